@@ -15,18 +15,18 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 PACKAGES = ("fmus", "orchestrator", "analysis", "hardware", "service")
 DOOR = "door"
 EXAMPLES = "service/examples"
-"""Where the page of the service has the scenes that one may begin with."""
+"""Folder of the starting scenes in the page of the service."""
 PACKAGE = "vibroimpact"
 ZIG = "ziglang>=0.13"
 RELEASE = "VIBROIMPACT_RELEASE"
-"""Variable that, where it is set, makes a wheel carry the libraries of all platforms: `make wheel`."""
+"""Variable that makes a wheel carry the libraries of all platforms, once it is set: `make wheel`."""
 
 
 class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Adds what the sources alone do not have: binaries for this machine."""
+    """Adds binaries for this machine, which the sources do not have."""
 
     def dependencies(self) -> list[str]:
-        """Ask for a compiler only where there is none."""
+        """Return a compiler as a requirement if this machine has none, or for a release."""
         self._make_importable()
         from vibroimpact.fmus.packaging.compiler import has_compiler
 
@@ -37,7 +37,7 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         self._make_importable()
         from vibroimpact.fmus.packaging.build import BUILT, build, build_platforms, is_current
 
-        # strict is for the project's own machines: a newer compiler's new warning must not stop a user
+        # strict only on the project's own machines: a newer compiler's new warning must not stop a user
         if version == "editable":
             link_packages(Path(self.root))
             build(BUILT, strict=False)
@@ -57,7 +57,7 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         build_data["tag"] = f"py3-none-{_platform()}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove what the wheel has taken in."""
+        """Remove the files made for the wheel."""
         if version != "editable":
             shutil.rmtree(self._built)
 
@@ -90,7 +90,7 @@ def _link_file(link: Path, target: Path) -> None:
 
 def _link(link: Path, target: Path) -> None:
     if sys.platform == "win32":
-        # symbolic links need a privilege there, junctions do not
+        # on Windows symbolic links need a privilege, junctions do not
         import _winapi
 
         _winapi.CreateJunction(str(target), str(link))
@@ -100,7 +100,7 @@ def _link(link: Path, target: Path) -> None:
 
 
 def _platform() -> str:
-    # the libraries know nothing of Python: one wheel per platform serves every version of it
+    # the libraries are independent of Python: one wheel per platform serves every version of it
     from packaging.tags import sys_tags
 
     names = (tag.platform for tag in sys_tags())

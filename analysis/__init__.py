@@ -1,4 +1,4 @@
-"""Datasets in, datasets or figures out; what is imported from here adds `ds.vibroimpact` to xarray datasets."""
+"""Datasets in, datasets or figures out; importing a name from here adds `ds.vibroimpact` to xarray datasets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # The options of commands come through this door, and xarray takes half a second to load.
+    # The options of commands are imported from here, and xarray takes half a second to load.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.dataset"), name)

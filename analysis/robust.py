@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-#: Median absolute deviation of normal noise times this is its standard deviation.
+#: Ratio of the standard deviation of normal noise to its median absolute deviation.
 MAD_TO_SIGMA = 1.482602218505602
 
 

@@ -30,7 +30,7 @@ class SpectralDensity:
     segment : int
         Samples of a segment.
     segments : int
-        Over which is averaged; each begins in the middle of the one before.
+        Number of averaged segments; each begins in the middle of the segment before.
     """
 
     frequency: Floats
@@ -40,12 +40,12 @@ class SpectralDensity:
 
     @property
     def resolution(self) -> float:
-        """Noise bandwidth, Hz: a peak that is narrower is drawn this wide. 4/3 of the distance of two frequencies."""
+        """Noise bandwidth, Hz: 4/3 of the distance of two frequencies. A narrower peak is drawn this wide."""
         return _BANDWIDTH * float(self.frequency[1])
 
     @property
     def words(self) -> str:
-        """How it was computed."""
+        """The method in words: window, number and length of the segments."""
         many = f"{self.segments} segments, half overlapping, of"
         return (
             f"Welch, Bartlett window: {'1 segment of' if self.segments == 1 else many} {self.segment} samples"
@@ -55,8 +55,8 @@ class SpectralDensity:
 def spectral_density(values: Floats, rate: float, segment: int | None = None) -> SpectralDensity:
     """Return the power spectral density of evenly spaced samples: equations.md 8.8, thesis (B.1), (B.2).
 
-    Segments overlap by half and have the window 1 - |j - M/2| / (M/2). No mean is taken off, as in the thesis: that of
-    the signal shows in the lowest two frequencies.
+    Segments overlap by half and have the window 1 - |j - M/2| / (M/2). The mean is not removed, as in the thesis:
+    it shows in the lowest two frequencies.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     Raises
     ------
     UsageError
-        The segment is no power of two or longer than the signal; samples are not finite; or the rate is no rate.
+        The segment is no power of two or longer than the signal; samples are not finite; or the rate is not > 0.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     signal = np.asarray(values, dtype=np.float64)
     if signal.ndim != 1 or signal.size < _FEWEST or not np.isfinite(signal).all():
         raise UsageError(
-            f"spectrum: expected a row of {_FEWEST} finite samples at least, got {_told(signal)}."
+            f"spectrum: expected a row of {_FEWEST} finite samples at least, got {_description(signal)}."
         )
     if not (np.isfinite(rate) and rate > 0.0):
         raise UsageError(f"spectrum: rate: expected a sampling rate > 0, Hz, got {rate}.")
@@ -103,7 +103,7 @@ def spectral_density(values: Floats, rate: float, segment: int | None = None) ->
     return SpectralDensity(frequency, density, length, (signal.size - length // 2) // (length // 2))
 
 
-def _told(signal: Floats) -> str:
+def _description(signal: Floats) -> str:
     if signal.ndim != 1:
         return f"an array of shape {signal.shape}"
     return (

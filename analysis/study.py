@@ -1,8 +1,8 @@
-"""What a study is: rows that are found one after the other, and what they are together, also half of them.
+"""The base class of studies: rows found one after the other, and their results, also when only half are found.
 
-Each study is one class. It says how it is prepared from the arguments of its operation, how its rows are found, and
-what they are as a dataset, in print and as a figure. `whole` makes one for a caller in Python;
-`analysis.commands.studies` conducts one on the command line, and keeps what Ctrl-C or a failure leaves.
+Each study is one class. The class says how it is prepared from the arguments of its operation. It finds the rows,
+and makes of them a dataset, a print and a figure. `whole` makes a study for a caller in Python;
+`analysis.commands.studies` conducts one on the command line, and keeps the results after Ctrl-C or a failure.
 """
 
 from __future__ import annotations
@@ -34,33 +34,33 @@ def _nowhere(_: Any) -> None:
 
 @dataclass(eq=False)
 class Study(ABC, Generic[Row]):
-    """A study; a subclass is a dataclass whose fields are what it is of.
+    """A study; a subclass is a dataclass whose fields say what is studied.
 
-    A subclass implements `rows` and `made`, for the command line `prepare` and `print_results` as well.
+    A subclass implements `rows` and `made`; for the command line also `prepare` and `print_results`.
 
     Attributes
     ----------
     found : list
-        Rows that were found so far, each of them whole.
+        Rows found so far, each of them whole.
     incomplete : str
-        Why there are not all rows; empty when there are.
+        Why rows are missing; empty when all are there.
     interruption : str
-        What is said of an interrupted study when its results are out.
+        Message printed after the results of an interrupted study.
     status : callable
-        Says where the study is, on a terminal.
+        Shows the progress of the study on a terminal.
     """
 
     name: ClassVar[str]
     nothing: ClassVar[str] = "a result"
-    """Noun of what there is none of before the first row."""
+    """Noun for the rows, for the message that there are none."""
     begins: ClassVar[str] = ""
-    """First words of the status line; none: there is no such line."""
+    """First words of the status line; empty: no status line."""
     named: ClassVar[tuple[type[VibroimpactError], ...]] = ()
     """Errors to which the command line adds the name of the file that is studied."""
     history: ClassVar[str] = ""
-    """Attribute `history` of its dataset, by which one that is there counts as made by the same command before."""
+    """Attribute `history` of its dataset: an existing dataset with the same one was made by the same command."""
     mark: ClassVar[str] = "scene_file"
-    """Attribute that the command line adds to the dataset: the path of what is studied."""
+    """Attribute that the command line adds to the dataset: the path of the studied file."""
     figure: ClassVar[str] = "auto"
     """Kind of its figure."""
 
@@ -72,18 +72,18 @@ class Study(ABC, Generic[Row]):
     @classmethod
     @abstractmethod
     def prepare(cls, options: Any, stack: ExitStack) -> Self | None:
-        """Return the study that the arguments of its operation ask for; None where they ask for no study.
+        """Return the study that the arguments of its operation describe; None where they describe no study.
 
         Parameters
         ----------
         options : Operation
         stack : ExitStack
-            Closes at the end what the study opens.
+            Closes, at the end, everything that the study opens.
         """
 
     @classmethod
     def reads(cls, options: Any) -> Sequence[Path]:
-        """Return the files that the arguments name; the first is what is studied."""
+        """Return the files that the arguments name; the studied file comes first."""
         return [options.scene]
 
     @classmethod
@@ -93,22 +93,22 @@ class Study(ABC, Generic[Row]):
 
     @classmethod
     def same(cls, options: Any) -> Mapping[str, Any]:
-        """Return the attributes by which a dataset that is there counts as made by the same command before."""
+        """Return the attributes by which an existing dataset counts as made by the same command before."""
         if cls.history:
             return {"history": cls.history}
         return {"results_kind": cls.name.replace("-", "_"), **cls.marks(options)}
 
     @abstractmethod
     def rows(self) -> Generator[Row, None, None]:
-        """Find the rows, one after the other; what makes none of them is refused before the first."""
+        """Find the rows, one after the other; arguments that allow no row are refused before the first row."""
 
     @abstractmethod
     def made(self) -> xr.Dataset:
-        """Return the dataset of what was found so far."""
+        """Return the dataset of the rows found so far."""
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """What was found, when no more rows come, with the program that found it."""
+        """The dataset of the rows found when no more come, with the versions of the program."""
         return self.made().assign_attrs(program_attributes())
 
     def take(self, row: Row) -> None:
@@ -121,33 +121,33 @@ class Study(ABC, Generic[Row]):
         return not self.found
 
     def shown(self) -> AbstractContextManager[Any]:
-        """Return what shows, while it is open, how far the study is."""
+        """Return the status line of the study, which is shown while the context is open."""
         return Terminal(stderr=True).status(self.begins) if self.begins else nullcontext()
 
     @abstractmethod
     def print_results(self) -> None:
-        """Print what was found."""
+        """Print the results."""
 
     @property
     def written(self) -> xr.Dataset | None:
-        """Dataset that is written; None where there is nothing to write."""
+        """Return the dataset to write; None where there is nothing to write."""
         return self.dataset
 
     @property
     def drawn(self) -> Any:
-        """Data of the figure; None where there is nothing to draw."""
+        """Return the data of the figure; None where there is nothing to draw."""
         found = self.dataset
         return found if "results_kind" in found.attrs else opened_in_memory(marked(found))
 
     def conclude(self, options: Any) -> None:
-        """Do what is left when results are printed, written and drawn; `incomplete` says whether these are all."""
+        """Finish the study when results are printed, written and drawn; `incomplete` says whether rows are missing."""
 
 
 AnyStudy = TypeVar("AnyStudy", bound=Study[Any])
 
 
 def whole(study: AnyStudy) -> AnyStudy:
-    """Return a study when all of its rows are found."""
+    """Return a study once all of its rows are found."""
     with closing(study.rows()) as rows:
         for row in rows:
             study.take(row)

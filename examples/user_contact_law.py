@@ -1,4 +1,4 @@
-"""A contact law in Python: a harder blow rebounds less. Make the FMU that user_contact_law.toml names with
+"""A contact law in Python: a harder blow rebounds less. This command makes the FMU for user_contact_law.toml:
 
 vibroimpact fmu export user-contact-law --law examples/user_contact_law.py -o examples/user_contact_law.fmu
 """

@@ -1,6 +1,6 @@
-"""The door to nidaqmx: NI's client, the messages of its protocol, and gRPC, in the extra `hardware`.
+"""The only importer of nidaqmx: NI's client, the messages of its protocol, and gRPC, in the extra `hardware`.
 
-The messages are in a private folder of nidaqmx, hence the bounds of its version in pyproject.toml.
+The messages are in a private folder of nidaqmx; therefore pyproject.toml bounds its version.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import Any
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.surroundings import in_a_folder_that_exists
 
-# what gRPC logs by itself stands beside the one line that this package says of it
+# gRPC's own log lines would stand beside the one line of this package
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 try:
-    with in_a_folder_that_exists():  # nidaqmx looks for a file of settings in the current one
+    with in_a_folder_that_exists():  # nidaqmx looks for a file of settings in the current folder
         import grpc
         import nidaqmx
         from nidaqmx import constants, stream_readers, stream_writers
@@ -29,7 +29,7 @@ except ImportError as _missing:
         "Install it: pip install 'vibroimpact[hardware]', or in a clone pip install '.[hardware]'."
     ) from None
 
-#: Of NI's service, as the client calls it.
+#: Name of NI's service in calls of the client.
 SERVICE = "nidaqmx_grpc.NiDAQmx"
 METHODS: dict[str, Any] = dict(nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"].methods_by_name)
 """Descriptor of each method of the service, by its name."""
@@ -89,5 +89,5 @@ class _Details(grpc.ClientCallDetails):  # type: ignore[misc]  # grpc carries no
 
 
 def with_deadline(channel: Any, seconds: float) -> Any:
-    """Return a channel whose calls fail when a server takes longer (s) to answer; NI's client waits for ever."""
+    """Return a channel whose calls fail after `seconds` without an answer; NI's client waits for ever."""
     return grpc.intercept_channel(channel, _Deadline(seconds))

@@ -14,7 +14,7 @@ MOST_BYTES = 2**16
 
 
 def text_of(path: Path, kind: str, most: int = MOST_BYTES) -> str:
-    """Return the text of a file; raise UsageError, which names its kind, if it cannot be read or is larger."""
+    """Return the text of a file; UsageError, which names its kind, if it cannot be read or is larger."""
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)
@@ -27,7 +27,7 @@ def text_of(path: Path, kind: str, most: int = MOST_BYTES) -> str:
 
 
 def document_of(text: str, source: str) -> dict[str, Any]:
-    """Return the tables of a text; raise UsageError, which begins with its source, if it is no TOML."""
+    """Return the tables of a text; UsageError, which begins with its source, if it is no TOML."""
     try:
         return parse_toml(text)
     except ValueError as problem:

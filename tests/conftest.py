@@ -1,4 +1,4 @@
-"""What `--fast` leaves out; seed and number of examples of every property test. The end of a run says both."""
+"""The tests of `--fast`; seed and number of examples of every property test. The end of a run reports both."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from typing import Any
 import hypothesis
 import pytest
 from _pytest.doctest import DoctestModule
-from harness.kept_costs import DEAR_FIXTURE, dear_tests, whole_modules
+from harness.kept_costs import EXPENSIVE_FIXTURE, expensive_tests, whole_modules
 from harness.warm import WITHOUT_THREADS
 from hypothesis.errors import UnsatisfiedAssumption
 
-# Images of containers often forbid it: then each worker rewrites the assertions of every module of tests, and each
-# process that a test starts compiles the whole package.
+# Container images often forbid bytecode. Each worker would then rewrite the assertions of every test module, and each
+# process started by a test would compile the whole package.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# before a test imports them: this process is forked
+# before a test imports numpy and pyarrow: this process is forked
 os.environ |= WITHOUT_THREADS
 
 pytest_plugins = ["harness.costs", "harness.side_by_side", "support.cluster"]
 
 SEED = 4
-"""Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
+"""Seed of every property test: a run can be repeated anywhere; `--hypothesis-seed=N` sets another."""
 
 COUNTS = pytest.StashKey[dict[str, list[int]]]()
 LEFT_OUT = pytest.StashKey[int]()
-"""Number of tests that `--fast` leaves out of the folders that it looks into."""
+"""Number of tests that `--fast` leaves out of its folders."""
 
 TESTS = Path(__file__).parent
 FAST_FOLDERS = ("architecture", "unit")
-"""All that `--fast` takes tests from."""
+"""The folders of `--fast`."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are neither dear nor long"
+    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are neither expensive nor long"
     parser.addoption("--fast", action="store_true", help=text)
     where = "a board for the tests of rigs: Dev1 of this machine, or grpc://HOST:PORT/Dev1"
     parser.addoption("--real-rig", metavar="BOARD", help=where)
@@ -53,7 +53,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> Any:
-    """Let `--doctest-modules` look for examples in the package alone, which is given beside the tests."""
+    """Let `--doctest-modules` look for examples only in the package, whose path is given next to the tests."""
     found = yield
     return [one for one in found if not (isinstance(one, DoctestModule) and TESTS in file_path.parents)]
 
@@ -64,25 +64,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = _left_out(items)
     config.stash[LEFT_OUT] = len(left_out)
     config.hook.pytest_deselected(items=left_out)
-    those = set(left_out)
-    items[:] = [item for item in items if item not in those]
+    excluded = set(left_out)
+    items[:] = [item for item in items if item not in excluded]
 
 
 def _left_out(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Return the tests that are dear or long, or have a dear fixture in their module; some of every room stay."""
-    costs, whole = dear_tests(), whole_modules()
+    """Return the expensive and long tests, and those of modules with an expensive fixture; every room keeps some."""
+    costs, whole = expensive_tests(), whole_modules()
     short = [item for item in items if not item.get_closest_marker("long")]
     cheap = [item for item in short if item.nodeid not in costs]
     stay: list[pytest.Item] = []
     for chosen in (
         [item for item in cheap if item.nodeid.partition("::")[0] not in whole],
         cheap,
-        [item for item in short if costs.get(item.nodeid, 0.0) < DEAR_FIXTURE],
+        [item for item in short if costs.get(item.nodeid, 0.0) < EXPENSIVE_FIXTURE],
     ):
         rooms = {item.path.parent for item in stay}
         stay += [item for item in chosen if item.path.parent not in rooms]
-    those = set(stay)
-    return [item for item in items if item not in those]
+    staying = set(stay)
+    return [item for item in items if item not in staying]
 
 
 def _seed(config: pytest.Config) -> int | str:
@@ -106,10 +106,10 @@ def _counted(function: Callable[..., Any], count: list[int]) -> Callable[..., An
 
 
 def _draw_the_same_whatever_is_loaded() -> None:
-    """Keep hypothesis from drawing constants of whichever of our modules happen to be loaded by then.
+    """Keep hypothesis from drawing constants of whichever modules of this project happen to be loaded.
 
-    What is loaded depends on which tests ran before, in which worker: a run could not be repeated. Hypothesis has no
-    setting for it; where its inside is another, nothing is changed.
+    The loaded modules depend on the earlier tests of a worker, so a run could not be repeated. Hypothesis has no
+    setting for it; if its internals differ, nothing is changed.
     """
     from hypothesis.internal.conjecture import providers
 
@@ -118,13 +118,13 @@ def _draw_the_same_whatever_is_loaded() -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # no example fails for its time: the machine may be busy, and the first text drawn makes a table of all characters
+    # no example fails for its time: the machine may be busy, and the first drawn text makes a table of all characters
     too_slow = [hypothesis.HealthCheck.too_slow]
     hypothesis.settings.register_profile("without a clock", deadline=None, suppress_health_check=too_slow)
     hypothesis.settings.load_profile("without a clock")
     _draw_the_same_whatever_is_loaded()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        # as a shell has it for what runs in the background: tests send Ctrl-C, to the processes that they start too
+        # a shell lets background jobs ignore SIGINT: tests send Ctrl-C, also to the processes that they start
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash.setdefault(COUNTS, {})
 
@@ -149,18 +149,18 @@ def pytest_runtest_call(item: pytest.Item) -> Any:
 
 
 def pytest_handed_over(config: pytest.Config) -> dict[str, Any]:
-    """Hand over what a copy of this process has tried."""
+    """Return the numbers of examples tried by a copy of this process."""
     return {"examples": config.stash.get(COUNTS, {})}
 
 
 def pytest_taken_over(config: pytest.Config, given: dict[str, Any]) -> None:
-    """Take over what a copy of this process has tried."""
+    """Add the numbers of examples tried by a copy of this process."""
     config.stash.setdefault(COUNTS, {}).update(given["examples"])
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Write what was tried, and what was not."""
-    _tell_examples(terminalreporter, config)
+    """Write the numbers of tried examples and of left-out tests."""
+    _write_examples(terminalreporter, config)
     if config.getoption("fast"):
         folders = sorted({path.relative_to(TESTS).parts[0] for path in TESTS.glob("*/**/test_*.py")})
         left_out = [f"tests/{folder}" for folder in folders if folder not in FAST_FOLDERS]
@@ -170,7 +170,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         )
 
 
-def _tell_examples(terminalreporter: Any, config: pytest.Config) -> None:
+def _write_examples(terminalreporter: Any, config: pytest.Config) -> None:
     counts = config.stash.get(COUNTS, {})
     if not counts:
         return

@@ -1,1 +1,1 @@
-"""What the operations of this package do on the command line, a module for each."""
+"""Code behind the operations of this package on the command line, a module for each."""

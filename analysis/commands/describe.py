@@ -1,4 +1,4 @@
-"""What `vibroimpact describe` does: say what is in a file from its own names and units."""
+"""The command `vibroimpact describe`: list the contents of a file by its own names and units."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 from vibroimpact.fmus.units import written_unit
 
-#: Texts of a variable that are shown; the rest is counted.
+#: Texts of a variable that are shown; further texts are counted only.
 _MOST_TEXTS = 6
-#: Remarks that are shown; the rest is counted.
+#: Remarks that are shown; further remarks are counted only.
 _MOST_REMARKS = 8
 #: Endings of the variable that holds the standard errors of another.
 _ERRORS = ("_error", "_standard_error")
@@ -33,7 +33,7 @@ _NOTES = ("title", "history", "engine", "channel", "verdict")
 
 
 def describe_file(options: Describe) -> None:
-    """Print what a file of this package holds; one that is missing, damaged or foreign raises DatasetError."""
+    """Print the contents of a file of this package; a missing, damaged or foreign file raises DatasetError."""
     file = dataset_file(options.file)
     console = wide_terminal()
     with opened_file(file) as data:
@@ -47,7 +47,7 @@ def describe_file(options: Describe) -> None:
 
 
 def _kind(data: xr.Dataset | Recording) -> str:
-    """Return what a file is."""
+    """Return the kind of a file, in words."""
     if isinstance(data, Recording):
         return "recording"
     kind = data.attrs.get("results_kind")
@@ -64,7 +64,7 @@ def _kind(data: xr.Dataset | Recording) -> str:
 
 
 def _notes(attrs: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what made a file, and what its writer says of it."""
+    """Yield the command that made a file, and the notes of its writer."""
     kind = str(attrs.get("results_kind", ""))
     source = attrs.get("source", attrs.get("source_file", "data without a name"))
     if kind == "estimates":
@@ -97,7 +97,7 @@ def _print_dataset(console: Terminal, data: xr.Dataset) -> None:
 
 
 def _is_shown_elsewhere(data: xr.Dataset, name: str) -> bool:
-    """Tell whether a variable stands in a table of its own, or is the error behind another's values."""
+    """Tell whether a variable stands in a table of its own, or is the standard error of another variable."""
     if {"estimator", "quantity"} <= set(data.dims) and name in _ESTIMATES:
         return True
     if "fitted_value" in data and name in _FITTED:
@@ -106,7 +106,7 @@ def _is_shown_elsewhere(data: xr.Dataset, name: str) -> bool:
 
 
 def _estimates(data: xr.Dataset) -> Table:
-    """Return quantities by methods."""
+    """Return the table of quantities by methods."""
     methods = [str(name) for name in data["estimator"].values]
     rows = table("Estimates", "<quantity", "<unit", *(f">{name.replace('_', ' ')}" for name in methods))
     for place, quantity in enumerate(data["quantity"].values):
@@ -118,7 +118,7 @@ def _estimates(data: xr.Dataset) -> Table:
 
 
 def _fit(data: xr.Dataset) -> Table:
-    """Return the numbers of a scene that a replay found."""
+    """Return the table of the scene's numbers that a replay fitted."""
     rows = table("Fit", "<number", ">found", ">began with")
     columns = (data[name].values for name in _FITTED)
     for key, value, start, error in zip(*columns, strict=True):
@@ -149,8 +149,8 @@ def _values(data: xr.Dataset, name: str) -> str:
         return "none"
     error = next((data[name + ending] for ending in _ERRORS if name + ending in data), None)
     if len(values) == 1:
-        doubt = np.nan if error is None else float(np.ravel(error.values)[0])
-        return with_error(float(values[0]), doubt)
+        standard_error = np.nan if error is None else float(np.ravel(error.values)[0])
+        return with_error(float(values[0]), standard_error)
     least, most = finite.min(), finite.max()
     text = f"{least:.6g}" if least == most else f"{least:.6g} to {most:.6g}"
     if error is not None:

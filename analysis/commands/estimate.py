@@ -1,4 +1,4 @@
-"""What `vibroimpact estimate` does: estimate, print, write and draw."""
+"""The command `vibroimpact estimate`: estimate, print, write and draw."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from vibroimpact.fmus.messages import Spelling, spelled, typed
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 Estimation = EstimateDecay | EstimateImpacts | EstimateBounces | EstimateResponse
-"""Estimations, which all say data, channel, window, run, places."""
+"""Estimations; all have the fields data, channel, window, run, and output places."""
 
 
 def decay_of(options: EstimateDecay, spelling: Spelling = typed) -> None:
@@ -118,7 +118,7 @@ def response_of(options: EstimateResponse, spelling: Spelling = typed) -> None:
 
 @contextmanager
 def _estimating(options: Estimation, spelling: Spelling) -> Iterator[Terminal]:
-    """Refuse files that cannot be written, and begin the message of what has no answer with the name of its data."""
+    """Refuse files that cannot be written; errors of an estimation begin with the name of its data."""
     refuse_places(options, [options.data], results_kind="estimates", source_file=options.data.name)
     try:
         yield wide_terminal(spelling)
@@ -161,7 +161,7 @@ def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Datase
 
 
 def _write(console: Terminal, dataset: xr.Dataset, options: Estimation) -> None:
-    """Write what was asked for, and say so."""
+    """Write the dataset and the figure that the options name, and report each."""
     dataset = dataset.assign_attrs(spelled(dataset.attrs, console.spelling))
     if options.output is not None:
         with writing(options.output):

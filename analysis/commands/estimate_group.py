@@ -12,15 +12,15 @@ from typer.core import TyperGroup
 
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
-# Kinds of estimation that version 0.1 did not have: its form never meant them.
+# Kinds of estimation that version 0.1 did not have: its form never names them.
 _NEW_KINDS = ("bounces",)
 
 
 class EstimateGroup(TyperGroup):
-    """The command `estimate`, which says what its form of version 0.1, `estimate FILE --kind KIND`, is now."""
+    """The command `estimate`; for its form of version 0.1, `estimate FILE --kind KIND`, it names the new command."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse what follows `estimate`; its old form raises UsageError, with the command to write."""
+        """Parse the words after `estimate`; the old form raises UsageError with the command to write instead."""
         if args and args[0] not in (*self.commands, "--help") and _has_old_form(args[0]):
             kind, words = _without_kind(args)
             names = [kind] if kind in self.commands else self._kinds(words)
@@ -32,7 +32,7 @@ class EstimateGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
     def _kinds(self, words: Sequence[str]) -> list[str]:
-        """Return the kinds of estimation that have all these options; of several that which fits the data."""
+        """Return the kinds of estimation that have all these options; of several, the kind that fits the data."""
         options = {
             name: _options(command) for name, command in self.commands.items() if name not in _NEW_KINDS
         }
@@ -57,7 +57,7 @@ def _has_old_form(first: str) -> bool:
 
 
 def _without_kind(args: Sequence[str]) -> tuple[str, list[str]]:
-    """Return the value of `--kind`, empty without, and the other words."""
+    """Return the value of `--kind` (empty if absent) and the other words."""
     kind, words, rest = "", [], iter(args)
     for word in rest:
         name, _, value = word.partition("=")

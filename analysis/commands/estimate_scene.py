@@ -1,4 +1,4 @@
-"""What `vibroimpact estimate` takes from the scene of a simulated run, and what its options add."""
+"""The numbers that `vibroimpact estimate` takes from the scene of a simulated run, and from its options."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def refuse_numbers(options: EstimateImpacts) -> None:
 
 
 def kind_of(data: Path, *, one_run: bool) -> str:
-    """Return what `vibroimpact estimate` finds in data: decay, impacts or response; of one run never a response.
+    """Return the estimation that fits the data: decay, impacts or response; never a response for one run.
 
-    A file that is missing, damaged or foreign raises DatasetError.
+    A missing, damaged or foreign file raises DatasetError.
     """
     if is_recording(data):
         return "decay"
@@ -72,7 +72,7 @@ def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, An
 
 
 def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
-    """Return the table of a swept key, `body` or `stop[1]`; None where the scene has none such."""
+    """Return the table of a swept key, `body` or `stop[1]`; None where the scene has no such table."""
     numbered = _NUMBERED.fullmatch(owner)
     if numbered is None:
         table = scene.setdefault(owner, {})
@@ -84,14 +84,14 @@ def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
 
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """What a channel reads of a displacement in m: gain * displacement + zero; a plain displacement reads itself."""
+    """The linear reading of a channel: gain * displacement (m) + zero; a plain displacement has gain 1 and zero 0."""
 
     gain: float = 1.0
     zero: float = 0.0
 
     @property
     def turn(self) -> float:
-        """Phase by which a channel that is inverted sees the force, rad."""
+        """Phase by which an inverted channel sees the force, rad."""
         return math.pi if self.gain < 0.0 else 0.0
 
     def side(self, side: str) -> str:
@@ -112,7 +112,7 @@ def _falls(scene: Mapping[str, Any]) -> bool:
 
 
 def force_amplitude(scene: Mapping[str, Any]) -> float | None:
-    """Return the amplitude of the forcing of a scene, N; in another unit for other kinds; None where it is not one."""
+    """Return the forcing amplitude of a scene, N (another unit for other kinds); None if it is not one number."""
     amplitude = scene.get("forcing", {}).get("amplitude")
     if _falls(scene) or not isinstance(amplitude, int | float):
         return None
@@ -120,7 +120,7 @@ def force_amplitude(scene: Mapping[str, Any]) -> float | None:
 
 
 def _rest(scene: Mapping[str, Any], reading: _Reading) -> float | None:
-    """Return what a channel reads of a simulated body at rest; None where it is not known how far a force bends it."""
+    """Return the reading of a channel for a simulated body at rest; None where the static deflection is unknown."""
     force, stiffness = scene.get("exciter", {}).get("offset", 0.0), scene.get("body", {}).get("stiffness")
     if force == 0.0:
         return reading.zero
@@ -132,11 +132,11 @@ def _rest(scene: Mapping[str, Any], reading: _Reading) -> float | None:
 def forcing_and_known(
     options: EstimateImpacts, recording: Recording, channel: Channel
 ) -> tuple[Forcing | None, Known]:
-    """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
+    """Return the force, and the known values of oscillator and stop: from the options, else from the scene.
 
-    No force where its frequency or amplitude is 0: a body that bounces under its weight. Of the scene only forcing and
-    stop are taken: what an experiment would know too. Stiffness and damping are left to be estimated, unless options
-    say them. UsageError: the forcing frequency is not known, or options contradict each other.
+    The force is None where its frequency or amplitude is 0: a body that bounces under its weight. The scene gives only
+    forcing and stop, which an experiment would know too. Stiffness and damping are left to be estimated, unless options
+    give them. UsageError: the forcing frequency is unknown, or options contradict each other.
     """
     scene = run_scene(options.data, options.run, recording)
     reading = _reading_of(channel, scene)
@@ -156,7 +156,7 @@ def forcing_and_known(
         damping_ratio=options.damping_ratio,
         natural_frequency=natural,
         stop_position=None if position is None else float(position),
-        # A simulated body rests where its scene says; an instrument may read anything there.
+        # The scene says where a simulated body rests; an instrument may read any value there.
         offset=_rest(scene, reading) if options.offset is None and scene else options.offset,
         # An option about another stop leaves the side to the signal.
         side=reading.side(str(stop.get("side", "upper"))) if stop and options.stop is None else None,
@@ -228,7 +228,7 @@ def _static_deflection(
     if len(known) < len(numbers) or not known[1] > 0.0:
         return None
     force = known[0] * (known[2] if moves_base else 1.0)
-    # what turns with a gain below 0 is the phase
+    # a gain below 0 turns the phase, not the amplitude
     sign = -1.0 if scene.get("exciter", {}).get("gain", 1.0) < 0.0 else 1.0
     return sign * force / known[1] * abs(reading.gain)
 

@@ -1,4 +1,4 @@
-"""Any file of ours, opened as what it is: a dataset of runs, a recording, what an analysis found."""
+"""Any file of this package, opened by its kind: a dataset of runs, a recording, or results of an analysis."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def opened_file(file: Path) -> Iterator[xr.Dataset | Recording]:
         with _opened(file) as data:
             yield data
     except DAMAGE as problem:
-        # What bears the hash of its writer holds what was written: there the fault is not the file's.
+        # A file with the hash of its writer is as it was written: the fault is not the file's then.
         if isinstance(problem, OSError | RuntimeError) or not matches_recorded_hash(file):
             raise unreadable(file, problem) from problem
         raise
@@ -41,7 +41,7 @@ def _opened(file: Path) -> AbstractContextManager[xr.Dataset | Recording]:
         return open_measured(file)
     if "dataset_schema" not in attributes:
         measured = open_measured(file)
-        # of a benchmark, which has no schema
+        # a benchmark writes no schema
         if "error" in measured:
             return measured
         measured.close()

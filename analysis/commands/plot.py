@@ -1,4 +1,4 @@
-"""What `vibroimpact plot` does."""
+"""The command `vibroimpact plot`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
 
 _DRAWN = ("recording", "start", "stop", "periods", "segment", "variable", "title", "width", "height")
-"""Arguments that `figures.draw` has too."""
+"""Arguments that `figures.draw` takes as well."""
 
 
 def draw_file(options: Plot) -> None:
-    """Draw a file that this package wrote, over another one."""
+    """Draw a file that this package wrote, or draw one file over another."""
     file, output = dataset_file(options.file), options.output
     drawn = {name: getattr(options, name) for name in _DRAWN}
     below = None if options.over is None else dataset_file(options.over)
@@ -37,7 +37,7 @@ def draw_file(options: Plot) -> None:
         try:
             figure = figures.draw(data, options.kind, options.run, **drawn, over=other)
         except (LookupError, ValueError, TypeError, AttributeError) as problem:
-            # results may lack what their figure shows, or be another's
+            # the results may lack the variables of their figure, or be another program's
             if results is None:
                 raise
             raise DatasetError(

@@ -1,4 +1,4 @@
-"""What `vibroimpact fmu replay` does: write an FMU that plays the channels of a recording."""
+"""The command `vibroimpact fmu replay`: write an FMU that plays the channels of a recording."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.fmus.terminal import say
 
-#: A time axis that calls itself even is played as such where no instant is off by more than this part of the interval.
+#: Largest deviation of a time axis with a stated interval, over this interval, at which it is played as even.
 EVEN = 0.01
 
 
 def build_player(options: ExportReplay) -> None:
-    """Write the FMU that plays channels of a recording, all without a name, and say what it plays."""
+    """Write the FMU that plays channels of a recording (all, unless some are named), and list them."""
     output, si = options.output, options.si
     refuse_outputs([options.recording], output, ending=".fmu")
     source = open_signals(options.recording, options.run)
@@ -42,7 +42,7 @@ def _chosen(source: Recording, names: Sequence[str]) -> list[Channel]:
 
 
 def replay_signal(channel: Channel, *, si: bool = False) -> ReplaySignal:
-    """Return a channel as what `build_replay` takes, in its own unit or in the SI unit of its kind.
+    """Return a channel in the form that `build_replay` takes, in its own unit or in the SI unit of its kind.
 
     Samples without a value (NaN) stay gaps; clipped ones are played as they are.
     """

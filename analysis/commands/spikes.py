@@ -1,4 +1,4 @@
-"""What `vibroimpact spikes` does: find spikes and look at the intervals between them."""
+"""The command `vibroimpact spikes`: find spikes, and analyse the intervals between them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.messages import Spelling, joined, spelled, typed
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
-#: Fewer spikes have no statistics of intervals.
+#: Number of spikes below which no statistics of intervals are computed.
 _FEWEST_FOR_INTERVALS = 3
 
 
 def find_spikes(options: Spikes, spelling: Spelling = typed) -> None:
-    """Find the spikes of a channel, or look at the intervals of an event train; print, write and draw them."""
+    """Find the spikes of a channel, or analyse the intervals of an event train; print, write and draw the results."""
     data, output, figure = options.data, options.output, options.figure
     settings, mechanics = _settings(options), _mechanics(options)
     refuse_places(options, [data], results_kind="spikes", source=data.name)
@@ -81,7 +81,7 @@ def _mechanics(options: Spikes) -> Mechanics:
 
 
 def number(text: str, option: str) -> float:
-    """Return the number that an option was given as text; another text raises UsageError."""
+    """Return the number of an option that was given as text; other text raises UsageError."""
     try:
         return float(text)
     except ValueError as problem:
@@ -108,7 +108,7 @@ def _spikes(
     dataset = report.dataset
     if dataset.sizes["spike"] < _FEWEST_FOR_INTERVALS:
         return report, dataset
-    # what was observed begins with the first spike: before it, one may have been cut off
+    # the observed time begins with the first spike: before it, another spike may have been cut off
     train = EventTrain("spikes", dataset["spike_time"].values)
     more = _trains(console, train, options, unobserved(report))
     remarks = joined("\n", (each.attrs["remarks"] for each in (dataset, more) if each.attrs.get("remarks")))
@@ -122,7 +122,7 @@ def _trains(
     options: Spikes,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> xr.Dataset:
-    """Print and return what the intervals of a train tell."""
+    """Print and return the statistics of the intervals of a train."""
     if options.seams is not None and len(train.times):
         masked += seams(options.seams, train.window or (float(train.times[0]), float(train.times[-1])))
     dataset = interval_report(
@@ -140,7 +140,7 @@ def _trains(
 
 
 def _draw(report: SpikeReport | None, dataset: xr.Dataset, path: Path) -> None:
-    """Write the figure of the spikes, or that of the intervals where there are only these."""
+    """Write the figure of the spikes, or of the intervals where there are only intervals."""
     # matplotlib takes half a second to import; spikes alone do not pay for it.
     from vibroimpact.analysis import figures
     from vibroimpact.analysis.figures.measured.intervals import draw_intervals

@@ -1,4 +1,4 @@
-"""Studies on the command line: prepared, followed row by row, then printed, written and drawn, half of them as well."""
+"""Studies on the command line: prepared, followed row by row, then printed, written and drawn, also half of them."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Studied(Places, Protocol):
 
 
 def conduct(options: Studied) -> None:
-    """Carry out a study; what was found is printed, written and drawn, also when it ends half way.
+    """Carry out a study; the rows found are printed, written and drawn, also when it ends half way.
 
-    VibroimpactError: the study cannot be made, or it failed on the way; typer.Exit: Ctrl-C came. What was found before
-    is out then.
+    VibroimpactError: the study cannot be made, or it failed half way. typer.Exit: Ctrl-C came. The rows found before
+    are printed, written and drawn even then.
     """
     kind: type[Study[Any]] = pkgutil.resolve_name(f"{ROOT}.{options.study}")
     read = kind.reads(options)
@@ -64,7 +64,7 @@ def conduct(options: Studied) -> None:
 
 @contextmanager
 def _naming(study: Study[Any], read: Sequence[Path]) -> Iterator[None]:
-    """Add the name of the file that is studied to errors that do not name it."""
+    """Add the name of the studied file to errors that do not name it."""
     try:
         yield
     except study.named as problem:
@@ -75,15 +75,15 @@ def _prepared(kind: type[Study[Any]], options: Studied, stack: ExitStack) -> Stu
     try:
         return kind.prepare(options, stack)
     except KeyboardInterrupt:
-        raise _nothing(kind) from None
+        raise _nothing_yet(kind) from None
 
 
-def _nothing(kind: type[Study[Any]]) -> Interrupted:
+def _nothing_yet(kind: type[Study[Any]]) -> Interrupted:
     return Interrupted(f"{kind.name}: interrupted before there was {kind.nothing}.")
 
 
 def _followed(study: Study[Any]) -> Exception | None:
-    """Find the rows; return the failure that came on the way.
+    """Find the rows; return the failure that ended the study, if any.
 
     VibroimpactError: nothing was found before an interrupt or a failure.
     """
@@ -96,7 +96,7 @@ def _followed(study: Study[Any]) -> Exception | None:
         study.incomplete = ""
     except KeyboardInterrupt:
         if study.is_empty:
-            raise _nothing(type(study)) from None
+            raise _nothing_yet(type(study)) from None
     except Exception as problem:
         if study.is_empty:
             raise
@@ -120,7 +120,7 @@ def _draw(study: Study[Any], figure: Path) -> None:
     data = study.drawn
     if data is None:
         return
-    from vibroimpact.analysis import figures  # half a second, which a table needs not
+    from vibroimpact.analysis import figures  # half a second, which a table alone does not need
 
     try:
         drawn = figures.draw(data, study.figure)

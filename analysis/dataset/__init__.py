@@ -1,8 +1,8 @@
 """The door to the dataset: its schema, its writers and its readers.
 
-`schema` holds the table of names, dimensions, units and meanings, `checking` the check against it; `writing`
-builds and writes; `merging` joins parts; `reading` opens; `accessor` is `ds.vibroimpact`, which `registering`
-tells xarray; `backend` is its engine. Everything public is importable from here.
+`schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
+`writing` builds and writes, `merging` joins parts, `reading` opens. `accessor` is `ds.vibroimpact`, which
+`registering` adds to xarray; `backend` is its engine. Everything public is importable from here.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # The process of a guarded point needs the records of runs alone, and xarray takes half a second to load.
+    # The process of a guarded point needs only the records of runs, and xarray takes half a second to load.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_HOMES.get(name, 'schema')}"), name)

@@ -1,4 +1,4 @@
-"""What `ds.vibroimpact` is: the impacts, sticks, samples and events of one run, under the dataset's coordinates."""
+"""The accessor `ds.vibroimpact`: impacts, sticks, samples and events of one run, by the dataset's coordinates."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _RECORD_KEYS = {
     "event": "events = true",
 }
 
-# Relative distance within which a value means the only one that a parameter has.
-_SAME = 1e-6
+# Relative distance from the only value of a parameter within which a selection means that value.
+_SAME_VALUE = 1e-6
 
 
 class VibroimpactAccessor:
-    """What an opened dataset can be asked about its runs.
+    """Questions to an opened dataset about its runs.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class VibroimpactAccessor:
             return kept
         if run_id.dims:
             flat = _stacked(kept, run_id)
-        else:  # what is said of the only run is along `run` too
+        else:  # variables of the only run get the dimension `run` too
             said = {name for name, one in kept.coords.items() if not one.dims} - set(constant_names(kept))
             flat = kept.reset_coords(said).expand_dims("run").set_coords(said)
         flat = flat.isel(run=flat["run_id"].values >= 0)
@@ -69,7 +69,7 @@ class VibroimpactAccessor:
         return html_table("vibroimpact", (), self._facts())
 
     def _facts(self) -> list[tuple[str, object]]:
-        """Return what the dataset holds: names and values."""
+        """Return the facts about the dataset, by name."""
         dataset, run_id = self._dataset, run_ids(self._dataset)
         outcomes = Counter(np.asarray(dataset["outcome"].values)[run_id.values >= 0].tolist())
         ends = ", ".join(f"{count} {Outcome(kind).name}" for kind, count in sorted(outcomes.items()))
@@ -86,7 +86,7 @@ class VibroimpactAccessor:
         Returns
         -------
         xarray.Dataset
-            Columns as those of `impacts`; `run_id`, `run_index`, `direction` and the swept parameters are coordinates
+            Columns as in `impacts`; `run_id`, `run_index`, `direction` and the swept parameters are coordinates
             along `impact`. `to_dataframe()` makes it a table of pandas.
 
         Raises
@@ -119,10 +119,10 @@ class VibroimpactAccessor:
         Parameters
         ----------
         exact : bool
-            Demand the very value of each swept parameter instead of the nearest, which is at most half a step away.
+            Demand the exact value of each swept parameter instead of the nearest, which is at most half a step away.
         **selection
-            Values of coordinates (`direction="up"`, `angular_frequency=0.9`), or `run_id=`; what is not
-            given must be the same for all runs that are left.
+            Values of coordinates (`direction="up"`, `angular_frequency=0.9`), or `run_id=`; coordinates without a
+            value must be the same for all runs that are left.
 
         Raises
         ------
@@ -176,7 +176,7 @@ def _rows_of(dataset: xr.Dataset, dimension: str) -> list[Any]:
 
 
 def _swept_in_words(values: xr.DataArray) -> str:
-    """Return the range of a swept parameter, its unit and how many values it has."""
+    """Return the range of a swept parameter, its unit and its number of values."""
     unit = str(values.attrs.get("units", "1"))
     there = np.unique(values.values)
     span = f"{there[0]:g} to {there[-1]:g}" if there.size > 1 else ", ".join(f"{each:g}" for each in there)
@@ -217,9 +217,9 @@ def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tup
 
 
 def _stacked(dataset: xr.Dataset, run_id: xr.DataArray) -> xr.Dataset:
-    """Return a dataset with one dimension `run` in place of those of its runs, in whatever order they are."""
+    """Return a dataset with one dimension `run` in place of the dimensions of its runs, in any order."""
     runs = set(run_id.dims)
-    # xarray cannot stack what has no size: where every run failed there is no period
+    # xarray cannot stack an empty variable: where every run failed there is no period
     nothing = {name: one for name, one in dataset.variables.items() if runs <= set(one.dims) and not one.size}
     if not run_id.size:
         return dataset.stack(run=run_id.dims, create_index=False)
@@ -238,9 +238,9 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
         if name not in ("run", "period", "connection", "compared") and set(coordinate.dims) <= set(
             run_id.dims
         ):
-            # of the variable: xarray copies all coordinates along with each of them
+            # the variable, not the coordinate: xarray copies all coordinates along with each coordinate
             values = coordinate.variable.set_dims(run_id.sizes).transpose(*run_id.dims).values
-            columns[str(name)] = values.reshape(-1)  # no copy of what is the same for all runs
+            columns[str(name)] = values.reshape(-1)  # no copy where all runs have the same value
     if "direction" in columns and columns["direction"].dtype.kind == "i":
         columns["direction"] = np.array([member.name for member in Direction])[columns["direction"]]
     return columns
@@ -249,13 +249,13 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
 def _matches(
     name: str, values: NDArray[Any], left: NDArray[np.bool_], value: Any, exact: bool
 ) -> NDArray[np.bool_]:
-    """Return which runs have this value, or the nearest there is among those left."""
+    """Return a mask of the runs with this value, or with the nearest value among the runs left."""
     if values.dtype.kind == "f" and not exact and left.any():
         if not np.isfinite(value):
             raise DatasetError(f"selection: {name}: expected a number, got {value}.")
         there = np.unique(values[left])
         nearest = there[np.argmin(np.abs(there - value))]
-        if not abs(value - nearest) <= _room_beyond(there, value):
+        if not abs(value - nearest) <= _half_step(there, value):
             raise DatasetError(
                 f"selection: {name}: expected {_span(there)}, got {value:g}. "
                 "Give a value that was computed, or near one."
@@ -264,17 +264,17 @@ def _matches(
     return np.asarray(values == value)
 
 
-def _room_beyond(there: NDArray[Any], value: float) -> float:
-    """Return how far a value may be from the nearest of those there: half a step, beyond the ends too."""
+def _half_step(there: NDArray[Any], value: float) -> float:
+    """Return the largest distance of a value from the nearest known one: half a step, also beyond the ends."""
     if there.size == 1:
-        return float(_SAME * abs(there[0]))
+        return float(_SAME_VALUE * abs(there[0]))
     if there[0] <= value <= there[-1]:
         return math.inf
     return float(0.5 * (there[1] - there[0] if value < there[0] else there[-1] - there[-2]))
 
 
 def _span(there: NDArray[Any]) -> str:
-    """Return what there is to choose from, in words."""
+    """Return the values that can be selected, in words."""
     if there.size == 1:
         return f"{there[0]:g}, the only value there is"
     return f"a value of {there[0]:g} to {there[-1]:g}"
@@ -293,7 +293,7 @@ def _not_one(
     several = [
         n for n, v in columns.items() if n not in ("run_id", "run_index") and np.unique(v[found]).size > 1
     ]
-    # one value along a dimension is enough, whatever moves along it
+    # one value along a dimension is enough, even if several parameters move along it
     axes = [name for name in several if name in dims]
     return (
         f"selection: expected one run, got {found.size} for {given}. "

@@ -1,4 +1,4 @@
-"""Datasets of xarray made of arrays, without dask.array and pint, which take a quarter of a second each to import."""
+"""Datasets of xarray made of arrays, without importing dask.array and pint, a quarter of a second each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Described: TypeAlias = tuple[tuple[Hashable, ...], Any, Mapping[Any, Any]]
 
 
 class Named(Protocol):
-    """Variables of which some are coordinates: a dataset of xarray, or what becomes one."""
+    """Variables, some of which are coordinates: a dataset of xarray, or variables that become one."""
 
     @property
     def variables(self) -> Mapping[Any, xr.Variable]:
@@ -38,7 +38,7 @@ def assembled(
 def wrapped(variables: Mapping[str, Described | xr.Variable]) -> dict[str, xr.Variable]:
     """Return variables of xarray by their names.
 
-    Without its fast path xarray asks of each array whether it is one of Dask, and imports that to know.
+    Without its fast path xarray checks whether each array is one of Dask, and imports Dask for the check.
     """
     return {
         name: parts if isinstance(parts, xr.Variable) else new_variable(*parts)
@@ -54,7 +54,7 @@ def new_variable(dims: str | tuple[Hashable, ...], values: Any, attrs: Mapping[A
 def loaded_variable(variable: xr.Variable) -> xr.Variable:
     """Return a variable with its values in memory.
 
-    `Variable.compute` would ask of each array whether it is one of Dask, and import Dask to know.
+    `Variable.compute` would check whether each array is one of Dask, and import Dask for the check.
     """
     if isinstance(variable, xr.IndexVariable):
         return variable
@@ -66,7 +66,7 @@ def loaded_variable(variable: xr.Variable) -> xr.Variable:
 def new_axis(dimension: str, values: np.ndarray[Any, Any], attrs: Mapping[Any, Any]) -> xr.IndexVariable:
     """Return the coordinate along a dimension.
 
-    Of an array that is no index yet xarray asks whether it is one of pint, and imports that to know.
+    For an array that is no index yet, xarray checks whether it is one of pint, and imports pint for the check.
     """
     index = PandasIndexingAdapter(pd.Index(values), dtype=values.dtype)
     return xr.IndexVariable(dimension, index, attrs)

@@ -1,4 +1,4 @@
-"""What xarray knows of this package: `engine="vibroimpact"`, and `ds.vibroimpact` of every dataset.
+"""The entry point of xarray into this package: `engine="vibroimpact"`, and `ds.vibroimpact` of every dataset.
 
 xarray imports this module with all its engines when it opens its first file. So it imports nothing that takes time.
 """

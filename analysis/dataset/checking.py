@@ -1,7 +1,7 @@
 """The check of a dataset against the schema; every writer calls it before it writes.
 
-Two kinds of problems: the file would be no dataset (a variable is missing, counts do not sum), which is refused;
-and the values of a run cannot be right (a speed of approach below 0), which marks that run and keeps all others.
+There are two kinds of problems. A file that would be no dataset (a variable is missing, counts do not sum) is
+refused. A run with impossible values (a speed of approach below 0) is marked; all other runs are kept.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from vibroimpact.fmus.errors import DatasetError
 def check(dataset: xr.Dataset) -> None:
     """Check a one-dimensional dataset against the schema.
 
-    A run with the outcome error promises nothing of its values: they are not looked at.
+    The values of a run with the outcome error are not checked: such a run promises nothing.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ def check(dataset: xr.Dataset) -> None:
 
 
 def marked(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in which each run whose values fail the check has the outcome error, and says why.
+    """Return a dataset in which each run whose values fail the check has the outcome error, and the reason.
 
-    Nothing that was computed is taken away: the values of a marked run stay as they are.
+    Computed values are never removed: the values of a marked run stay as they are.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def marked(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     DatasetError
-        Names, dimensions, types or counts are wrong, so that no run can be told from another.
+        Names, dimensions, types or counts are wrong, so that runs cannot be distinguished.
     """
     problems = _problems(dataset)
     if problems:
@@ -75,7 +75,7 @@ def marked(dataset: xr.Dataset) -> xr.Dataset:
     bad = list(_run_problems(dataset))
     if not bad:
         return dataset
-    # a copy for nothing would cost more than all else here
+    # a needless copy would cost more than all other work here
     outcome, message = dataset.variables["outcome"].copy(), dataset.variables["message"].copy()
     for run, problem in bad:
         outcome.values[run] = Outcome.error
@@ -88,13 +88,13 @@ def _refusal(problems: list[str]) -> DatasetError:
 
 
 def _problems(dataset: xr.Dataset) -> list[str]:
-    """Return why this is no dataset at all."""
+    """Return the reasons why this is no dataset at all."""
     # The contents mean nothing while a variable is missing or has another shape.
     return structure_problems(dataset) or _content_problems(dataset)
 
 
 def structure_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with names, dimensions, types and attributes."""
+    """Return the problems of names, dimensions, types and attributes."""
     problems = [f"{name}: expected this variable, got none." for name in _missing_names(dataset)]
     if dataset.attrs.get("Conventions") != CONVENTIONS:
         problems.append(f"Conventions: expected {CONVENTIONS!r}, got {dataset.attrs.get('Conventions')!r}.")
@@ -108,7 +108,7 @@ def structure_problems(dataset: xr.Dataset) -> list[str]:
     return problems
 
 
-# What a scene asks for together is stored together.
+# Variables that one key of a scene records are stored together.
 _GROUPS = (
     ("displacement_max", "displacement_min"),
     ("strobe_displacement", "strobe_velocity"),
@@ -121,7 +121,7 @@ _GROUPS = (
 
 
 def _missing_names(dataset: xr.Dataset) -> list[str]:
-    """Return the names that must be there: those of every run, and each recorded group as a whole."""
+    """Return the required names that are missing: names of every run, and recorded groups that are incomplete."""
     present = set(map(str, dataset.variables))
     required = set(RUN_COLUMNS)
     for group in _GROUPS:
@@ -133,7 +133,7 @@ def _missing_names(dataset: xr.Dataset) -> list[str]:
 
 
 def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
-    """Return what is wrong with one variable."""
+    """Return the problems of one variable."""
     rule = RULES.get(name)
     problems = []
     if rule is None:
@@ -144,13 +144,13 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
     else:
         if variable.dims != rule.dims:
             problems.append(f"{name}: expected dimensions {rule.dims}, got {variable.dims}.")
-        # text is object where it was built, and of some length where it was read
+        # text is object where it was built, and has a fixed length where it was read
         is_text = np.dtype(rule.dtype).kind == "O" and variable.dtype.kind in "OUT"
         if variable.dtype != rule.dtype and not is_text:
             problems.append(f"{name}: expected {np.dtype(rule.dtype)}, got {variable.dtype}.")
     wanted = ["long_name", "units"]
     if name == "event_component":
-        # The meanings of the other flags are in the schema; these are the scene's components.
+        # The schema has the meanings of the other flags; the flags of events are the scene's components.
         wanted += ["flag_meanings"]
     return problems + [
         f"{name}: expected the attribute {key}, got none." for key in wanted if not variable.attrs.get(key)
@@ -158,7 +158,7 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
 
 
 def count_problems(dataset: xr.Dataset) -> list[str]:
-    """Return which counts of rows do not sum to the rows there are; no row is assigned to a run before they do."""
+    """Return the counts of rows that do not sum to the number of rows; rows are assigned to runs only after this."""
     problems = []
     for dimension, count_name in RAGGED.items():
         if count_name in dataset.variables:
@@ -172,7 +172,7 @@ def count_problems(dataset: xr.Dataset) -> list[str]:
 
 
 def _content_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with the values that tell runs, rows and components apart."""
+    """Return the problems of the values that identify runs, rows and components."""
     problems = []
     for name, kind in (("outcome", Outcome), ("direction", Direction)):
         values = dataset.variables[name].values
@@ -190,7 +190,7 @@ def _content_problems(dataset: xr.Dataset) -> list[str]:
 
 
 def _label_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with the names of components and connections."""
+    """Return the problems of the names of components and connections."""
     problems = []
     if "event" in dataset.dims:
         component = dataset.variables["event_component"]
@@ -213,7 +213,7 @@ _CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time", "e
 
 
 def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
-    """Yield each run whose values cannot be right, by its place, with the first value that is not."""
+    """Yield each run with impossible values: its place, and its first problem."""
     failed = dataset.variables["outcome"].values == Outcome.error
     for dimension, count_name in RAGGED.items():
         if count_name in dataset.variables:
@@ -237,7 +237,7 @@ def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
 def _row_checks(
     dataset: xr.Dataset, dimension: str, owner: NDArray[np.int64]
 ) -> Iterator[tuple[str, str, _Flags]]:
-    """Yield the variables of a ragged dimension: name, what its values must be, and which rows are not."""
+    """Yield the variables of a ragged dimension: name, rule of its values, and mask of the rows that break it."""
     clock = _CLOCKS[dimension]
     time = dataset.variables[clock].values
     yield clock, "finite times", ~np.isfinite(time)

@@ -1,4 +1,4 @@
-"""What many runs recorded, as arrays: the columns that a dataset is built of."""
+"""The records of many runs as arrays: the columns that a dataset is built of."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ class Ragged:
 
 @dataclass(frozen=True, slots=True)
 class RunColumns:
-    """What runs recorded, one element or row for each; a group that their scene does not ask for is None.
+    """Records of runs, one element or row for each; a group that their scene does not record is None.
 
-    Attributes are those of `RunRecord`, of all runs at once. `periods` has the shape (run, period, 5): a run that
-    recorded fewer periods than the others ends in NaN.
+    Attributes are named as in `RunRecord`, but hold all runs at once. `periods` has the shape (run, period, 5): a run
+    that recorded fewer periods than the others ends in NaN.
     """
 
     outcome: NDArray[np.int8]
@@ -87,7 +87,7 @@ class RunColumns:
 
 
 def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: bool = True) -> dict[str, Any]:
-    """Return what runs recorded as arrays, by their names in a dataset and in its types.
+    """Return the records of runs as arrays, by their names in a dataset and in its types.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: b
     omit : collection of str
         Per-period variables that are left out.
     each_period : bool
-        False: one element stands for all recorded periods of a run, see `of_all_periods`.
+        False: one element stands for all recorded periods of a run, as `of_all_periods` computes it.
     """
     found: dict[str, Any] = {
         "outcome": columns.outcome,
@@ -179,17 +179,17 @@ OF_ALL_PERIODS = {
     "strobe_velocity": "velocity at forcing phase zero of the last recorded period",
     "impacts_per_period": "mean number of impacts in a recorded period",
 }
-"""What the variables of each period mean where one value stands for all, see `of_all_periods`."""
+"""Meanings of the variables of each period where one value stands for all, see `of_all_periods`."""
 
 
 def of_all_periods(periods: Floats) -> Floats:
-    """Return what each run recorded in all its periods together.
+    """Return the values of each run over all its periods together.
 
-    The columns are `PERIOD_COLUMNS`, shape (run, period, 5), then (run, 1, 5): largest, smallest, those of the last
-    period (2), mean. A run that recorded fewer periods than the others ends in NaN; one without any has NaN alone.
+    The columns are `PERIOD_COLUMNS`, shape (run, period, 5), then (run, 1, 5): largest, smallest, both strobe values
+    of the last period, mean. A run with fewer periods than the others ends in NaN; a run without any has NaN alone.
     """
     result = np.full((len(periods), 1, len(PERIOD_COLUMNS)), np.nan)
-    # each recorded period counts its impacts, whatever else is recorded
+    # each recorded period has its number of impacts, also where nothing else is recorded
     count = np.count_nonzero(~np.isnan(periods[:, :, 4]), axis=1)
     some = count > 0
     if some.any():
@@ -202,7 +202,7 @@ def of_all_periods(periods: Floats) -> Floats:
 
 
 def ragged(tables: Sequence[Floats | None], columns: int) -> Ragged | None:
-    """Return the tables of runs as one, with so many columns; None where no run has one."""
+    """Return the tables of runs as one, with this number of columns; None where no run has a table."""
     known = [_with_columns(table, columns) for table in tables if table is not None]
     if not known:
         return None
@@ -211,7 +211,7 @@ def ragged(tables: Sequence[Floats | None], columns: int) -> Ragged | None:
 
 
 def _with_columns(table: Floats, number: int) -> Floats:
-    """Return a table with so many columns; those that its run does not know are NaN."""
+    """Return a table with this number of columns; columns that its run does not know are NaN."""
     known = table[:, :number]
     return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
 

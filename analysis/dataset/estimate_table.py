@@ -30,16 +30,16 @@ def estimate_table(
 ) -> xr.Dataset:
     """Return estimates on the dimensions estimator and quantity.
 
-    Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
+    Units differ by quantity, so the variables carry `1`, and the coordinate `unit` gives the unit of each quantity.
 
     Parameters
     ----------
     cells : mapping
-        By estimator, then quantity; what an estimator does not give is NaN.
+        By estimator, then quantity; a quantity that an estimator does not give is NaN.
     units : mapping of str to str
         CF unit of each quantity, in the order of the columns.
     confidence : float
-        Of the intervals.
+        Confidence of the intervals.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The runs of a dataset on the real dimensions of their sweep, with the ragged arrays beside them."""
+"""The runs of a dataset on the real dimensions of their sweep, and the ragged arrays."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 
-# A sweep that is no grid (scattered points) would waste memory on a grid; then `run` stays the dimension.
+# Grid points per run above which a sweep (scattered points) would waste memory on a grid; `run` stays its dimension.
 _LARGEST_GRID_PER_RUN = 10
 
 
@@ -46,12 +46,12 @@ class _RunArray(BackendArray):
         )
 
     def now(self) -> NDArray[Any]:
-        """Return the values as a reader of all of them gets them; one text alone has a length."""
+        """Return the values as a reader of all values gets them; a single text keeps its length."""
         return np.asarray(self._values[()])
 
     @cached_property
     def _values(self) -> NDArray[Any]:
-        # one run alone is a bare value: text would stay so
+        # a single run gives a scalar, which text would stay without the array
         values = np.array(self._read()[self._run_id], dtype=self.dtype)
         missing = self._run_id < 0
         if missing.any():
@@ -60,7 +60,7 @@ class _RunArray(BackendArray):
 
 
 class Flat(Named, Protocol):
-    """Runs one after the other, as a file has them: a dataset of xarray, or what was read of a file."""
+    """Runs one after the other, as a file has them: a dataset of xarray, or variables read from a file."""
 
     @property
     def sizes(self) -> Mapping[Any, int]:
@@ -72,7 +72,7 @@ class Flat(Named, Protocol):
 
 
 def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
-    """Return runs on the dimensions of their sweep, with the ragged arrays beside them; lazily: when first used."""
+    """Return runs on the dimensions of their sweep, with the ragged arrays; lazily: read when first used."""
     labelled = _with_labels(flat)
     dims, axes, scalars, run_id = _grid(labelled)
     swept, constants = swept_names(labelled), constant_names(labelled)
@@ -104,7 +104,7 @@ def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
 
 
 def _with_labels(flat: Flat) -> Flat:
-    """Return runs with names as dimensions, where some are: in memory they select."""
+    """Return runs with names as dimensions, where there are some: a dataset in memory selects by them."""
     renamed = {"connection": "interface", "compared": "comparison"}
     if not renamed.keys() & set(flat.variables):
         return flat
@@ -119,7 +119,7 @@ def _with_labels(flat: Flat) -> Flat:
 
 @dataclass(frozen=True, slots=True)
 class _Placing:
-    """How per-run variables are laid out: the dimensions, the run at each point, and when."""
+    """Layout of per-run variables: the dimensions, the run at each point, and whether values are read lazily."""
 
     dims: tuple[str, ...]
     run_id: NDArray[np.int32]
@@ -134,14 +134,14 @@ class _Placing:
         return self.laid_out((*self.dims, *variable.dims[1:]), array, attributes)
 
     def laid_out(self, dims: tuple[Any, ...], array: _RunArray, attributes: Mapping[Any, Any]) -> xr.Variable:
-        """Return the variable of an array, now or when it is first used."""
+        """Return the variable of an array, read now or when it is first used."""
         if not self.lazily:
             return new_variable(dims, array.now(), attributes)
         return xr.Variable(dims, indexing.LazilyIndexedArray(array), attributes)
 
 
 def _displacement_range(flat: Flat, place: _Placing) -> xr.Variable:
-    """Return the largest minus the smallest displacement over the recorded periods, NaN periods aside."""
+    """Return the largest minus the smallest displacement over the recorded periods, without NaN periods."""
 
     def read() -> NDArray[np.float64]:
         largest = np.fmax.reduce(flat.variables["displacement_max"].values, axis=1, initial=-np.inf)
@@ -157,7 +157,7 @@ def _displacement_range(flat: Flat, place: _Placing) -> xr.Variable:
 
 
 def _row_owners(flat: Flat) -> dict[str, xr.Variable]:
-    """Return, for each row of each ragged array, the run_id of the run it belongs to."""
+    """Return the run_id of the owner of each row, for each ragged array."""
     runs = np.arange(flat.sizes["run"], dtype=np.int32)
     return {
         f"{dimension}_run": new_variable(
@@ -196,14 +196,14 @@ def _grid(
         sizes[dimension] = len(values)
         places.append(place)
     axes |= shared_axes(axes)
-    run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])
+    run_id = _run_grid(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
         return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
     return tuple(sizes), axes, scalars, run_id
 
 
 def shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
-    """Return the coordinate of each dimension that parameters share: values of one of them, or numbers from 0."""
+    """Return the coordinate of each dimension that parameters share: values of one parameter, or numbers from 0."""
     along: dict[str, dict[str, NDArray[np.float64]]] = {}
     for name, column in columns.items():
         if column.attrs.get(SWEPT_ALONG) in column.dims:
@@ -222,7 +222,7 @@ def shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
 
 
 def _swept_along(flat: Flat) -> dict[str, list[str]]:
-    """Return the swept parameters along each dimension: those that move together share one."""
+    """Return the swept parameters along each dimension; parameters that move together share one."""
     found: dict[str, list[str]] = {}
     for name in _in_order_of_the_scene(flat):
         found.setdefault(flat.variables[name].attrs.get(SWEPT_ALONG, name), []).append(name)
@@ -230,9 +230,9 @@ def _swept_along(flat: Flat) -> dict[str, list[str]]:
 
 
 def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the points that runs have along a dimension, shape (point, parameter), and at which each run is.
+    """Return the distinct points of runs along a dimension, shape (point, parameter), and the point of each run.
 
-    One parameter ascends; several that move together are in the order of the runs.
+    One parameter ascends; several parameters that move together keep the order of the runs.
     """
     if len(columns) == 1 and SWEPT_ALONG not in columns[0].attrs:
         values, place = _distinct(columns[0].values)
@@ -248,20 +248,20 @@ def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], N
 def _distinct(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
     """Return the values that occur, ascending, and the place of each element among them.
 
-    By a table of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
+    It uses a table of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
     """
     place, present = pd.factorize(values, sort=True, use_na_sentinel=False)
     return np.asarray(present), place
 
 
 def _in_order_of_the_scene(flat: Flat) -> list[str]:
-    """Return the swept parameters as the scene lists them: variables of a file come by the alphabet."""
+    """Return the swept parameters in the order of the scene: a file lists variables by the alphabet."""
     linked = str(flat.variables["outcome"].encoding.get("coordinates", "")).split()
     return sorted(swept_names(flat), key=lambda name: linked.index(name) if name in linked else len(linked))
 
 
-def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
-    """Return the run at each grid point, or None when the runs are no grid."""
+def _run_grid(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
+    """Return the run at each grid point, or None when the runs form no grid."""
     size = int(np.prod(shape, dtype=np.int64))
     if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:
         return None

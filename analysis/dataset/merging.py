@@ -18,9 +18,9 @@ from vibroimpact.fmus.errors import DatasetError
 # Labels that are not along run, the same in all parts.
 _LABELS = frozenset({"connection", "compared"})
 _SHARED_SIZES = ("state", "interface", "comparison")
-# What runs may be without: a part of failed runs knows no loops, one of an older version no durations.
+# Variables that parts may lack: a part of failed runs has no loops, a part of an older version no durations.
 _MAY_LACK = ("loop_residual", *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
-# Attributes that say what the values are: parts that differ in them cannot be joined.
+# Attributes with the meaning of the values: parts that differ in them cannot be joined.
 _MEANING = ("units", "component_variable", "flag_meanings")
 
 
@@ -92,7 +92,7 @@ def _is_shared(name: Hashable, variable: xr.Variable) -> bool:
 
 
 def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dataset:
-    """Return a dataset like another one with other values along run."""
+    """Return a dataset like `first`, with other values along run."""
     columns |= {str(name): v.values for name, v in first.variables.items() if _is_shared(name, v)}
     data = {
         str(name): (variable.dims, columns[str(name)], variable.attrs)
@@ -103,7 +103,7 @@ def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dat
 
 
 def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Return parts in which NaN stands for what only others of them have, where runs may be without it."""
+    """Return the parts with NaN for variables that only other parts have, where runs may lack them."""
     known = {name: part.variables[name] for part in parts for name in _MAY_LACK if name in part.variables}
     completed = []
     for part in parts:
@@ -117,19 +117,19 @@ def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 
 def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:
-    """Refuse a part that cannot be joined with another one.
+    """Raise DatasetError unless a part can be joined with the first one.
 
     Parameters
     ----------
     name, first_name : str
-        Where the two come from, for the message.
+        Names of the files of both, for the message.
     part, first : xarray.Dataset
         One-dimensional.
 
     Raises
     ------
     DatasetError
-        When they differ in their variables, or in what these mean.
+        When they differ in their variables, or in the meaning of these.
     """
     different = (set(part.variables) ^ set(first.variables)) - set(_MAY_LACK)
     if different:
@@ -138,26 +138,28 @@ def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Datase
             f"got a difference in {', '.join(sorted(map(str, different)))}."
         )
     for dimension in _SHARED_SIZES:
-        wanted, got = first.sizes.get(dimension), part.sizes.get(dimension)
-        if wanted != got:
-            raise DatasetError(f"{name}: {dimension}: expected the size {wanted} of {first_name}, got {got}.")
+        expected, got = first.sizes.get(dimension), part.sizes.get(dimension)
+        if expected != got:
+            raise DatasetError(
+                f"{name}: {dimension}: expected the size {expected} of {first_name}, got {got}."
+            )
     _refuse_other_meaning(name, part, first_name, first)
 
 
 def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:
-    """Refuse a part whose equal names or numbers mean something else than those of the first part."""
+    """Raise DatasetError if equal names or numbers mean something else than in the first part."""
     for variable, meaning in first.variables.items():
         for key in _MEANING if variable in part.variables else ():
-            wanted, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
-            if wanted != got:
+            expected, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
+            if expected != got:
                 raise DatasetError(
-                    f"{name}: {variable}: expected {key} {wanted!r} as in {first_name}, got {got!r}."
+                    f"{name}: {variable}: expected {key} {expected!r} as in {first_name}, got {got!r}."
                 )
     for label in [name for name, variable in first.variables.items() if _is_shared(name, variable)]:
-        wanted, got = (np.atleast_1d(source.variables[label].values) for source in (first, part))
-        if not np.array_equal(wanted, got):
+        expected, got = (np.atleast_1d(source.variables[label].values) for source in (first, part))
+        if not np.array_equal(expected, got):
             raise DatasetError(
-                f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, wanted))}), "
+                f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, expected))}), "
                 f"got {', '.join(map(str, got))}."
             )
 

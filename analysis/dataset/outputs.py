@@ -1,4 +1,4 @@
-"""The files that a command is to write: looked at before it reads and computes, and named where writing fails."""
+"""The files that a command writes: checked before the command computes, and named in errors of writing."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ FILE_ENDINGS = (
     ".fmu",
     ".ssp",
 )
-"""Endings that no folder is given on purpose."""
+"""Endings that nobody gives a folder on purpose."""
 LONGEST_NAME = 200
-"""Bytes: most file systems take 255, and what is half-written has a longer name."""
+"""Bytes: most file systems take 255, and the temporary file has a longer name."""
 
 
 def refuse_outputs(
     read: Iterable[Path], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
 ) -> None:
-    """Refuse outputs that would overwrite what is read, have no folder, or whose ending is another kind's.
+    """Refuse outputs that would overwrite a file to be read, lie in no folder, or have the ending of another kind.
 
     Parameters
     ----------
     read : iterable of Path
         Files that the command reads.
     output, figure : Path or None
-        What it is to write.
+        Files that the command will write.
     ending : str
-        Of the output.
+        Ending of the output.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def _refuse_long_name(target: Path) -> None:
 
 
 def refuse_folder(folder: Path) -> None:
-    """Refuse a name for a new folder that is that of a file, or too long.
+    """Raise UsageError if the name of a new folder is too long, or looks like the name of a file.
 
     Raises
     ------
@@ -109,15 +109,15 @@ def refuse_folder(folder: Path) -> None:
 def refuse_overwriting(
     output: Path | None, force: bool, is_same: Callable[[Mapping[str, Any]], bool]
 ) -> None:
-    """Refuse to overwrite a dataset that holds something else; a command may be repeated, and figures are drawn anew.
+    """Refuse to overwrite a dataset with other contents; a command may be repeated, and figures are drawn anew.
 
     Parameters
     ----------
     output : Path or None
     force : bool
-        Whether the user wants it all the same.
+        Whether the user allows it all the same.
     is_same : callable
-        Whether global attributes are those of what the command would write.
+        Whether global attributes belong to a dataset that the command would write.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def refuse_overwriting(
 
 
 class Places(Protocol):
-    """Arguments of operations with results: dataset, figure, and whether other files may be replaced."""
+    """Arguments of operations with results: dataset, figure, and permission to replace other files."""
 
     @property
     def output(self) -> Path | None:
@@ -145,18 +145,18 @@ class Places(Protocol):
 
     @property
     def force(self) -> bool:
-        """Whether a file that holds something else is replaced."""
+        """Whether a file with other contents may be replaced."""
 
 
 def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None:
-    """Refuse places where results cannot be written, or where something else is.
+    """Raise UsageError for places that cannot be written, or that hold other contents.
 
     Parameters
     ----------
     read : iterable of Path
-        Files that are read, and not written over.
+        Files that are read, and must not be overwritten.
     **same : object
-        Attributes by which a dataset that is there counts as made by the same command before.
+        Attributes by which an existing dataset counts as made by the same command before.
 
     Raises
     ------
@@ -172,12 +172,12 @@ def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn what keeps a file from being written, such as a full disk, into an error with its name.
+    """Turn an operating system's error of writing, such as a full disk, into an error that names the file.
 
     Raises
     ------
     UsageError
-        Of an OSError within.
+        On an OSError inside the context.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Which program made a dataset: the versions of its packages, and its commit."""
+"""The program that made a dataset: the versions of its packages, and its commit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _GIT_SECONDS = 5.0
 
 
 def program_attributes() -> dict[str, Any]:
-    """Return the global attributes that say which program made a dataset."""
+    """Return the global attributes that identify the program behind a dataset."""
     return {"versions": json.dumps(versions()), "git_commit": git_commit()}
 
 
@@ -26,7 +26,7 @@ def versions() -> dict[str, str]:
 
 @lru_cache(maxsize=1)
 def _versions() -> dict[str, str]:
-    """Read them once in a process: each is a search of all packages that are installed."""
+    """Read the versions once per process: each one is a search of all installed packages."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -40,8 +40,8 @@ def _versions() -> dict[str, str]:
 def git_commit() -> str:
     """Return the commit of the checkout this package runs from, `-dirty` when changed; else `unknown`."""
     here = Path(__file__).resolve()
-    # A virtual environment may lie inside a checkout of something else: only our own tracked file counts.
-    # Git need not be asked where the checkout begins at our own root.
+    # A virtual environment may lie inside a checkout of another project: only our own tracked file counts.
+    # The question to git is needless where the checkout begins at our own root.
     if not (here.parents[2] / ".git").exists() and _git("ls-files", "--error-unmatch", here.name) is None:
         return "unknown"
     return _git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*") or "unknown"

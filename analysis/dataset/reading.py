@@ -32,7 +32,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What resuming a campaign needs of a written part.
+    """Facts about a written part that resuming a campaign needs.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Part:
 
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
-    """Open a file that vibroimpact wrote; whatever is wrong with it is one DatasetError."""
+    """Open a file that vibroimpact wrote; any fault of the file becomes one DatasetError."""
     with opened_netcdf(path) as file:
         _refuse_foreign(path, file.ncattrs(), file.variables)
         yield file
@@ -64,7 +64,7 @@ def _refuse_foreign(
 
 
 def read_part(path: str | os.PathLike[str]) -> Part:
-    """Read what resuming needs of a part: which runs it holds, and its attributes.
+    """Read the facts that resuming needs: the runs of a part, and its attributes.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             name: (variable.dimensions, variable[...], _attributes(variable))
             for name, variable in file.variables.items()
         }
-        # the library lists variables by the alphabet, this attribute as the scene does
+        # the library lists variables by the alphabet; this attribute keeps the order of the scene
         links = " ".join(getattr(variable, "coordinates", "") for variable in file.variables.values())
         linked = dict.fromkeys(links.split())
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -104,7 +104,7 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
-    """Return the attributes of a stored variable without those that only the file needs."""
+    """Return the attributes of a stored variable, without attributes that only the file needs."""
     return {
         name: variable.getncattr(name)
         for name in variable.ncattrs()
@@ -113,7 +113,7 @@ def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
 
 
 def dataset_file(path: str | os.PathLike[str]) -> Path:
-    """Return the file that a name stands for: of the folder of a campaign its dataset."""
+    """Return the file that a name stands for: the dataset of a campaign's folder, or the file itself."""
     # os.path: False for names that no file can have, where Path.is_dir raises
     return Path(path) / "dataset.nc" if os.path.isdir(path) else Path(path)
 
@@ -121,16 +121,17 @@ def dataset_file(path: str | os.PathLike[str]) -> Path:
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a dataset on the real dimensions of its sweep.
 
-    Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept
-    parameter. Parameters that move together share one; its coordinate has the values of the first of them whose
-    values all differ, else numbers from 0. Points that no run covers are NaN, or -1 in integers. With independent runs
+    Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept parameter.
+    Parameters that move together share one dimension. Its coordinate has the values of the first of them whose values
+    all differ, else numbers from 0. Points that no run covers are NaN, or -1 in integers. With independent runs
     only, `direction` is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
-    (scattered or repeated points) keep the dimension `run`. Impacts, sticks, samples and events stay on their
-    own dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
-    `energy_residual` is along `connection`, the names of the connections; scores of replays are along `compared`.
-    `displacement_range` is the largest displacement minus the smallest over the recorded periods (m).
-    A variable is read from the file when it is first used. What `to_netcdf` has saved of such a dataset, all of it or a
-    selection, opens as it was saved.
+    (scattered or repeated points) keep the dimension `run`.
+
+    Impacts, sticks, samples and events stay on their own dimension; `impact_run` and so on give the `run_id` of each
+    row, under any selection. `energy_residual` is along `connection`, the names of the connections; scores of replays
+    are along `compared`. `displacement_range` is the largest displacement minus the smallest over the recorded
+    periods (m). A variable is read from the file when it is first used. `to_netcdf` may save such a dataset or a
+    selection of it; the saved file opens as it was saved.
 
     Parameters
     ----------
@@ -168,9 +169,9 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open what an analysis found or a benchmark measured: any NetCDF file, as it is.
+    """Open results of an analysis or a benchmark: any NetCDF file, as it is.
 
-    Estimates of version 0.1 come with their dimension `method`, which `sel` has a keyword of, as `estimator`.
+    Estimates of version 0.1 have the dimension `method`, a keyword of `sel`; it is renamed to `estimator`.
 
     Raises
     ------
@@ -205,16 +206,16 @@ def _open_flat(file: Path) -> xr.Dataset:
 
 
 def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open a file lazily, once it is known to be sound: seconds are not dates, and numbers are as they are stored."""
+    """Open a sound file lazily: seconds stay numbers instead of dates, and numbers stay as they are stored."""
     state = check_sound(path)
     store = LazyStore(os.path.abspath(path))
     try:
         refuse_changed(path, state)
         stored, _ = store.load()
-        # xarray would read all texts at once: those that are no labels can wait.
+        # xarray would read all texts at once: texts that are no labels can wait.
         texts = {name: stored[name] for name in _texts(stored)}
-        # Flags are not floats, and what is missing is NaN already.
-        # Without an engine xarray loads all that are installed, and asks each of them.
+        # Flags are not floats, and missing values are NaN already.
+        # Without an engine xarray loads all installed engines, and asks each of them.
         dataset = xr.open_dataset(
             store,
             engine=StoreBackendEntrypoint,
@@ -231,7 +232,7 @@ def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def _texts(stored: Mapping[str, xr.Variable]) -> list[str]:
-    """Return the variables of texts that are no labels."""
+    """Return the names of text variables that are no labels."""
     linked = {name for v in stored.values() for name in str(v.attrs.get("coordinates", "")).split()}
     return [
         name
@@ -241,7 +242,7 @@ def _texts(stored: Mapping[str, xr.Variable]) -> list[str]:
 
 
 def _saved_again(opened: xr.Dataset) -> xr.Dataset:
-    """Return an opened dataset as it was before `to_netcdf` marked what is missing."""
+    """Return an opened dataset as it was before `to_netcdf` marked missing values."""
     for variable in opened.variables.values():
         variable.attrs.pop("_FillValue", None)
     # version 0.2 saved no coordinate along a shared dimension
@@ -250,7 +251,7 @@ def _saved_again(opened: xr.Dataset) -> xr.Dataset:
 
 
 def opened_in_memory(flat: xr.Dataset) -> xr.Dataset:
-    """Return what `open_dataset` gives of the file that `write_dataset` writes of a dataset; no file is needed.
+    """Return a dataset as `open_dataset` would open its file; no file is written.
 
     Parameters
     ----------
@@ -261,7 +262,7 @@ def opened_in_memory(flat: xr.Dataset) -> xr.Dataset:
 
 
 def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
-    """Return a dataset whose types, dimensions and counts are those of the schema; all else relies on them."""
+    """Return a dataset once its types, dimensions and counts fit the schema; all other code relies on them."""
     problems = structure_problems(flat) or count_problems(flat)
     if problems:
         more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""

@@ -1,4 +1,4 @@
-"""Registers `ds.vibroimpact` with xarray; what it is loads when it is first asked for."""
+"""Registers `ds.vibroimpact` with xarray; its class is imported at its first use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import xarray as xr
 
 
 def accessor(dataset: xr.Dataset) -> Any:
-    """Return what `ds.vibroimpact` is; its module is imported when it is first asked for."""
+    """Return the object `ds.vibroimpact`; its module is imported at the first use."""
     from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
 
     return VibroimpactAccessor(dataset)

@@ -1,4 +1,4 @@
-"""What an analysis found: a table of variables for each kind, made into datasets and written as NetCDF-4 (CF-1.11)."""
+"""Results of analyses: a table of variables for each kind, made into datasets and written as NetCDF-4 (CF-1.11)."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def _variable(name: str, row: Row) -> xr.Variable:
 TableRow = tuple[str, str, str, str] | tuple[str, str, str, str, str]
 """A row of a `ResultTable`."""
 SECONDS = "second"
-"""Unit of a time of the machine: s in every system of units."""
+"""Unit of times measured by the machine's clock: s in every system of units."""
 SWEPT = "..."
-"""Stands among the dimensions of a table for those of the runs that results are of."""
+"""Placeholder among the dimensions of a table for the dimensions of the studied runs."""
 
 
 class ResultTable:
@@ -56,11 +56,11 @@ class ResultTable:
     Parameters
     ----------
     kind : str
-        Of the results, by which `vi.draw` knows how to draw them.
+        Kind of the results, by which `vi.draw` chooses their drawing.
     *rows : tuple of str
-        Name, dimensions with blanks between them, SI unit, name in words. `text` after these: values are texts. A name
-        that ends in `#` is that of several variables, each with its number; `{WORD}` in a unit or in words is said with
-        the values.
+        Name, dimensions separated by blanks, SI unit, name in words. `text` after these: values are texts. A name that
+        ends in `#` stands for several variables, each with its number. `{WORD}` in a unit or in words is filled in
+        with the values.
 
     Examples
     --------
@@ -88,17 +88,17 @@ class ResultTable:
         Parameters
         ----------
         values : mapping of str to array
-            By the names of the table; those that are left out are no variables.
+            By the names of the table; names without values become no variables.
         attrs : mapping, optional
             Attributes of the dataset.
         over : tuple of str
-            Dimensions of the runs that results are of.
+            Dimensions of the runs that were analysed.
         coords : mapping of str to xarray.Variable, optional
-            Their coordinates.
+            Coordinates of these dimensions.
         units : {"SI", "nondimensional"}
             In the latter no variable has a unit.
         **said
-            What stands in the units and words of variables.
+            Texts for the words in braces in units and names.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class ResultTable:
         return found.assign_attrs(results_kind=self.kind)
 
     def rule_of(self, name: str) -> VariableRule:
-        """Return what the table says of a variable; an unknown one raises DatasetError."""
+        """Return the table's rule of a variable; an unknown variable raises DatasetError."""
         if name in self.rules:
             return self.rules[name]
         family, number = re.sub(r"\d+$", "#", name), name[len(name.rstrip("0123456789")) :]
@@ -148,8 +148,8 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     path : path
         An older file of this name is replaced only when the new one is complete.
     kind : str
-        What it is (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` knows how to draw it; its own
-        attribute `results_kind` unless it is said.
+        Kind of the results (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` chooses their drawing.
+        Default: the attribute `results_kind` of the dataset.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The dataset schema: every name, dimension, type, unit and meaning that a vibroimpact file may hold.
 
 This table is the only place where these facts are written. `writing` builds and writes datasets from it,
-`checking` holds them to it, `reading` opens them, and `docs/dataset.md` says the same in words.
+`checking` checks them against it, `reading` opens them, and `docs/dataset.md` explains it in words.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ UnitSystem = Literal["SI", "nondimensional"]
 
 
 class Outcome(IntEnum):
-    """How a run ended; the first three are physics, the last three are failures of the run."""
+    """End of a run; the first three are physics, the last three are failures of the run."""
 
     ok = 0
     stuck = 1
@@ -41,7 +41,7 @@ class Outcome(IntEnum):
 
 
 class Direction(IntEnum):
-    """How a run was started: from the scene's own start state, or from its neighbour in a sweep."""
+    """Start of a run: from the scene's own start state, or from its neighbour in a sweep."""
 
     independent = 0
     up = 1
@@ -49,7 +49,7 @@ class Direction(IntEnum):
 
 
 class SpecialOrbit(IntEnum):
-    """What happens to a periodic orbit where it is on its branch."""
+    """Special point of a branch of periodic orbits."""
 
     none = 0
     fold = 1
@@ -61,7 +61,7 @@ class SpecialOrbit(IntEnum):
 
 
 class OrbitClass(IntEnum):
-    """What the motion of a run is, as its recorded periods tell it."""
+    """Class of the motion of a run, judged by its recorded periods."""
 
     unknown = 0
     no_impacts = 1
@@ -72,7 +72,7 @@ class OrbitClass(IntEnum):
 
 
 class MeasurementFlag(IntFlag):
-    """What is wrong with a measured run; several may be."""
+    """Faults of a measured run; several may apply."""
 
     clipped = 1
     gap = 2
@@ -82,30 +82,30 @@ class MeasurementFlag(IntFlag):
 
 @dataclass(slots=True)
 class RunRecord:
-    """What one run of a scene recorded; a group that the scene does not ask for is None.
+    """Records of one run of a scene; a group that the scene does not record is None.
 
     Attributes
     ----------
     outcome : Outcome
         How the run ended.
     message : str
-        Why, in words; empty for `Outcome.ok`.
+        The reason, in words; empty for `Outcome.ok`.
     periods : ndarray of float, shape (period, 5), or None
         Columns `PERIOD_COLUMNS`: displacement_max, displacement_min, strobe_displacement (m),
         strobe_velocity (m/s), impacts_per_period.
     impacts : ndarray of float, shape (impact, 8), or None
         Columns `IMPACT_COLUMNS`: impact_time (s), impact_phase (rad), impact_velocity (m/s),
         impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s),
-        impact_peak_force (N; NaN on a rigid stop). The last three may be left out, and are NaN then. Of a contact
-        that is open at the end they and the impulse are NaN.
+        impact_peak_force (N; NaN on a rigid stop). The last three may be left out, and are NaN then. They and the
+        impulse are NaN for a contact that is still open at the end.
     sticks : ndarray of float, shape (stick, 3), or None
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None
         Time (s), then the sampled variables.
     final_displacement, final_velocity, final_phase : float
-        State (m, m/s) and forcing phase (rad) at the end, where a sweep goes on.
+        State (m, m/s) and forcing phase (rad) at the end, from which a sweep continues.
     seconds : float
-        Wall time this run took, s.
+        Wall time of this run, s.
     events : ndarray of float, shape (event, 3), or None
         Columns `EVENT_COLUMNS`: event_time (s), event_index (superdense: which of the events at the same
         time, from 0), event_component (1-based, into the components of the scene).
@@ -117,7 +117,7 @@ class RunRecord:
         Whole state of a chain or beam at the end: N displacements (m), then N velocities (m/s), of its masses
         or modes.
     scores : ndarray of float, shape (comparison, 6), or None
-        Columns `SCORE_COLUMNS`, of each compared pair of a replay.
+        Columns `SCORE_COLUMNS`, for each compared pair of a replay.
     """
 
     outcome: Outcome
@@ -139,7 +139,7 @@ class RunRecord:
 
 @dataclass(frozen=True, slots=True)
 class VariableRule:
-    """What the schema says of one variable; `unit` is its SI unit."""
+    """The schema's entry for one variable; `unit` is its SI unit."""
 
     name: str
     dims: tuple[str, ...]
@@ -166,7 +166,7 @@ def _masks(kind: type[IntFlag]) -> dict[str, Any]:
 
 
 def _count(dimension: str, words: str) -> VariableRule:
-    """Return the rule of the number of rows that a run has in a ragged dimension."""
+    """Return the rule of the variable that counts the rows of a run in a ragged dimension."""
     extra = {"sample_dimension": dimension}
     return VariableRule(f"{dimension}_count", ("run",), "1", f"number of {words} of the run", np.int32, extra)
 
@@ -271,7 +271,7 @@ def _columns(dims: tuple[str, ...]) -> tuple[str, ...]:
 PERIOD_COLUMNS = _columns(("run", "period"))
 IMPACT_COLUMNS = _columns(("impact",))
 NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
-"""Columns of impacts that every file has; the others came later."""
+"""Columns of impacts that every file has; the other columns came later."""
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
 SCORE_COLUMNS = _columns(("run", "comparison"))
@@ -282,7 +282,7 @@ ORBIT_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("orbi
 CLASS_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("class_"))
 """Columns of runs that have been classified."""
 RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
-# What every file has; the other per-run variables are there where they were recorded.
+# Not in every file: these per-run variables are there only where they were recorded.
 _NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS, *ORBIT_COLUMNS, *CLASS_COLUMNS)
 RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in _NOT_IN_ALL)
 RESERVED_NAMES = frozenset(
@@ -291,15 +291,15 @@ RESERVED_NAMES = frozenset(
 )
 """Names that mean something in a stored or opened dataset; nothing else may take them."""
 SWEPT_ALONG = "swept_along"
-"""Attribute of a swept parameter: the dimension that it shares with those that move with it."""
+"""Attribute of a swept parameter: the dimension it shares with the parameters that move with it."""
 DRAW = "draw"
-"""Dimension of the points that are drawn; `sample` is that of time series."""
+"""Dimension of drawn points; `sample` is the dimension of time series."""
 SCATTERED = "point"
 """Dimension of the points of two adaptive axes, which are no grid."""
 NOT_SWEPT = {"swept": "no"}
-"""Attribute of the numbers of a scene that are the same for all of its runs; scalar coordinates."""
+"""Attribute of the numbers of a scene that are the same for all of its runs; these are scalar coordinates."""
 
-# Units of sampled variables, found by the end of their name; those of swept parameters come with them.
+# Units of sampled variables, found by the end of their name; swept parameters bring their own units.
 _QUANTITY_UNITS = {
     "displacement": "m",
     "velocity": "m s-1",
@@ -322,7 +322,7 @@ _QUANTITY_UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class SampleRule:
-    """What the schema says of a sampled variable of a body; `unit` is its SI unit.
+    """The schema's entry for a sampled variable of a body; `unit` is its SI unit.
 
     `pattern` matches its name in a file; its group, where there is one, is the number in `long_name`.
     """
@@ -374,9 +374,9 @@ def file_name_of(quantity: str) -> str:
 
 
 def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAMES) -> tuple[str, ...]:
-    """Return a name of its own in a file for each quantity, in order.
+    """Return a unique name in a file for each quantity, in order.
 
-    A name that is taken already is numbered, also where it differs in case only, as CF advises.
+    A name that is taken already gets a number, also where it differs in case only, as CF advises.
 
     Parameters
     ----------
@@ -400,8 +400,8 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
             raise DatasetError(f"dataset: {quantity}: expected each quantity once, got it twice.")
         plain = file_name_of(quantity)
         # CF wants a letter first.
-        wanted = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
-        choices = (wanted, *(f"{wanted}_{number}" for number in range(2, len(used) + 3)))
+        base = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
+        choices = (base, *(f"{base}_{number}" for number in range(2, len(used) + 3)))
         name = next(choice for choice in choices if choice.lower() not in used)
         used.add(name.lower())
         found[quantity] = name
@@ -409,7 +409,7 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit that an SI unit becomes in a system of units; angles stay radians, shares percent.
+    """Return the unit that replaces an SI unit in a system of units; angles stay radians, shares percent.
 
     >>> unit_in("nondimensional", "m s-1"), unit_in("nondimensional", "rad"), unit_in("SI", "m s-1")
     ('1', 'rad', 'm s-1')
@@ -420,7 +420,7 @@ def unit_in(system: UnitSystem, unit: str) -> str:
 def quantity_unit(name: str, system: UnitSystem) -> str:
     """Return the unit of a sampled variable, known by the end of its name.
 
-    An unknown quantity raises DatasetError; the writer must then be told the unit.
+    An unknown quantity raises DatasetError; the caller must then give its unit to the writer.
     """
     unit = known_unit(name)
     if unit is None:
@@ -432,8 +432,8 @@ def quantity_unit(name: str, system: UnitSystem) -> str:
 
 
 def known_unit(name: str) -> str | None:
-    """Return the SI unit of a quantity by the end of its name, or None if no known quantity ends it."""
-    # The number of one of several alike (velocity_2) does not change what it is.
+    """Return the SI unit of a quantity by the end of its name, or None for an unknown ending."""
+    # The number of a quantity among several alike (velocity_2) does not change its kind.
     end = name.rstrip("0123456789_")
     while end and end not in _QUANTITY_UNITS:
         end = end.partition("_")[2]
@@ -449,7 +449,7 @@ def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
 
 
 def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the tables of the scene in the attributes of a dataset; none where there is none that can be read."""
+    """Return the tables of the scene in the attributes of a dataset; empty where no scene can be read."""
     try:
         return parse_toml(str(attrs.get("scene", "")))
     except ValueError:
@@ -457,8 +457,8 @@ def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def swept_names(dataset: Named) -> tuple[str, ...]:
-    """Return the names of the swept parameters; those that a selection has made scalar are among them."""
-    # names of coordinates and their variables: an array of xarray for each of them would cost ten times as much
+    """Return the names of the swept parameters, also of parameters that a selection has made scalar."""
+    # names and variables: creating an array of xarray for each coordinate would cost ten times as much
     coordinates = {str(name): dataset.variables[name] for name in dataset.coords}
     # the axis of parameters that move together has the values of one of them
     shared = {coordinate.attrs.get(SWEPT_ALONG) for coordinate in coordinates.values()}
@@ -472,7 +472,7 @@ def swept_names(dataset: Named) -> tuple[str, ...]:
 
 
 def standing_for(dimension: str, columns: Mapping[str, NDArray[np.float64]]) -> str | None:
-    """Return the parameter whose values are the axis of those that share a dimension.
+    """Return the parameter whose values become the axis of a dimension that several parameters share.
 
     It is the first whose values all differ.
 
@@ -485,7 +485,7 @@ def standing_for(dimension: str, columns: Mapping[str, NDArray[np.float64]]) -> 
     Returns
     -------
     str or None
-        None where the points are numbered: none of several drawn or adaptive parameters stands for all.
+        None where the points are numbered: no single one of several drawn or adaptive parameters stands for all.
 
     Examples
     --------
@@ -503,12 +503,12 @@ def constant_names(dataset: Named) -> tuple[str, ...]:
 
 
 def _is_constant(coordinate: xr.Variable) -> bool:
-    # what joins datasets of two scenes makes a dimension of such a number
+    # joining the datasets of two scenes makes a dimension of such a number
     return not coordinate.dims and coordinate.attrs.items() >= NOT_SWEPT.items()
 
 
 def flat_order(first_rows: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the row numbers, shape (sum of counts,), of ragged blocks in the order given."""
+    """Return the row numbers, shape (sum of counts,), of ragged blocks in the given order."""
     ends = np.cumsum(counts)
     return np.repeat(first_rows - (ends - counts), counts) + np.arange(ends[-1] if ends.size else 0)
 

@@ -1,4 +1,4 @@
-"""What a file keeps of each variable beside its values, and what reading it gives back."""
+"""The stored form of a variable beyond its values, and the form in which reading returns it."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def stored_variables(dataset: xr.Dataset) -> Iterator[Stored]:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """What a file gives back, before it is a dataset of xarray: making one costs more than all else."""
+    """Contents of a file before they become a dataset of xarray: making that costs more than all other work."""
 
     variables: dict[str, xr.Variable]
-    """In the order of the file, the alphabet."""
+    """In the alphabetical order of the file."""
     coords: tuple[str, ...]
-    """Names of those that are coordinates."""
+    """Names of the variables that are coordinates."""
     attrs: dict[Any, Any]
 
     @property
@@ -69,13 +69,13 @@ def as_read(dataset: xr.Dataset) -> Read:
             variables[one.name].encoding["coordinates"] = one.linked
             links.update(one.linked.split())
     for name in links:
-        if variables[name].dtype.kind == "O":  # texts that are labels have one length, as an index has them
+        if variables[name].dtype.kind == "O":  # labels get texts of one length, as an index has
             variables[name] = variables[name].astype(np.str_)
     return Read(variables, tuple(sorted(links)), _attributes_read(dataset.attrs))
 
 
 def _attributes_read(attributes: Mapping[Any, Any]) -> dict[Any, Any]:
-    """Return attributes in the types that a file gives back: an array of one element is a number."""
+    """Return attributes in the types that a file returns: an array of one element is a number."""
     return {name: _read(value) for name, value in attributes.items()}
 
 

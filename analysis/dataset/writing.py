@@ -1,4 +1,4 @@
-"""Build datasets from runs, and write them so that a file is whole or not there at all."""
+"""Build datasets from runs, and write each as a file that is whole or absent."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from vibroimpact.analysis.files.open_files import netcdf_lock
 from vibroimpact.fmus.errors import DatasetError
 
 _TEXT_CHUNK = 4096
-"""Texts that are stored together; a chunk without any is not there."""
+"""Number of texts stored together; a chunk of empty texts is not stored."""
 
 _Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
 
@@ -85,19 +85,19 @@ def build_dataset(
     run_index : ndarray of int, shape (run,)
         Index of each run in its campaign.
     sample_variables : sequence of str
-        Names of the sampled variables, columns 1 on of `RunRecord.samples`; `component.variable` in a
-        general scene. In the file they have the names that `file_names` gives.
+        Names of the sampled variables, in the order of columns 1 on of `RunRecord.samples`; `component.variable`
+        in a general scene. In the file they have the names that `file_names` gives.
     units : {"SI", "nondimensional"}
         Units of the scene.
     attrs : mapping, optional
         Provenance: scene text, versions, hashes; written as global attributes.
     unit_of : mapping of str to str, optional
-        SI units of swept parameters, and of sampled variables whose name does not tell; a variable of one of
-        the `event_components` that is not here has the unit 1.
+        SI units of swept parameters, and of sampled variables whose name does not end in a known quantity. A variable
+        of one of the `event_components` that is missing here has the unit 1.
     omit : collection of str
         Per-period variables that the scene does not record; they are not stored.
     each_period : bool, optional
-        False: `period` has one element, which stands for all recorded periods of its run, see
+        False: `period` has one element, which stands for all recorded periods of its run:
         `columns.of_all_periods`.
     event_components : sequence of str, optional
         Names of all components of a general scene, in the order that `RunRecord.events` counts them.
@@ -107,7 +107,7 @@ def build_dataset(
     compared : sequence of str, optional
         Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
     measured : mapping of str to ndarray, shape (run,), optional
-        What is known of runs that a rig has measured, or that are orbits: some of `schema.MEASURED_COLUMNS`, or
+        Further columns of runs that a rig has measured, or that are orbits: some of `schema.MEASURED_COLUMNS`, or
         `schema.ORBIT_COLUMNS`.
     constants : mapping of str to tuple, optional
         Numbers that are the same for all runs, as `described_constants` gives them.
@@ -166,9 +166,9 @@ def with_constants(
 ) -> xr.Dataset:
     """Return a one-dimensional dataset with the numbers of its scene that all runs share, as scalar coordinates.
 
-    They keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`. Their names
-    in the file are new there; units are SI, and those of sampled quantities may be left out. An unknown unit raises
-    DatasetError.
+    The constants keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`.
+    Their names in the file must be new there. Units are SI, and may be left out for sampled quantities. An unknown
+    unit raises DatasetError.
     """
     described = described_constants(constants, dataset.attrs["units_system"], unit_of)
     return dataset.assign_coords(wrapped(described))
@@ -177,7 +177,7 @@ def with_constants(
 def described_constants(
     constants: Mapping[str, float], units: UnitSystem, unit_of: Mapping[str, str] | None = None
 ) -> dict[str, Described]:
-    """Return the variables of numbers that are the same for all runs, see `with_constants`."""
+    """Return the variables of numbers that are the same for all runs, as `with_constants` adds them."""
     return {
         name: (
             (),
@@ -194,7 +194,7 @@ def _check_lengths(
     direction: Sequence[Direction] | NDArray[np.int8],
     run_index: Sequence[int] | NDArray[np.integer[Any]],
 ) -> None:
-    """Refuse per-run arrays of different lengths, and swept parameters that would hide a variable."""
+    """Raise DatasetError if per-run arrays differ in length, or a swept parameter would hide a variable."""
     lengths = {"direction": len(direction), "run_index": len(run_index)}
     lengths |= {name: len(values) for name, values in coordinates.items()}
     problems = [
@@ -212,7 +212,7 @@ def _check_lengths(
 
 
 def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
-    """Return values as variables of the schema: with its dimensions, types and attributes."""
+    """Return values as variables of the schema, with its dimensions, types and attributes."""
     return {
         name: (
             RULES[name].dims,
@@ -226,7 +226,7 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
 def _column_variables(
     columns: RunColumns, units: UnitSystem, omit: Collection[str], each_period: bool
 ) -> _Variables:
-    """Return the variables of what runs recorded."""
+    """Return the variables of the records of runs."""
     variables = _described(arrays_of(columns, omit, each_period=each_period), units)
     for name in () if each_period else OF_ALL_PERIODS.keys() & variables:
         variables[name][2]["long_name"] = OF_ALL_PERIODS[name]
@@ -245,7 +245,7 @@ def _ragged_variables(
 
 @dataclass(frozen=True, slots=True)
 class _Samples:
-    """What is known of the sampled variables beside their values."""
+    """Facts about the sampled variables other than their values."""
 
     names: Sequence[str]
     components: Collection[str]
@@ -254,14 +254,14 @@ class _Samples:
     units: UnitSystem
 
     def attributes(self, name: str, stored: str) -> dict[str, Any]:
-        """Return the attributes of a variable that is stored under another name than its component's."""
+        """Return the attributes of a variable that is stored under another name than in its component."""
         rule = None if self.components or stored == name else sample_rule(stored)
         if rule is not None:
             return {"long_name": rule.long_name, "units": unit_in(self.units, rule.unit)}
         unit = self.unit_of.get(name) or self.unit_of.get(stored)
         owner, dot, _ = name.partition(".")
         if not unit and (owner in self.components or (dot and known_unit(stored) is None)):
-            # What other people's FMUs say of their units is all that is known: names would only mislead.
+            # The units that foreign FMUs state are the only source: names would only mislead.
             unit = "1"
         attributes = _quantity_attributes(stored, self.units, {stored: unit} if unit else {})
         return attributes if stored == name else attributes | {"long_name": name, "component_variable": name}
@@ -306,7 +306,7 @@ def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units
 def _coupling_variables(
     runs: Sequence[RunRecord], connections: Sequence[str], units: UnitSystem
 ) -> _Variables:
-    """Return the residuals that the coupling of components left."""
+    """Return the residuals of the coupling of components."""
     variables: _Variables = {}
     for run in runs:
         if run.energy_residual is not None and len(run.energy_residual) != len(connections):
@@ -344,12 +344,12 @@ def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str
 
 
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
-    """Check a dataset and write it as one NetCDF-4 file that is whole or not there at all.
+    """Check a dataset and write it as one NetCDF-4 file that is whole or absent.
 
     A run whose values fail the check is marked (`checking.marked`) and written with the others.
 
-    The SHA-256 of the content follows it, see `fingerprints`. The file is made in memory first and then
-    written in one go: the HDF5 library would keep a file open, and its space taken, after the disk was full.
+    The SHA-256 of the content follows the content, see `fingerprints`. The file is made in memory and then written in
+    one go. Otherwise the HDF5 library would keep the file open on a full disk, and its space taken.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
 
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
-    # what is read of another file wants the lock, too
+    # values that come from another file need the lock, too
     variables = [replace(one, variable=loaded_variable(one.variable)) for one in stored_variables(dataset)]
     with netcdf_lock():
         file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
@@ -387,7 +387,7 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
 
 
 def _store(file: netCDF4.Dataset, one: Stored, compression: int) -> None:
-    """Store one variable with its attributes; floats mark what is missing by NaN."""
+    """Store one variable with its attributes; floats mark missing values by NaN."""
     variable = one.variable
     is_text = variable.dtype.kind == "O"
     kind: Any = str if is_text else variable.dtype
@@ -410,7 +410,7 @@ def _store(file: netCDF4.Dataset, one: Stored, compression: int) -> None:
 
 
 def _store_texts(placed: netCDF4.Variable[Any], texts: NDArray[Any]) -> None:
-    """Store what is not empty: what was never stored reads as empty, and takes no space."""
+    """Store the texts that are not empty: an element never stored reads as empty, and takes no space."""
     places = np.flatnonzero(texts.astype(bool))
     for block in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else ():
         placed[block[0] : block[-1] + 1] = texts[block]

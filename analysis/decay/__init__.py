@@ -1,7 +1,7 @@
 """Free decays and resonances: decrement, exponential fit, damping laws, frequency response, backbone.
 
 Start at `estimate_decay` for a free decay, at `frequency_response` and `fit_resonance` for a driven one;
-docs/damping.md says what is fitted and why.
+docs/damping.md describes the fitted models and the reasons for them.
 
 Examples
 --------

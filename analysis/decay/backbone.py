@@ -1,4 +1,4 @@
-"""How frequency and damping change with the amplitude of a free decay."""
+"""Frequency and damping of a free decay as functions of its amplitude."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FEWEST_PERIODS = 4.0
 _MOST_WINDOWS = 16
 _TENTH = 0.1
 _SMALLEST = 3.0
-"""Amplitude of a window, in standard errors, below which it is noise; so it is below the rms of the residual."""
+"""Amplitude in standard errors below which a window is noise; it is noise below the rms of its residual as well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Backbone:
     periods: float
 
     def words(self, unit: str) -> str:
-        """Return how the frequency changes, as a sentence: the first window against those under a tenth of it."""
+        """Return the change of the frequency as a sentence: the largest window against those below a tenth of it."""
         high = int(np.argmax(self.amplitude))
         small = self.amplitude <= max(_TENTH * self.amplitude[high], float(np.min(self.amplitude)))
         weights = 1.0 / self.angular_frequency_error[small] ** 2
@@ -75,10 +75,10 @@ def _short(unit: str) -> str:
 def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
     """Return frequency and damping against amplitude, window by window.
 
-    In each window a decaying cosine is fitted with its own frequency and decay rate; its amplitude is that of the
+    A decaying cosine with its own frequency and decay rate is fitted to each window; the amplitude refers to the
     middle. Nothing is filtered: a Hilbert transform would smear the start of the decay, where the amplitude is largest.
-    A window is `periods` long, by default a sixteenth of the decay, but four periods at least. If fewer than two
-    windows can be fitted, EstimationError is raised.
+    A window is `periods` long, by default a sixteenth of the decay, but four periods at least. EstimationError is
+    raised if fewer than two windows can be fitted.
     """
     guess = first_guess(samples)
     length = 2.0 * np.pi / guess.angular_frequency
@@ -108,7 +108,7 @@ def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
 def _window(
     samples: DecaySamples, part: NDArray[np.int64], guess: FirstGuess, shortest: float
 ) -> ExponentialDecay | None:
-    """Return the fit of one window; None where it is too short, or where noise is all there is."""
+    """Return the fit of one window; None where it is too short, or holds only noise."""
     time = samples.time[part]
     if len(part) < FEWEST_SAMPLES or time[-1] - time[0] < shortest:
         return None
@@ -120,7 +120,7 @@ def _window(
         fit = fit_exponential(piece, replace(guess, angular_frequency=omega))
     except EstimationError:
         return None
-    # A frequency far from its neighbours' is that of noise, or of another mode.
+    # A frequency far from that of its neighbours belongs to noise, or to another mode.
     lost = abs(fit.angular_frequency.value / omega - 1.0) > 0.2
     least = max(_SMALLEST * fit.amplitude.standard_error, fit.test.rms)
     return None if lost or fit.amplitude.value < least else fit

@@ -14,11 +14,11 @@ from vibroimpact.fmus.errors import EstimationError
 
 _FEWEST_PEAKS = 4
 _SMALLEST = 3.0
-"""Height of a peak, in standard errors, below which its logarithm is biased: such peaks are left out."""
+"""Height of a peak, in standard errors, below which its logarithm is biased, and the peak is left out."""
 _LAGS_TURN = 1.25
-"""Phase per peak, rad, with which the residual test looks over ten peaks."""
-_BENT = 3.0
-"""Curvature of ln(peak) over n, in standard errors, above which it is called bent."""
+"""Phase per peak, rad, at which the two periods of the residual test span ten peaks."""
+_CURVED = 3.0
+"""Curvature of ln(peak) over n, in standard errors, above which the logarithm counts as bent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +28,9 @@ class Peaks:
     Attributes
     ----------
     number, time : ndarray of float, shape (peak,)
-        In half periods (one that is missing leaves its number out), and in s.
+        Number of half periods (a missing peak leaves its number out), and time in s.
     height, error : ndarray of float, shape (peak,)
-        Above the equilibrium, positive on both sides, and its standard error; unit of the samples.
+        Height above the equilibrium, positive on both sides, and its standard error; unit of the samples.
     equilibrium : float
         Unit of the samples.
     """
@@ -44,19 +44,19 @@ class Peaks:
 
 @dataclass(frozen=True, slots=True)
 class Decrement:
-    """Logarithmic decrement per period, what follows from it, and the peaks it is from.
+    """Logarithmic decrement per period, the numbers that follow from it, and the peaks behind it.
 
     Attributes
     ----------
     decrement, damping_ratio : Estimate
     angular_frequency : Estimate
-        Of the damped motion, from the times of the peaks, rad/s.
+        Angular frequency of the damped motion, from the times of the peaks, rad/s.
     peaks : Peaks
     first, last : float
         Decrement per period at the first and the last peak, from a parabola through ln(height).
     bent : bool
-        Whether ln(height) does not lie on a straight line: it needs the parabola, or what the line leaves is not
-        noise. Then the damping is not viscous alone.
+        Whether ln(height) is no straight line: the parabola fits better, or the residual of the line is not noise.
+        Then the damping is not viscous alone.
     """
 
     decrement: Estimate
@@ -71,9 +71,9 @@ class Decrement:
 def logarithmic_decrement(samples: DecaySamples) -> Decrement:
     """Return the decrement from a straight line through ln(peaks).
 
-    `decrement = (1/n) ln(x_0 / x_n)`, `damping_ratio = decrement / sqrt(4 pi^2 + decrement^2)` (thesis eq. 4.1), with
-    all peaks of both sides, measured from the equilibrium and weighted by the square of a smooth height: that is the
-    inverse variance of a logarithm. Standard errors come from the scatter about the line, neighbours correlated or not.
+    `decrement = (1/n) ln(x_0 / x_n)`, `damping_ratio = decrement / sqrt(4 pi^2 + decrement^2)` (thesis eq. 4.1). All
+    peaks of both sides count, measured from the equilibrium. The weight is the square of a smooth height, the inverse
+    variance of a logarithm. Standard errors come from the scatter about the line, neighbours correlated or not.
 
     Raises
     ------
@@ -95,13 +95,13 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
     weight = peaks.height / float(np.max(peaks.height))
     for _ in range(2):
         curve, bends = _weighted(number, logarithm, weight, 2)
-        # A peak's own noise must not weigh it: the smooth curve through all of them does.
+        # The weight of a peak must not depend on its own noise: the smooth curve through all peaks gives it.
         weight = np.exp(np.polynomial.Polynomial(curve)(number) - logarithm[0])
     line, errors = _weighted(number, logarithm, weight, 1)
     off_line = (logarithm - line[0] - line[1] * number) * weight
     turns, turn_errors = _weighted(number, peaks.time, weight, 1)
     freedom = max(len(number) - 2.0, 1.0)
-    # n counts half periods, a decrement is that of a whole one.
+    # n counts half periods, a decrement counts whole ones.
     decrement, error = -2.0 * line[1], 2.0 * errors[1]
     whole = np.hypot(2.0 * np.pi, decrement)
     omega = np.pi / turns[1]
@@ -112,12 +112,12 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
         peaks,
         float(-2.0 * curve[1]),
         float(-2.0 * (curve[1] + 2.0 * curve[2] * number[-1])),
-        bool(abs(curve[2]) > _BENT * bends[2]) or _wanders(off_line),
+        bool(abs(curve[2]) > _CURVED * bends[2]) or _is_systematic(off_line),
     )
 
 
-def _wanders(off_line: Floats) -> bool:
-    """Tell whether what a line leaves is no noise; sides that alternate are an error of the equilibrium, no bend."""
+def _is_systematic(off_line: Floats) -> bool:
+    """Tell whether the residual of a line is no noise; alternating sides mean a wrong equilibrium, not a bend."""
     alternates = np.mean(np.diff(off_line, 2) ** 2) >= 6.0 * np.mean(off_line**2)
     return bool(not alternates and not residual_test(off_line, 1.0, _LAGS_TURN).adequate)
 
@@ -132,10 +132,10 @@ def _weighted(number: Floats, value: Floats, weight: Floats, degree: int) -> tup
 
 
 def find_peaks(samples: DecaySamples, envelope: Envelope) -> Peaks:
-    """Return the turning points, each from a cosine through the half period around it.
+    """Return the turning points, each fitted by a cosine through the half period around it.
 
-    No sample is a peak by itself: sampling would miss it, and noise would raise it. The envelope gives the phase, and
-    the equilibrium as its mean offset.
+    No single sample serves as a peak: sampling would miss the peak, and noise would raise it. The phase comes from the
+    envelope; the equilibrium is the mean offset of the envelope.
     """
     equilibrium = float(np.mean(envelope.offset))
     phase = _phase(samples.time, envelope)
@@ -168,7 +168,7 @@ def _phase(time: Floats, envelope: Envelope) -> Floats:
 def _standing_out(
     samples: DecaySamples, found: list[tuple[float, ...]], noise: float, equilibrium: float
 ) -> Peaks:
-    """Return the peaks up to the first that noise could have made."""
+    """Return the peaks before the first one that noise could have made."""
     number, time, height, share = np.array(found).reshape(-1, 4).T
     error = noise * share
     small = np.flatnonzero(height < _SMALLEST * error)

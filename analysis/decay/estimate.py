@@ -1,4 +1,4 @@
-"""A number with its standard error, and such numbers as a dataset and as a table that people read."""
+"""A number with its standard error; such numbers as a dataset, and as a printed table."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ METHOD_WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A value, its standard error and what the error rests on.
+    """A value, its standard error and the degrees of freedom behind the error.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Estimate:
     unit : str
         CF unit.
     degrees_of_freedom : float
-        Of the residual that the standard error was taken from.
+        Degrees of freedom of the residual from which the standard error was computed.
     """
 
     value: float
@@ -57,7 +57,7 @@ class Estimate:
 
 
 def verdict_of(doubts: Sequence[str]) -> str:
-    """Return in one line whether estimates are to be relied on, and why not.
+    """Return one line that says whether estimates are reliable, and why not.
 
     >>> verdict_of([]), verdict_of(["the record is short"])
     ('sure.', 'not sure, because the record is short.')
@@ -66,21 +66,21 @@ def verdict_of(doubts: Sequence[str]) -> str:
 
 
 def verdict_by_method(doubts: Mapping[str, Sequence[str]]) -> str:
-    """Return in one line which methods are to be relied on, which are not, and why not, from the doubts of each.
+    """Return one line with the reliable methods, the unreliable methods, and the reasons.
 
     >>> verdict_by_method({"decrement": ["it is bent"], "law": []})
     'sure of best damping law; not sure of logarithmic decrement, because it is bent.'
     """
-    sure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if not reasons)
-    unsure = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if reasons)
+    reliable = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if not reasons)
+    unreliable = ", ".join(METHOD_WORDS[name] for name, reasons in doubts.items() if reasons)
     reasons = list(dict.fromkeys(reason for several in doubts.values() for reason in several))
-    if not sure or not unsure:
-        return f"sure of {sure}." if sure else verdict_of(reasons)
-    return f"sure of {sure}; not sure of {unsure}, because {'; '.join(reasons)}."
+    if not reliable or not unreliable:
+        return f"sure of {reliable}." if reliable else verdict_of(reasons)
+    return f"sure of {reliable}; not sure of {unreliable}, because {'; '.join(reasons)}."
 
 
 def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
-    """Return estimates by method, then quantity, on these dimensions; see `estimate_table`."""
+    """Return estimates on the dimensions method and quantity, see `estimate_table`."""
     units = {name: item.unit for found in estimates.values() for name, item in found.items()}
     cells = {
         method: {name: (item.value, item.standard_error, *item.interval) for name, item in found.items()}

@@ -1,6 +1,6 @@
 """A decaying cosine fitted to a free decay: `offset + A e^(-lambda t) cos(omega t + phi)`.
 
-First in windows of one period, which give the guess of frequency, decay rate and equilibrium; then to all samples.
+Windows of one period give a first guess of frequency, decay rate and equilibrium; the fit then takes all samples.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 FEWEST_PERIODS = 2.0
 _MOST_GRID = 1 << 18
 _NO_WEIGHT = 1e-9
-"""Amplitude, relative to the largest, below which a window says nothing."""
+"""Amplitude of the second largest window, relative to the largest, below which no slope is computed."""
 _LEAST_EXPLAINED = 0.1
-"""Part of the variance about a straight line; a cosine through plain noise explains a few hundredths."""
+"""Share of the variance about a straight line that the fit must explain; plain noise gives a few hundredths."""
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
     """Amplitude and phase of an oscillation, window by window.
 
-    Of shape (window,): middle of the window in s, amplitude, phase of `cos(phase)` in rad (unwrapped), and offset.
+    Arrays of shape (window,): middle of the window in s, amplitude, phase of `cos(phase)` in rad (unwrapped), offset.
     """
 
     time: Floats
@@ -41,7 +41,7 @@ class Envelope:
 
 @dataclass(frozen=True, slots=True)
 class FirstGuess:
-    """Where a fit starts: angular frequency (rad/s), decay rate (1/s), equilibrium (unit of the samples)."""
+    """Start values of a fit: angular frequency (rad/s), decay rate (1/s), equilibrium (unit of the samples)."""
 
     angular_frequency: float
     decay_rate: float
@@ -52,8 +52,8 @@ class FirstGuess:
 def first_guess(samples: DecaySamples) -> FirstGuess:
     """Return frequency, decay rate and equilibrium of the strongest oscillation.
 
-    The frequency is the highest peak of the spectrum of the samples, interpolated to an even grid, then the mean slope
-    of the phase of one-period windows; the decay rate is the slope of the logarithm of their amplitudes.
+    The frequency is first the highest peak of the spectrum, with the samples interpolated to an even grid. It is then
+    the mean slope of the phase of one-period windows. The decay rate is the slope of the logarithm of their amplitudes.
     EstimationError: fewer than two periods are in the window, or nothing oscillates.
     """
     omega = spectral_peak(samples)
@@ -68,7 +68,7 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
         envelope = windowed_cosines(samples, omega, decay_rate)
         weights = envelope.amplitude
         if len(weights) < 2 or not np.sort(weights)[-2] > _NO_WEIGHT * np.max(weights):
-            break  # one window has no slope
+            break  # a single window has no slope
         slope = np.polyfit(envelope.time, envelope.phase, 1, w=weights)[0]
         omega = float(slope) if 0.5 * omega < slope < 2.0 * omega else omega
         logarithm = np.log(np.maximum(envelope.amplitude, 1e-300))
@@ -86,8 +86,8 @@ def spectral_peak(samples: DecaySamples) -> float:
         raise EstimationError(
             f"{samples.name}: expected an oscillation, got a constant. Choose another channel."
         )
-    # No window: it would take away the start, where the oscillation is; the decay itself tapers the end. Below one
-    # and a half periods in the record the spectrum shows drifts only.
+    # No window: it would remove the start, where the oscillation is; the decay itself tapers the end. Below one and a
+    # half periods in the record the spectrum shows only drifts.
     power = np.abs(np.fft.rfft(value, 4 * count))
     peak = 6 + int(np.argmax(power[6:]))
     return 2.0 * np.pi * peak / (4 * count * float(grid[1] - grid[0]))
@@ -96,7 +96,7 @@ def spectral_peak(samples: DecaySamples) -> float:
 def windowed_cosines(samples: DecaySamples, omega: float, decay_rate: float) -> Envelope:
     """Fit `offset + e^(-decay_rate t) (C cos(omega t) + S sin(omega t))` in windows of one period.
 
-    The decay within a window matters: without it, it would show as an offset, the same in all windows.
+    The decay within a window is part of the fit: without it, all windows would show the same false offset.
     Windows with fewer than six samples are left out. `omega` is in rad/s, `decay_rate` in 1/s.
     """
     length = 2.0 * np.pi / omega
@@ -112,12 +112,12 @@ def windowed_cosines(samples: DecaySamples, omega: float, decay_rate: float) -> 
             f"{omega / (2.0 * np.pi):.4g} Hz is sampled every {samples.mean_interval:.4g} s. Record faster, or longer."
         )
     time, amplitude, phase, offset = np.array(found).T
-    # The phase beyond omega t moves slowly: it is what is unwrapped.
+    # The phase beyond omega t moves slowly, so this difference is unwrapped.
     return Envelope(time, amplitude, np.unwrap(phase - omega * time) + omega * time, offset)
 
 
 def _cosine(time: Floats, value: Floats, omega: float, decay_rate: float) -> tuple[float, ...]:
-    """Return middle, amplitude, phase and offset of a window."""
+    """Return the middle, amplitude, phase and offset of a window."""
     middle = 0.5 * (time[0] + time[-1])
     cosine, sine, offset = _amplitudes(time - middle, value, omega, decay_rate)
     return float(middle), float(np.hypot(cosine, sine)), float(np.arctan2(-sine, cosine)), float(offset)
@@ -166,7 +166,7 @@ class ExponentialDecay:
 def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> ExponentialDecay:
     """Fit a decaying cosine by least squares.
 
-    Standard errors allow for residuals that are correlated (`coloured_covariance`).
+    Standard errors allow for correlated residuals (`coloured_covariance`).
 
     Raises
     ------
@@ -176,7 +176,7 @@ def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> E
     from scipy.optimize import least_squares
 
     guess = first_guess(samples) if guess is None else guess
-    # Amplitude and phase are least correlated with rate and frequency at the start of the samples.
+    # At the start of the samples, amplitude and phase are least correlated with rate and frequency.
     time = samples.time - samples.time[0]
     omega, rate = guess.angular_frequency, guess.decay_rate
     cosine, sine, offset = _amplitudes(time, samples.value, omega, rate)
@@ -201,7 +201,7 @@ def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> E
 
 
 def _refuse_nothing(samples: DecaySamples, found: OptimizeResult) -> None:
-    """Refuse a fit that did not settle, or that explains hardly more than noise would let it."""
+    """Raise EstimationError if the fit did not settle, or explains hardly more than a fit of noise."""
     if not found.success or not np.all(np.isfinite(found.x)):
         raise EstimationError(f"{samples.name}: expected a decaying cosine, got no fit: {found.message}")
     line = np.polyval(np.polyfit(samples.time, samples.value, 1), samples.time)
@@ -247,7 +247,7 @@ def _described(
     fitted: Floats,
     test: ResidualTest,
 ) -> ExponentialDecay:
-    """Return the quantities people ask for, with errors to first order."""
+    """Return the derived quantities, with errors to first order."""
     cosine, sine, omega, rate, offset = (float(number) for number in found)
     since = samples.reference_time - float(samples.time[0])
     size, natural = float(np.hypot(cosine, sine)), float(np.hypot(omega, rate))

@@ -1,4 +1,4 @@
-"""All that is estimated from one free decay, as a dataset and as tables that people read."""
+"""All estimates from one free decay, as a dataset and as printed tables."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ _TERMS = (*TERMS, CUBIC)
 
 @dataclass(frozen=True, slots=True)
 class FreeDecay:
-    """What one free decay gave.
+    """Results of one free decay.
 
-    What is None was not asked for, or has its reason in `refusals`, by method.
+    A field is None if its method was not requested, or failed; `refusals` has the reason by method.
     """
 
     samples: DecaySamples
@@ -58,7 +58,7 @@ class FreeDecay:
         return self.choice.best if self.choice is not None and self.second is None else None
 
     def doubts(self) -> dict[str, list[str]]:
-        """Return why the estimates are not to be relied on, by method; each a part of a sentence."""
+        """Return the reasons why estimates are unreliable, by method; each is a part of a sentence."""
         common = [self.second.words] if self.second is not None else []
         if self.exponential.decay_rate.interval[0] <= 0.0:
             common.append("the motion does not decay by more than its error")
@@ -75,7 +75,7 @@ class FreeDecay:
 
     @property
     def verdict(self) -> str:
-        """Whether the estimates are to be relied on, in one line: of which methods, and why not of the others."""
+        """One line with the reliable methods, the unreliable methods, and the reasons."""
         return verdict_by_method(self.doubts())
 
     def estimates(self) -> dict[str, dict[str, Estimate]]:
@@ -97,32 +97,32 @@ class FreeDecay:
         return found
 
     def words(self) -> tuple[str, ...]:
-        """Return what a reader must know, in sentences."""
-        said = list(self.samples.remarks)
+        """Return the remarks for a reader, in sentences."""
+        sentences = list(self.samples.remarks)
         rate = self.exponential.decay_rate
         if rate.interval[0] <= 0.0:
-            said.append(
+            sentences.append(
                 "the motion does not decay by more than its error: it is driven, or the window too short."
             )
-        said.append(f"the decaying cosine is {self.exponential.test.words()}.")
+        sentences.append(f"the decaying cosine is {self.exponential.test.words()}.")
         if self.decrement is not None and self.decrement.bent:
-            said.append(
+            sentences.append(
                 f"the logarithm of the peaks is not a straight line (decrement about {self.decrement.first:.3g} at "
                 f"first, {self.decrement.last:.3g} at last): the damping is not viscous alone."
             )
         if self.second is not None:
-            said.append(
+            sentences.append(
                 f"{self.second.words}. Two decaying cosines describe the motion, and no damping law is chosen."
             )
         elif self.choice is not None:
-            said += self.choice.words()
+            sentences += self.choice.words()
         if self.backbone is not None:
-            said.append(self.backbone.words(self.samples.unit))
-        said += [message(f"{method}: ", reason) for method, reason in self.refusals.items()]
-        return tuple(said)
+            sentences.append(self.backbone.words(self.samples.unit))
+        sentences += [message(f"{method}: ", reason) for method, reason in self.refusals.items()]
+        return tuple(sentences)
 
     def dataset(self) -> xr.Dataset:
-        """Return estimates (method, quantity), the motion, laws, peaks and windows, each where there is one."""
+        """Return the dataset: estimates (method, quantity), motion, laws, peaks and windows, where available."""
         parts = [table_of(self.estimates()), _motion(self)]
         if self.decrement is not None:
             parts.append(_peaks(self.decrement.peaks, self.samples.unit))
@@ -152,9 +152,9 @@ def estimate_decay(
     Parameters
     ----------
     samples : DecaySamples, Channel or xarray.DataArray
-        Of a signal the samples from the largest excursion on, see `decay_samples`.
+        Samples of a decay; a signal is cut at its largest excursion, see `decay_samples`.
     laws : sequence of DampingLaw
-        Those tried; without any, the choice of a law is left out.
+        Laws to fit; if empty, no law is chosen.
     cubic : bool
         Fit a cubic stiffness with every law.
     periods : float, optional
@@ -187,7 +187,7 @@ def estimate_decay(
 
 
 def _misfit(what: str, test: ResidualTest) -> list[str]:
-    """Return the doubt that a fit leaves more than noise, where it does."""
+    """Return the reason for doubt if a fit leaves more than noise."""
     if test.adequate:
         return []
     return [
@@ -202,7 +202,7 @@ def law_estimates(fit: LawFit) -> dict[str, Estimate]:
     found |= {"decay_rate" if name == VISCOUS else name: known[name] for name in _TERMS if name in known}
     if VISCOUS in known:
         omega, rate = known["natural_angular_frequency"], known[VISCOUS]
-        # The relative error of the frequency is smaller than that of the rate by orders.
+        # The relative error of the frequency is orders of magnitude smaller than that of the rate.
         error = rate.standard_error / omega.value
         found["damping_ratio"] = Estimate(rate.value / omega.value, error, "1", rate.degrees_of_freedom)
     return found

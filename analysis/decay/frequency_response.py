@@ -16,12 +16,12 @@ from vibroimpact.fmus.messages import Argument, message
 
 WINDOWS = ("bartlett", "hann", "boxcar")
 _SEGMENTS, _FEWEST_SEGMENTS = 8, 5
-"""Segments by default, and the fewest that longer segments leave: below, the coherence says too little."""
+"""Default number of segments, and the smallest number after doubling their length; fewer give a poor coherence."""
 _LINES = 4.0
-"""Lines in the half-power bandwidth of the highest peak, below which segments are made longer."""
+"""Lines in the half-power bandwidth of the highest peak, below which segments become twice as long."""
 _SHORTEST = 16
 DRIVEN = 1e-3
-"""Drive of a line, relative to the largest, below which the line tells nothing of a response."""
+"""Power of the drive at a line, relative to the largest, below which the line is ignored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +35,17 @@ class FrequencyResponse:
     h1, h2 : ndarray of complex, shape (line,)
         `S_xy / S_xx` (noise on the response only) and `S_yy / S_yx` (noise on the drive only).
     coherence : ndarray of float, shape (line,)
-        `|S_xy|^2 / (S_xx S_yy)`; 1 throughout where there is one segment only: then it says nothing.
+        `|S_xy|^2 / (S_xx S_yy)`; 1 throughout for a single segment, and without meaning then.
     drive_power : ndarray of float, shape (line,)
-        Spectral density of the drive over its largest.
+        Spectral density of the drive, relative to its largest value.
     averages : float
-        Independent segments; overlap counted as what it is worth.
+        Number of independent segments equivalent to the overlapping ones.
     resolution : float
         Noise bandwidth of a line, Hz.
     leakage : Leakage
-        What segments make of the response, at this drive.
+        Effect of the segments on the response, for this drive.
     common : float
-        Lines that are worth one, as the window makes errors of neighbours alike.
+        Number of neighbouring lines equivalent to one independent line, since the window correlates their errors.
     phase_known : bool
         Whether both channels share a clock.
     units : tuple of str
@@ -98,13 +98,13 @@ def frequency_response(
     drive, response : Channel or xarray.DataArray
         Evenly sampled. On different axes the response is taken at the instants of the drive.
     segment : int, optional
-        Samples of a segment; by default the power of two that gives eight segments or more, twice as many where
-        the highest peak has fewer than four lines in its half-power bandwidth and five segments remain. As many as
-        there are, or more: one segment of all samples, as a single transient wants it.
+        Samples of a segment, at most all: a single transient needs one segment of all samples. Default: the power of
+        two that gives eight segments or more. It is doubled where the highest peak has fewer than four lines in its
+        half-power bandwidth and five segments remain.
     window : {"bartlett", "hann", "boxcar"}
-        `bartlett` is the periodic one: `1 - |j - M/2| / (M/2)`.
+        `bartlett` is the periodic form: `1 - |j - M/2| / (M/2)`.
     start, stop : float, optional
-        s; part of the record.
+        Part of the record, s.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def _averaged(
     known: tuple[bool, tuple[str, str]],
     remarks: list[str],
 ) -> FrequencyResponse:
-    """Return the response by segments of a length; `known`: whether the phase is, and the units."""
+    """Return the response by segments of this length; `known`: whether the phase is known, and the units."""
     from scipy.signal import csd, get_window, welch
 
     shape = get_window(window, segment, fftbins=True)
@@ -165,7 +165,7 @@ def _averaged(
     frequency, xx = welch(x, **options)
     _, yy = welch(y, **options)
     _, xy = csd(x, y, **options)
-    # Without the offset line; a line on which nothing was driven has no response.
+    # The offset line is left out; a line without drive has no response.
     lines = (frequency > 0.0) & (xx > 0.0) & (yy > 0.0) & (np.abs(xy) > 0.0)
     frequency, xx, yy, xy = frequency[lines], xx[lines], yy[lines], xy[lines]
     segments = _segments(len(x), segment)
@@ -186,7 +186,7 @@ def _averaged(
 
 
 def half_power(frequency: Floats, magnitude: Floats) -> tuple[float, float]:
-    """Return where the magnitude falls to its maximum over sqrt 2, on both sides; NaN where it does not."""
+    """Return both frequencies where the magnitude falls to its maximum over sqrt 2; NaN where it does not."""
     top = int(np.argmax(magnitude))
     level = _highest(magnitude, top) / np.sqrt(2.0)
     below = np.flatnonzero(magnitude < level)
@@ -212,13 +212,13 @@ def _highest(magnitude: Floats, top: int) -> float:
 
 
 def _common(shape: Floats) -> float:
-    """Return how many neighbouring lines are worth one: the sum of the squared correlations of their errors."""
+    """Return the number of correlated lines equivalent to one: the sum of their errors' squared correlations."""
     spectrum = np.abs(np.fft.fft(shape**2)) / float(np.sum(shape**2))
     return float(np.sum(spectrum**4))
 
 
 def _independent(shape: Floats, segments: int) -> float:
-    """Return how many independent segments overlapping ones are worth (Welch 1967)."""
+    """Return the number of independent segments equivalent to the overlapping ones (Welch 1967)."""
     half = len(shape) // 2
     overlap = float(np.sum(shape[: len(shape) - half] * shape[half:]) / np.sum(shape**2)) ** 2
     return segments / (1.0 + 2.0 * overlap * (segments - 1.0) / segments)
@@ -227,7 +227,7 @@ def _independent(shape: Floats, segments: int) -> float:
 def _pair(
     drive: Channel, response: Channel, start: float | None, stop: float | None
 ) -> tuple[Floats, Floats, float, list[str]]:
-    """Return both signals in SI units on the instants of the drive, their interval, and remarks."""
+    """Return both signals in SI units at the instants of the drive, their interval, and remarks."""
     for channel in (drive, response):
         if channel.axis.interval is None:
             raise UsageError(

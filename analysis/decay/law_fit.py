@@ -1,4 +1,4 @@
-"""Damping laws fitted to the whole motion of a free decay, and which of them it follows, if any."""
+"""Damping laws fitted to the whole motion of a free decay, and the choice of the best law, if any."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class LawFit:
     ----------
     law : DampingLaw
     coefficients : mapping of str to Estimate
-        By name: `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
-        `turning_time`, the terms of the law, and `cubic` where asked for.
+        By name: `natural_angular_frequency`, `offset`, `amplitude` (at the turning point before the window),
+        `turning_time`, the terms of the law, and `cubic` if it was fitted.
     residual_sum : float
         Sum of squares, (unit of the samples)^2.
     fitted : ndarray of float, shape (sample,)
@@ -51,7 +51,7 @@ class LawFit:
 
     @property
     def physical(self) -> bool:
-        """Whether every damping coefficient takes energy out: none is negative."""
+        """Whether every damping coefficient removes energy: none is negative."""
         return all(self.coefficients[term].value >= 0.0 for term in self.law.terms)
 
     @property
@@ -79,8 +79,9 @@ class LawFit:
 class _Problem:
     """The motion and its derivatives as functions of scaled parameters, in one pass for both.
 
-    The parameters, all of order 1 or smaller: shift of the turning point (periods / 2 pi), amplitude and offset (in
-    first amplitudes A), relative change of omega0; then lambda / omega, c / (omega^2 A), q A and mu A^2 as asked for.
+    All parameters are of order 1 or smaller. They are the shift of the turning point (periods / 2 pi), amplitude and
+    offset (in first amplitudes A) and the relative change of omega0. The chosen terms of lambda / omega,
+    c / (omega^2 A), q A and mu A^2 follow.
     """
 
     def __init__(self, samples: DecaySamples, start: ExponentialDecay, names: tuple[str, ...]) -> None:
@@ -92,7 +93,7 @@ class _Problem:
 
     @cached_property
     def scales(self) -> dict[str, tuple[float, float, str]]:
-        """What a scaled 0 of each parameter stands for, what one scaled unit is, and its CF unit."""
+        """The physical value of a scaled 0, the size of one scaled unit, and the CF unit, by parameter."""
         unit = self.samples.unit
         return {
             "turning_time": (self.turning, 1.0 / self.omega, "s"),
@@ -111,7 +112,7 @@ class _Problem:
         return {name: self.scales[name][0] + self.scales[name][1] * row for name, row in rows}
 
     def motion(self, parameters: Floats) -> Floats:
-        """Return the displacement of the samples, shape (sample, column)."""
+        """Return the displacement at the samples, shape (sample, column)."""
         values = self.physical(parameters)
         nothing = np.zeros(parameters.shape[1])
         coefficients = Coefficients(
@@ -122,7 +123,7 @@ class _Problem:
         return values["offset"] + self.side * moved
 
     def evaluated(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return fitted minus measured, and its derivatives by the scaled parameters."""
+        """Return fitted minus measured values, and their derivatives by the scaled parameters."""
         key = parameters.tobytes()
         if self._known is None or self._known[0] != key:
             columns = np.hstack([parameters[:, None], parameters[:, None] + _STEP * np.eye(len(parameters))])
@@ -155,15 +156,15 @@ def fit_law(
     *,
     cubic: bool = False,
 ) -> LawFit:
-    """Fit a damping law by the trajectory it gives.
+    """Fit a damping law by its trajectory.
 
-    The equation of motion (`DampingLaw`) is integrated from turning point to turning point; nothing is averaged, so
-    that amplitude, waveform and phase all count. Coefficients are not held positive: a negative one says that the data
-    do not want this term, and where they are uncertain their interval shows it.
+    The equation of motion (`DampingLaw`) is integrated from turning point to turning point. Nothing is averaged, so
+    amplitude, waveform and phase all count. Coefficients may become negative: the data then speak against this term,
+    and the interval shows the uncertainty.
 
-    `start` gives frequency, phase and equilibrium to start from, `envelope` the amplitudes from which the coefficients
-    are guessed. With `cubic` a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the
-    amplitude. Damping that ends the motion before the data do raises EstimationError.
+    `start` gives the first frequency, phase and equilibrium; `envelope` gives the amplitudes for the first guess of the
+    coefficients. With `cubic` a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the
+    amplitude. EstimationError: the damping ends the motion before the data end.
     """
     from scipy.optimize import least_squares
 
@@ -181,7 +182,7 @@ def fit_law(
                 gtol=1e-12,
                 max_nfev=_MOST_EVALUATIONS,
             )
-    except ValueError as problem_of_scipy:  # what it raises of values that are not finite
+    except ValueError as problem_of_scipy:  # raised for values that are not finite
         raise EstimationError(
             f"{samples.name}: {law.name}: expected an oscillation, got damping beyond any swing. Narrow the window."
         ) from problem_of_scipy
@@ -189,9 +190,9 @@ def fit_law(
 
 
 def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Floats:
-    """Return scaled start values; the coefficients from the slow equation of the amplitude.
+    """Return scaled start values; the coefficients come from the slow equation of the amplitude.
 
-    `dA/dt = -lambda A - 2 c / (pi omega) - 4 q omega A^2 / (3 pi)`, integrated once, is linear in all of them.
+    `dA/dt = -lambda A - 2 c / (pi omega) - 4 q omega A^2 / (3 pi)`, integrated once, is linear in all coefficients.
     """
     from scipy.optimize import nnls
 
@@ -207,7 +208,7 @@ def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Flo
         share, power = losses[term]
         areas = np.concatenate([[power[0] * time[0]], 0.5 * (power[1:] + power[:-1]) * np.diff(time)])
         columns.append(-omega * share * np.cumsum(areas))
-    # The slow equation ends where friction holds the body: from there on the envelope is noise.
+    # The slow equation ends where friction holds the body: after that the envelope is noise.
     moving = slice(0, max(3, int(np.argmax(np.append(size < 0.02 * size[0], True)))))
     solved, _ = nnls(np.column_stack(columns)[moving], size[moving])
     values = [0.0, float(solved[0]) or 1.0, 0.0, 0.0, *solved[1:]]
@@ -235,30 +236,30 @@ class LawChoice:
     Attributes
     ----------
     fits : tuple of LawFit
-        Best first by AIC; laws with a negative coefficient come after all others.
+        Best first, by AIC; laws with a negative coefficient come last.
     effective_samples : float
-        Independent samples by the residual of the best law; the same number for all laws.
-    lost : tuple of DampingLaw
+        Number of independent samples, from the residual of the best law; the same number for all laws.
+    failed : tuple of DampingLaw
         Laws whose fit ended in damping beyond any swing.
     """
 
     fits: tuple[LawFit, ...]
     effective_samples: float
-    lost: tuple[DampingLaw, ...] = ()
+    failed: tuple[DampingLaw, ...] = ()
 
     @property
     def best(self) -> LawFit:
-        """The law of the lowest AIC among those that take energy out only."""
+        """The law of the lowest AIC among the laws that only remove energy."""
         return self.fits[0]
 
     @property
     def best_by_effective_samples(self) -> LawFit:
-        """The law of the lowest AIC when correlated samples are counted as the fewer that they are worth."""
+        """The law of the lowest AIC when correlated samples count only as the equivalent independent samples."""
         eligible = [fit for fit in self.fits if fit.physical] or list(self.fits)
         return min(eligible, key=lambda fit: fit.effective_aic(self.effective_samples))
 
     def weights(self) -> tuple[float, ...]:
-        """Return Akaike weights of the fits, by the effective number of samples; 0 where a law is no damping."""
+        """Return Akaike weights of the fits, by the effective number of samples; 0 for a law that feeds energy in."""
         scores = np.array(
             [fit.effective_aic(self.effective_samples) if fit.physical else np.inf for fit in self.fits]
         )
@@ -268,37 +269,37 @@ class LawChoice:
         return tuple((share / np.sum(share)).tolist())
 
     def words(self) -> tuple[str, ...]:
-        """Return what was found, in sentences."""
+        """Return the choice of the law and its quality, in sentences."""
         best, other = self.best, self.best_by_effective_samples
-        said = [f"{spoken(best.law)} {'has the lowest AIC' if len(self.fits) > 1 else 'was asked for'}."]
+        sentences = [f"{spoken(best.law)} {'has the lowest AIC' if len(self.fits) > 1 else 'was asked for'}."]
         if not best.physical:
-            said.append(
+            sentences.append(
                 "a coefficient of it is negative: it feeds energy in; no law here is a damping of this motion."
             )
-        said.append(f"{spoken(best.law)} is {best.test.words()}.")
+        sentences.append(f"{spoken(best.law)} is {best.test.words()}.")
         if len(self.fits) > 1 and not best.test.adequate:
             good = [fit for fit in self.fits if fit.test.adequate and fit.physical]
-            said.append(
+            sentences.append(
                 "none of the laws is adequate: coefficients and errors describe the best of the wrong models."
                 if not good
                 else f"adequate by its residual: {_named(good)}."
             )
         count = len(best.fitted)
         if len(self.fits) > 1 and self.effective_samples < 0.8 * count:
-            said.append(
+            sentences.append(
                 f"AIC assumes white residuals; these are correlated, and {count} samples are worth "
                 f"{self.effective_samples:.0f}: with that number {spoken(other.law)} "
                 f"{'stays the first' if other is best else 'wins'}."
             )
-        odd = [fit for fit in self.fits if not fit.physical]
-        if odd and best.physical:
-            said.append(f"left out for a negative coefficient: {_named(odd)}.")
-        if self.lost:
-            said.append(f"could not be fitted: {', '.join(map(spoken, self.lost))}.")
+        unphysical = [fit for fit in self.fits if not fit.physical]
+        if unphysical and best.physical:
+            sentences.append(f"left out for a negative coefficient: {_named(unphysical)}.")
+        if self.failed:
+            sentences.append(f"could not be fitted: {', '.join(map(spoken, self.failed))}.")
         unsettled = [fit for fit in self.fits if not fit.settled]
         if unsettled:
-            said.append(f"not settled within the limit of steps: {_named(unsettled)}.")
-        return tuple(said)
+            sentences.append(f"not settled within the limit of steps: {_named(unsettled)}.")
+        return tuple(sentences)
 
 
 def _named(fits: Sequence[LawFit]) -> str:
@@ -312,9 +313,9 @@ def choose_law(
     cubic: bool = False,
     start: ExponentialDecay | None = None,
 ) -> LawChoice:
-    """Fit damping laws to a free decay, with `cubic` a cubic stiffness too, and rank them by Akaike's criterion.
+    """Fit damping laws to a free decay and rank them by Akaike's criterion; `cubic` adds a cubic stiffness.
 
-    `start` is the decaying cosine of the same samples, where it is known already.
+    `start` is the decaying cosine of the same samples, if it was fitted before.
 
     Raises
     ------
@@ -331,15 +332,15 @@ def choose_law(
     """
     envelope = first_guess(samples).envelope
     start = fit_exponential(samples) if start is None else start
-    found, lost = [], []
+    found, failed = [], []
     for law in laws:
         try:
             found.append(fit_law(samples, law, start, envelope, cubic=cubic))
         except EstimationError:
-            lost.append(law)
+            failed.append(law)
     if not found:
         raise EstimationError(
             f"{samples.name}: expected a decay that some law fits, got none. Narrow the window."
         )
     ranked = sorted(found, key=lambda fit: (not fit.physical, fit.aic))
-    return LawChoice(tuple(ranked), ranked[0].test.effective_samples, tuple(lost))
+    return LawChoice(tuple(ranked), ranked[0].test.effective_samples, tuple(failed))

@@ -1,4 +1,4 @@
-"""The damping laws that a free decay is tried against."""
+"""The damping laws that are fitted to a free decay."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class DampingLaw:
     Attributes
     ----------
     terms : tuple of str
-        Which of `viscous` (lambda, 1/s), `coulomb` (c, unit/s^2), `quadratic` (q, 1/unit).
+        Some of `viscous` (lambda, 1/s), `coulomb` (c, unit/s^2), `quadratic` (q, 1/unit).
     """
 
     terms: tuple[str, ...]
@@ -35,7 +35,7 @@ ALL_LAWS = tuple(DampingLaw(terms) for count in (1, 2, 3) for terms in combinati
 
 
 def damping_law(name: str) -> DampingLaw:
-    """Return the law of a name such as `viscous+coulomb`; the order of the terms does not matter.
+    """Return the law with a name such as `viscous+coulomb`; the order of the terms does not matter.
 
     >>> damping_law("coulomb + viscous").name
     'viscous+coulomb'
@@ -57,7 +57,7 @@ def damping_law(name: str) -> DampingLaw:
 
 
 def spoken(law: DampingLaw) -> str:
-    """Return the law as people write it.
+    """Return the name of a law as people write it.
 
     >>> spoken(DampingLaw(("viscous", "coulomb")))
     'viscous + Coulomb'

@@ -1,9 +1,9 @@
-"""Leakage: what spectra by segments show of a frequency response, from the drive itself.
+"""Leakage: the error of a frequency response from spectra by segments, computed from the drive itself.
 
-A segment holds the response to a drive before it, and loses the response after it. Averaged over segments, H1 is
-the Fourier transform of `h(t) rho(t)`: h is the impulse response, rho the cross spectrum of the drive and of the drive
-delayed by t, over the spectrum of the drive. Random forces have the correlation of the window for rho, periodic ones
-of the segment's length have 1.
+A segment holds the response to a drive before it, and loses the response after it. Averaged over segments, H1 is the
+Fourier transform of `h(t) rho(t)` with the impulse response h. Rho is the cross spectrum of the drive and of the
+drive delayed by t, over the spectrum of the drive. For random forces rho is the correlation of the window; for forces
+with the period of the segment it is 1.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from vibroimpact.analysis.decay.samples import Complexes, Floats
 
 _DELAYS = 16
-"""Delays in the length of a segment at which rho is taken."""
+"""Number of delays, within one segment, at which rho is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,16 +26,16 @@ class Leakage:
     Attributes
     ----------
     weights : ndarray of float, shape (term,)
-        w; their sum is 1. One term: no leakage.
+        Weights w, with the sum 1. One term: no leakage.
     spacing : float
-        d, rad/s: half a line.
+        Spacing d, rad/s: half a line.
     """
 
     weights: Floats = field(default_factory=lambda: np.ones(1))
     spacing: float = 0.0
 
     def seen(self, response: Callable[[Floats], Complexes], omega: Floats) -> Complexes:
-        """Return the response that lines at `omega` (rad/s) show of a function of the angular frequency."""
+        """Return a response as lines at `omega` (rad/s) show it; the response is a function of angular frequency."""
         if len(self.weights) == 1:
             return response(omega)
         weights = np.concatenate([0.5 * self.weights[:0:-1], self.weights[:1], 0.5 * self.weights[1:]])
@@ -50,8 +50,8 @@ NO_LEAKAGE = Leakage()
 def leakage_of(drive: Floats, window: Floats, interval: float, driven: float) -> Leakage:
     """Return the leakage of spectra by segments that overlap by half.
 
-    The drive is evenly spaced, an interval (s) apart, and without its mean. The rho of a line counts where its power,
-    relative to the largest, is above `driven`.
+    The drive is evenly spaced by an interval (s), and without its mean. The rho of a line counts where the power of the
+    line, relative to the largest power, is above `driven`.
     """
     from scipy.fft import dct
     from scipy.signal import csd, welch

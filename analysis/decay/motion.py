@@ -1,15 +1,15 @@
 """Free decays under viscous, Coulomb and quadratic damping, from turning point to turning point.
 
-Between two turning points the damping force is smooth: all that is not smooth happens at the turning points, where
-the friction changes its sign. In the plane of `x = a cos(theta)`, `x' = -a omega sin(theta)` these lie at known
-angles, whole multiples of pi, so that one half swing is a smooth problem on a fixed interval of theta:
+Between two turning points the damping force is smooth; only at the turning points does friction change its sign.
+In the plane of `x = a cos(theta)`, `x' = -a omega sin(theta)` the turning points are at multiples of pi. One half
+swing is therefore a smooth problem on a fixed interval of theta:
 
     d(ln a)/d(theta) = g sin(theta) / (1 + g cos(theta)),   dt/d(theta) = 1 / (omega (1 + g cos(theta))),
 
-with g the force beside the linear spring over `omega^2 a`. It is solved on Chebyshev points by repeated integration
-(Picard), to rounding: at once where the damping is viscous, in a few rounds else. The last swings, where Coulomb
-friction ends the motion away from the equilibrium, are written out: a damped half cosine about the edge of the dead
-zone, then rest.
+Here g is the force in addition to the linear spring, over `omega^2 a`. Repeated integration (Picard) on Chebyshev
+points solves the problem to rounding: at once for viscous damping, otherwise in a few rounds. Coulomb friction may
+end the motion away from the equilibrium. The last swing then has a closed form: a damped half cosine about the edge
+of the dead zone, then rest.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _ORDER = 16
 _MOST_SWEEPS = 60
 _CONVERGED = 1e-11
 _LAST_SWING = 3.0
-"""Half widths of the dead zone: a swing that starts within ends inside the zone, and is the last."""
+"""Start of a swing, in half widths of the dead zone, below which it ends inside the zone, and is the last swing."""
 _MOST_SWINGS = 200_000
 
 
@@ -45,10 +45,10 @@ _COS, _SIN = np.cos(_ANGLE)[:, None], np.sin(_ANGLE)[:, None]
 
 @dataclass(frozen=True, slots=True)
 class Coefficients:
-    """Coefficients of the motion, shape (column,), one column for each variant that is computed along.
+    """Coefficients of the motion, shape (column,), one column for each variant computed together.
 
-    omega0 (rad/s), lambda (1/s), c (unit/s^2), q (1/unit), mu (1/unit^2), in the order of the fields, of `x'' +
-    omega0^2 x (1 + mu x^2) = -2 lambda x' - c sign(x') - q x' |x'|`.
+    The order is omega0 (rad/s), lambda (1/s), c (unit/s^2), q (1/unit), mu (1/unit^2). The equation of motion is
+    `x'' + omega0^2 x (1 + mu x^2) = -2 lambda x' - c sign(x') - q x' |x'|`.
     """
 
     angular_frequency: Floats
@@ -69,7 +69,7 @@ class Nodes:
 
 
 class _Terms:
-    """The force beside the linear spring on a half swing, by its coefficients at the nodes."""
+    """The force in addition to the linear spring on a half swing, by its coefficients at the nodes."""
 
     def __init__(self, known: Coefficients) -> None:
         self.omega = known.angular_frequency
@@ -89,27 +89,27 @@ class _Terms:
 def half_swings(start: Floats, amplitude: Floats, coefficients: Coefficients, until: float) -> Nodes:
     """Follow the motion from a turning point at a positive displacement, half swing by half swing.
 
-    `start` (s) and `amplitude`, of shape (column,), are those of the turning point. The motion is followed until all
-    columns are past `until` (s) or at rest; it is NaN from where a column's motion ceased to be an oscillation (damped
-    beyond any swing).
+    `start` (s) and `amplitude`, of shape (column,), belong to this turning point. The motion is followed until all
+    columns are past `until` (s) or at rest. A column is NaN after its motion has ceased to oscillate (damped beyond any
+    swing).
     """
     terms = _Terms(coefficients)
     time, height = start.astype(float), amplitude.astype(float)
-    rests = np.zeros(len(time), bool)
+    at_rest = np.zeros(len(time), bool)
     shape = np.zeros((_ORDER + 1, len(time)))
     swings: list[tuple[Floats, ...]] = []
     with np.errstate(all="ignore"):
-        while np.any(~rests & (time < until)) and len(swings) < _MOST_SWINGS:
-            last = ~rests & (height <= _LAST_SWING * terms.dead)
+        while np.any(~at_rest & (time < until)) and len(swings) < _MOST_SWINGS:
+            last = ~at_rest & (height <= _LAST_SWING * terms.dead)
             swing, shape = _free_swing(height, shape, terms)
             if last.any():
                 swing = _replaced(swing, last, _last_swing(height, terms.dead, coefficients))
-            if rests.any():
-                swing = _replaced(swing, rests, _rest(height, coefficients))
+            if at_rest.any():
+                swing = _replaced(swing, at_rest, _rest(height, coefficients))
             side = -1.0 if len(swings) % 2 else 1.0
             swings.append((time + swing[0], *(side * part for part in swing[1:])))
             time, height = time + swing[0][-1], -swing[1][-1]
-            rests = rests | last | ~np.isfinite(height)
+            at_rest = at_rest | last | ~np.isfinite(height)
     return Nodes(*(np.array(part) for part in zip(*swings, strict=True)))
 
 
@@ -120,9 +120,9 @@ def _replaced(
 
 
 def _free_swing(height: Floats, shape: Floats, terms: _Terms) -> tuple[tuple[Floats, ...], Floats]:
-    """Return time, displacement, velocity, acceleration of a swing towards the negative side.
+    """Return time, displacement, velocity and acceleration of a swing towards the negative side.
 
-    `shape` is ln(a(theta) / a(0)) of the swing before: where the iteration starts.
+    `shape` is ln(a(theta) / a(0)) of the swing before, the start of the iteration.
     """
     for _ in range(_MOST_SWEEPS):
         force = terms.relative_force(height * np.exp(shape))
@@ -143,7 +143,7 @@ def _free_swing(height: Floats, shape: Floats, terms: _Terms) -> tuple[tuple[Flo
 
 
 def _last_swing(height: Floats, dead: Floats, known: Coefficients) -> tuple[Floats, ...]:
-    """Return the swing that ends within the dead zone; quadratic damping as the viscous one of equal loss."""
+    """Return the swing that ends within the dead zone; viscous damping of equal loss replaces quadratic damping."""
     omega = known.angular_frequency
     rate = known.viscous + 4.0 / (3.0 * np.pi) * known.quadratic * omega * height
     damped = np.sqrt(omega**2 - rate**2)
@@ -156,16 +156,16 @@ def _last_swing(height: Floats, dead: Floats, known: Coefficients) -> tuple[Floa
 
 
 def _rest(height: Floats, known: Coefficients) -> tuple[Floats, ...]:
-    """Return a swing that does not move: `height` seen from the other side at its end."""
+    """Return a swing without motion: its end is `height` seen from the other side."""
     still = np.zeros((_ORDER + 1, len(height)))
-    # The side changes with every swing; what rests stays where it is because the sign of its height is kept.
+    # The side changes with every swing; a body at rest stays in place because its height keeps its sign.
     return _ANGLE[:, None] / known.angular_frequency, still + height, still, still
 
 
 def decaying_motion(start: Floats, amplitude: Floats, coefficients: Coefficients, time: Floats) -> Floats:
     """Return displacements from the equilibrium, after a turning point, shape (sample, column).
 
-    Quintic Hermite interpolation between nodes that are at most a twentieth of a period apart: errors of 1e-7 of the
+    Quintic Hermite interpolation between nodes at most a twentieth of a period apart: errors of 1e-7 of the
     amplitude. Start (s), amplitude (positive) and coefficients have shape (column,), the ascending time (s) has shape
     (sample,); instants shortly before the start are extrapolated.
     """

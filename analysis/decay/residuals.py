@@ -1,4 +1,4 @@
-"""The residual of a fit: whether it is noise, said in words, and standard errors where it is not white."""
+"""The residual of a fit: a test whether it is noise, its verdict in words, and standard errors if it is not white."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ import numpy as np
 from vibroimpact.analysis.decay.samples import Floats
 
 SIGNIFICANCE = 0.01
-"""A law is called inadequate where noise alone would leave such a residual once in a hundred records."""
+"""Probability of such a residual by noise alone, below which a law is inadequate."""
 
 NUMERICAL_FLOOR = 1e-6
-"""Structure below this fraction of the amplitude is not told from rounding and interpolation of the model."""
+"""Structure, as a fraction of the largest excursion, below which rounding and interpolation may explain it."""
 
 _FEWEST_LAGS, _MOST_LAGS = 10, 400
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualTest:
-    """What the residual of a fit looks like.
+    """Measures of the residual of a fit.
 
     Attributes
     ----------
     rms, noise_floor, structure : float
-        Root mean square of the residual; of its white part, from second differences; of the rest.
+        Root mean square of the residual; rms of its white part, from second differences; rms of the rest.
     relative_structure : float
         The structure as a fraction of the largest excursion of the measured motion.
     lags : int
         Lags of the Ljung-Box test.
     portmanteau_probability : float
-        That white noise shows such autocorrelations (Ljung-Box).
+        Probability of such autocorrelations in white noise (Ljung-Box).
     runs_probability : float
-        That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided).
+        Probability of a number of sign changes as unusual as this in white noise (Wald-Wolfowitz, two-sided).
     effective_samples : float
-        Independent samples that say as much about the oscillation as these do.
+        Number of independent samples that carry the same information about the oscillation.
     """
 
     rms: float
@@ -48,7 +48,7 @@ class ResidualTest:
 
     @property
     def adequate(self) -> bool:
-        """Whether the residual passes for white noise, or is below what the model computes."""
+        """Whether the residual passes for white noise, or is below the accuracy of the model."""
         return self.portmanteau_probability >= SIGNIFICANCE or self.relative_structure < NUMERICAL_FLOOR
 
     def words(self) -> str:
@@ -85,8 +85,8 @@ def _probability(number: float) -> str:
 def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTest:
     """Test a residual, measured minus fitted in the order of time, against white noise.
 
-    The excursion is the largest of the motion from its equilibrium, in the same unit. The test looks over two periods
-    of the oscillation, whose phase per sample is `turn`, rad.
+    The excursion is the largest distance of the motion from its equilibrium, in the same unit. The test spans two
+    periods of the oscillation; `turn` is the phase of the oscillation per sample, rad.
     """
     from scipy.stats import chi2
 
@@ -98,7 +98,7 @@ def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTe
     probability = float(chi2.sf(statistic, lags))
     floor = float(np.mean(np.diff(residual, 2) ** 2)) / 6.0
     if floor >= variance:
-        # faster than white noise, as a hum: second differences tell no noise from it
+        # changes faster than white noise, such as a hum: second differences cannot separate noise from it
         floor = variance if probability >= SIGNIFICANCE else 0.0
     structure = float(np.sqrt(variance - floor))
     return ResidualTest(
@@ -137,7 +137,7 @@ def _runs_probability(residual: Floats) -> float:
 
 
 def effective_samples(residual: Floats, turn: float) -> float:
-    """Return how many independent samples know as much about the oscillation as the correlated ones.
+    """Return the number of independent samples that carry the same information about the oscillation.
 
     `n / (1 + 2 sum_l rho_l cos(l turn))`: the density of the residual's spectrum at the oscillation's frequency,
     against its mean. The sum is taken period by period and ends at the first period that adds nothing. `turn` is the
@@ -155,17 +155,17 @@ def effective_samples(residual: Floats, turn: float) -> float:
 
 
 def coloured_covariance(jacobian: Floats, residual: Floats, correlation: int) -> tuple[Floats, float]:
-    """Return the covariance of the parameters of a fit whose residuals may be correlated, and its freedom.
+    """Return the covariance of the parameters of a fit with possibly correlated residuals, and its degrees of freedom.
 
-    The sandwich `(J'J)^-1 S (J'J)^-1` with `S = sum_l (1 - |l| / (L + 1)) sum_i s_i s_(i+l)'`, `s_i = J_i r_i` (Newey
-    and West). Correlation among neighbours counts at the frequency at which the parameter acts: an amplitude is as
-    uncertain as the residual is strong near the frequency of the oscillation. Where this is less than the formula for
-    white residuals gives, the white one is kept, parameter by parameter: a fit removes from its residual what resembles
-    its parameters, and the sandwich alone would be too sure.
+    The covariance is the sandwich `(J'J)^-1 S (J'J)^-1` (Newey and West), with `s_i = J_i r_i` and
+    `S = sum_l (1 - |l| / (L + 1)) sum_i s_i s_(i+l)'`. Correlation counts at the frequency at which the parameter acts.
+    An amplitude is thus as uncertain as the residual is strong near the frequency of the oscillation. The formula for
+    white residuals is the lower bound of each variance. A fit removes the parts of its residual that resemble its
+    parameters, so the sandwich alone would be too small.
 
-    The Jacobian has shape (sample, parameter). The correlation is counted in samples, some periods of the oscillation
-    at least; more is taken where the scores are correlated over longer. The freedom, of a variance that was summed over
-    L lags, is 3 n / (2 (L + 1)), for Student's t.
+    The Jacobian has shape (sample, parameter). `correlation` counts samples, at least some periods of the oscillation;
+    more lags are used where the scores are correlated over longer times. A variance summed over L lags has
+    3 n / (2 (L + 1)) degrees of freedom, for Student's t.
     """
     samples, parameters = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
@@ -176,11 +176,11 @@ def coloured_covariance(jacobian: Floats, residual: Floats, correlation: int) ->
     white = bread * float(residual @ residual) / freedom
     scores = unit * residual[:, None]
     lags = _lags(scores, correlation)
-    # The weighted sum over lags is that of products of sums over L + 1 neighbours, at every place they may have.
+    # The weighted sum over lags equals the sum of products of sums over L + 1 neighbours, at every place.
     sums = np.cumsum(np.pad(scores, ((lags + 1, lags), (0, 0))), axis=0)
     moving = sums[lags + 1 :] - sums[: -lags - 1]
     meat = moving.T @ moving / (lags + 1.0)
-    # Scores add up to zero after a fit, which takes (L + 1) / n from a sum over L lags.
+    # Scores add up to zero after a fit, which removes the share (L + 1) / n from a sum over L lags.
     spared = 1.0 - (lags + 1.0) / samples
     coloured = bread @ meat @ bread * samples / freedom / spared
     inflation = np.sqrt(np.maximum(1.0, np.diag(white) / np.maximum(np.diag(coloured), 1e-300)))

@@ -21,50 +21,50 @@ if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
 FORMS = ("displacement", "velocity", "acceleration", "transmissibility")
-"""What responds to what: the first three to a force, the last an absolute acceleration to that of the base."""
+"""Kinds of response: the first three to a force, the last an absolute acceleration to that of the base."""
 
 _FEWEST_LINES = 8
 _STANDS_OUT = 3.0
 """Modal constant, in standard errors, below which a peak may be a ripple of the noise."""
 _BAND = 8.0
-"""Half-power bandwidths on either side of a peak that are fitted, unless a band is given."""
+"""Fitted half-power bandwidths on either side of a peak, unless a band is given."""
 _NEIGHBOURS = 5
-"""Lines over which the variance that the coherence gives is averaged."""
+"""Number of lines over which the variance from the coherence is averaged."""
 _ROUNDING = 1e-12
-"""Distance of the coherence from 1 below which it is rounding, and says nothing of errors."""
+"""Distance of the coherence from 1 below which the distance is rounding, and errors are unknown."""
 _BY_CHANCE = 1e-3
-"""Probability of a larger misfit of one resonance by chance alone, below which the band holds more than one."""
-_OFF = 0.01
-"""Misfit over the peak above which one resonance does not describe lines whose errors are not known."""
+"""Probability of a larger misfit by chance alone, below which the band holds more than one resonance."""
+_LARGEST_MISFIT = 0.01
+"""Misfit over the peak above which one resonance does not describe lines whose errors are unknown."""
 _FEW_LINES = 0.5
-"""Lines in the half-power bandwidth below which the leakage takes the place of the resonance."""
+"""Lines in the half-power bandwidth below which the lines show leakage instead of the resonance."""
 _LEAKAGE_ERROR = 0.1
-"""Standard error of what the leakage moves, as a share of it: rho is that of the lines in the mean."""
+"""Standard error of the leakage's shift, as a share of the shift: rho is the mean over the lines."""
 
 
 @dataclass(frozen=True, slots=True)
 class Resonance:
     """A fitted resonance.
 
-    `H = C N(omega) / (omega0^2 - omega^2 + 2 i zeta omega0 omega) + R`, with `N = (i omega)^p` for the displacement
-    (p = 0), velocity or acceleration per force, and `N = omega0^2 + 2 i zeta omega0 omega` for a transmissibility; R is
-    what all other modes leave in the band.
+    `H = C N(omega) / (omega0^2 - omega^2 + 2 i zeta omega0 omega) + R`. For displacement (p = 0), velocity or
+    acceleration per force, `N = (i omega)^p`; for a transmissibility, `N = omega0^2 + 2 i zeta omega0 omega`. R is the
+    response of all other modes in the band.
 
     Attributes
     ----------
     natural_angular_frequency, damping_ratio : Estimate
     modal_constant : Estimate
-        C: 1/mass of a single oscillator, or the participation (1 of a single one) of a transmissibility.
+        C: 1/mass of a single oscillator; for a transmissibility the participation (1 for a single oscillator).
     phase : Estimate or None
-        Of C, rad: 0 or pi where model and polarity are right; None where only magnitudes were fitted.
+        Phase of C, rad: 0 or pi where model and polarity are right; None where only magnitudes were fitted.
     half_power_damping_ratio : float
-        From the bandwidth at the peak over sqrt 2, as a check; NaN where the curve does not fall that far.
+        Ratio from the bandwidth at the peak over sqrt 2, as a check; NaN where the curve does not fall that far.
     angular_frequency, magnitude, fitted : ndarray of float, shape (line,)
-        What was fitted: rad/s, `|H|` measured and fitted.
+        The fitted lines: rad/s, `|H|` measured and fitted.
     error : ndarray of float, shape (line,)
-        Standard error of the magnitude; zeros where not known.
+        Standard error of the magnitude; zeros where unknown.
     doubts : tuple of str
-        Why the estimates are not to be relied on, each a part of a sentence.
+        Reasons why the estimates are unreliable, each a part of a sentence.
     """
 
     natural_angular_frequency: Estimate
@@ -81,7 +81,7 @@ class Resonance:
 
     @property
     def verdict(self) -> str:
-        """Whether the estimates are to be relied on, in one line, and why not."""
+        """One line that says whether the estimates are reliable, and why not."""
         return verdict_of(self.doubts)
 
 
@@ -95,14 +95,14 @@ class Curve:
         rad/s.
     response : ndarray of complex or float, shape (line,)
     error : ndarray of float, shape (line,)
-        Standard error of each real part; zeros where not known.
+        Standard error of each real part; zeros where unknown.
     form, unit : str
         One of `FORMS`; CF unit of C.
     leakage : Leakage
-        What the lines show of the response.
+        Effect of the segments on the lines.
     estimator : {"h1", "h2"}
     common : float
-        Lines that are worth one.
+        Number of lines equivalent to one independent line.
     """
 
     angular_frequency: Floats
@@ -153,7 +153,7 @@ def curve_of(
     low, high = band or (0.0, np.inf)
     lines = (found.frequency >= low) & (found.frequency <= high)
     if band is None:
-        # Where hardly anything was driven, the quotient is noise over noise, and may be the highest of all.
+        # Lines with hardly any drive are noise over noise, and their quotient may be the highest of all.
         driven = np.abs(response) * (found.drive_power > DRIVEN)
         peak, width = _peak(omega, driven)
         finest = max(2.0 * np.pi * found.resolution, 2.0 * float(omega[1] - omega[0]))
@@ -182,15 +182,15 @@ def curve_of(
 
 
 def _errors(magnitude: Floats, found: FrequencyResponse) -> Floats:
-    """Return the standard errors of the lines, from the coherence of each and its neighbours.
+    """Return the standard errors of the lines, from the coherence of each line and its neighbours.
 
-    Few averages make the coherence of one line too high and too uncertain to weigh with.
+    With few averages, the coherence of a single line is too high and too uncertain for a weight.
     """
     from scipy.ndimage import uniform_filter1d
 
     unbiased = found.averages / (found.averages - 1.0)
     variance = unbiased * (magnitude * found.relative_error) ** 2
-    # geometric: leakage errs by a share of the response, which changes fast about its peak
+    # geometric: the error of leakage is a share of the response, which changes fast about its peak
     return np.asarray(np.exp(0.5 * uniform_filter1d(np.log(np.maximum(variance, 1e-300)), _NEIGHBOURS)))
 
 
@@ -210,7 +210,7 @@ def _constant_unit(form: str, units: tuple[str, str]) -> str:
 
 
 def _peak(omega: Floats, magnitude: Floats) -> tuple[float, float]:
-    """Return the place of the highest value, and the width at which it has fallen by sqrt 2."""
+    """Return the place of the highest value, and the width of the peak at this value over sqrt 2."""
     low, high = half_power(omega, magnitude)
     return float(omega[np.argmax(magnitude)]), high - low if np.isfinite(high - low) else 0.0
 
@@ -235,10 +235,10 @@ def _shape(omega: Floats, natural: float, damping: float, form: str) -> Complexe
 def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     """Fit one resonance to a frequency response by least squares, weighted by its errors where these are known.
 
-    What is fitted is what the lines show of the resonance (`Leakage`). Standard errors are those of the scatter about
-    the fit, neighbouring lines correlated or not, or those that the coherence predicts, whichever are larger, and a
-    tenth of what the leakage moves. Of a frequency response the part around its highest peak is fitted, see
-    `curve_of`. A misfit that chance does not explain, as of a second resonance in the band, is a doubt.
+    The model includes the leakage of the lines (`Leakage`). Standard errors come from the scatter about the fit,
+    neighbouring lines correlated or not, or from the coherence, whichever is larger. A tenth of the leakage's shift is
+    added. A frequency response is fitted around its highest peak, see `curve_of`. A misfit beyond chance, for example
+    from a second resonance in the band, is a reason for doubt.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
 
 
 def _model(curve: Curve, p: Floats) -> Floats | Complexes:
-    """Return what the lines show of a resonance: its frequency, damping ratio, C and R."""
+    """Return the lines of a resonance, leakage included, from its frequency, damping ratio, C and R."""
     omega, seen = curve.angular_frequency, curve.leakage.seen
     if not curve.complex:
         return np.asarray(np.abs(seen(lambda at: p[2] * _shape(at, p[0], p[1], curve.form), omega) + p[3]))
@@ -280,7 +280,7 @@ def _model(curve: Curve, p: Floats) -> Floats | Complexes:
 
 
 def _solved(curve: Curve, start: Floats) -> OptimizeResult:
-    """Return the least-squares fit, its parameters within the band; EstimationError where the fit leaves it."""
+    """Return the least-squares fit; EstimationError where its parameters leave the band."""
     from scipy.optimize import least_squares
 
     omega = curve.angular_frequency
@@ -289,7 +289,7 @@ def _solved(curve: Curve, start: Floats) -> OptimizeResult:
     weight = 1.0 / curve.error if known else np.full(len(omega), 1.0 / largest)
 
     def residual(p: Floats) -> Floats:
-        # Real and imaginary part of each line in turn: neighbours in the residual are neighbours in frequency.
+        # Real and imaginary part of each line alternate: neighbours in the residual are neighbours in frequency.
         return np.asarray((_model(curve, p) - curve.response) * weight).view(np.float64)
 
     found = least_squares(residual, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400)
@@ -303,7 +303,7 @@ def _solved(curve: Curve, start: Floats) -> OptimizeResult:
 
 
 def _misfit(curve: Curve, found: OptimizeResult) -> tuple[str, ...]:
-    """Return the doubt that one resonance does not describe the lines, where it does not."""
+    """Return the reason for doubt if one resonance does not describe the lines."""
     from scipy.stats import chi2
 
     omega = curve.angular_frequency
@@ -322,13 +322,13 @@ def _misfit(curve: Curve, found: OptimizeResult) -> tuple[str, ...]:
         return ()
     # residuals are shares of the peak here
     rms = float(np.sqrt(np.mean(left)))
-    if rms > _OFF and not residual_test(found.fun, 1.0, np.pi / 2.0).adequate:
+    if rms > _LARGEST_MISFIT and not residual_test(found.fun, 1.0, np.pi / 2.0).adequate:
         return (f"the fit leaves {100.0 * rms:.2g} % of the peak, and not as noise: {why}",)
     return ()
 
 
 def _too_narrow(curve: Curve, resonance: Resonance) -> tuple[str, ...]:
-    """Return the doubt that lines are too far apart for the resonance, where they are."""
+    """Return the reason for doubt if lines are too far apart for the resonance."""
     width = 2.0 * resonance.damping_ratio.value * resonance.natural_angular_frequency.value
     lines = width / (2.0 * curve.leakage.spacing) if curve.leakage.spacing else np.inf
     if lines >= _FEW_LINES:
@@ -346,7 +346,7 @@ def _larger(one: Floats, other: Floats) -> Floats:
 
 
 def _start(curve: Curve) -> Floats:
-    """Return the parameters that the peak and its width suggest; EstimationError for lines of one frequency."""
+    """Return start parameters from the peak and its width; EstimationError for lines of one frequency."""
     omega = curve.angular_frequency
     # a sweep up and down has each frequency twice
     spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
@@ -393,7 +393,7 @@ def _described(curve: Curve, found: Floats, covariance: Floats, fitted: Floats) 
 
 
 def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[str, ...]:
-    """Return the warning that lines are too wide for the resonance, where they are."""
+    """Return the warning that lines are too wide for the resonance, if they are."""
     width = resonance.damping_ratio.value * resonance.natural_angular_frequency.value / np.pi
     if found.resolution < 0.25 * width:
         return ()
@@ -408,9 +408,9 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
 
 @dataclass(frozen=True, slots=True)
 class ResponseEstimates:
-    """A fitted resonance and where it is from.
+    """A fitted resonance and its source.
 
-    `response` is None where the curve is that of a simulated sweep; `unit` is the CF unit of the response.
+    `response` is None for a curve from a simulated sweep; `unit` is the CF unit of the response.
     """
 
     resonance: Resonance
@@ -433,7 +433,7 @@ class ResponseEstimates:
         return {"response": found, "half_power": {"damping_ratio": rough}}
 
     def words(self) -> tuple[str, ...]:
-        """Return what a reader must know, in sentences."""
+        """Return the remarks for a reader, in sentences."""
         said = list(self.remarks)
         fit = self.resonance
         ratio = fit.half_power_damping_ratio / fit.damping_ratio.value

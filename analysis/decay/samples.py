@@ -22,7 +22,7 @@ WIDEN = message("Widen ", Argument("start"), " and ", Argument("stop"), ".")
 
 @dataclass(frozen=True, slots=True)
 class DecaySamples:
-    """Good samples of a free decay; their times are used as they are, evenly spaced or not.
+    """Good samples of a free decay; their times are used unchanged, evenly spaced or not.
 
     Attributes
     ----------
@@ -33,9 +33,9 @@ class DecaySamples:
     unit, name : str
         CF unit and name of the channel.
     reference_time : float
-        s; amplitudes and phases of fits refer to it: the start of the window that was asked for.
+        Reference of amplitudes and phases of fits, s: the start of the chosen window.
     remarks : tuple of str
-        What was left out, and why.
+        Samples that were left out, and the reasons.
     """
 
     time: Floats
@@ -54,9 +54,9 @@ class DecaySamples:
 def decay_samples(
     channel: Channel | xr.DataArray, start: float | None = None, stop: float | None = None
 ) -> DecaySamples:
-    """Take the window of a channel in which the body decays.
+    """Return the samples of a channel in a window in which the body decays freely.
 
-    Both ends, in s, are included. Without a start the decay begins at the largest excursion, unless that is within
+    The window includes both ends, in s. Without a start the decay begins at the largest excursion, unless that lies in
     the first twentieth of the record: then nothing is cut.
 
     Raises
@@ -99,29 +99,29 @@ def decay_samples(
 
 
 def stretches(number: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the places of neighbours that have the same number, one array for each stretch of them."""
+    """Return the places of neighbours with equal numbers, one array for each stretch."""
     return np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1)
 
 
 def unit_power(unit: str, power: int) -> str:
-    """Return the CF unit of a power of a quantity."""
+    """Return the CF unit of a power of a quantity with this unit."""
     if unit == "1":
         return "1"
     return f"({unit}){power}" if " " in unit else f"{unit}{power}"
 
 
 def clock_remark(channel: Channel) -> list[str]:
-    """Return the warning that all frequencies share the doubt of the clock, where it has one."""
-    doubt = channel.axis.interval_uncertainty
+    """Return the warning that all frequencies share the uncertainty of the clock, if it has one."""
+    error = channel.axis.interval_uncertainty
     words = (
-        f"{channel.name}: the clock of this recording is uncertain by {100 * doubt:.2g} %, and with it every frequency "
+        f"{channel.name}: the clock of this recording is uncertain by {100 * error:.2g} %, and with it every frequency "
         "and decay rate; the standard errors do not count that. Damping ratios do not change."
     )
-    return [words] if doubt else []
+    return [words] if error else []
 
 
 def _largest_excursion(time: Floats, value: Floats) -> float:
-    """Return the instant of the largest excursion, or the first one where that is early."""
+    """Return the instant of the largest excursion, or the first instant where that is early."""
     excursion = np.abs(value - np.median(value[len(value) // 2 :]))
     peak = float(time[int(np.argmax(excursion))])
     return peak if peak > time[0] + 0.05 * (time[-1] - time[0]) else float(time[0])

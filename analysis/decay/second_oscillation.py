@@ -1,6 +1,6 @@
 """A second oscillation in a free decay: another mode that beats with the first, or a hum.
 
-A damping law explains neither. Two decaying cosines do, and are compared with the laws by the same criterion.
+No damping law explains either. Two decaying cosines do; the same criterion compares them with the laws.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from vibroimpact.analysis.decay.residuals import residual_test
 from vibroimpact.analysis.decay.samples import DecaySamples, Floats
 from vibroimpact.fmus.errors import EstimationError
 
-_LINES_APART = 1.5
-"""Distance from the first frequency, over one period in the record, below which a slow change of it looks the same."""
+_LINE_DISTANCE = 1.5
+"""Distance from the first frequency, in 1 / (length of the record), below which the first may just change slowly."""
 _EXPLAINED = 0.9
-"""Part of the residual's variance that a second oscillation has to explain where what is left is no noise."""
-_CLEARLY = 30.0
+"""Share of the residual's variance that a second oscillation must explain if the rest is no noise."""
+_AIC_DIFFERENCE = 30.0
 """Difference of Akaike's criterion above which two cosines are better than a damping law.
 
 The highest of thousands of lines of noise takes about 15 off the criterion.
@@ -29,7 +29,7 @@ _PARAMETERS = 10
 
 @dataclass(frozen=True, slots=True)
 class SecondOscillation:
-    """What a second decaying cosine leaves.
+    """The second decaying cosine of a decay, and the criterion of both.
 
     Attributes
     ----------
@@ -46,26 +46,26 @@ class SecondOscillation:
     aic: float
 
     def better_than(self, aic: float) -> bool:
-        """Tell whether two cosines describe the decay better than a fit of this criterion."""
-        return self.aic < aic - _CLEARLY
+        """Tell whether two cosines describe the decay better than a fit with this criterion."""
+        return self.aic < aic - _AIC_DIFFERENCE
 
     @property
     def words(self) -> str:
-        """What oscillates beside the mode, as part of a sentence."""
+        """The second oscillation as part of a sentence."""
         hertz = self.angular_frequency / (2.0 * np.pi)
         return f"a second oscillation of {hertz:.4g} Hz is in the window: another mode, or a hum"
 
 
 def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> SecondOscillation | None:
-    """Return the second oscillation of a decay, None where there is none.
+    """Return the second oscillation of a decay; None where there is none.
 
-    Both cosines are fitted together, the second from the highest peak of the residual's spectrum on. A frequency at
-    which the first oscillation itself changes slowly, and a multiple of it, as friction and springs make them, are no
-    second oscillation.
+    Both cosines are fitted together; the second starts at the highest peak of the residual's spectrum. A frequency
+    close to the first one is a slow change of the first oscillation. A multiple of the first frequency comes from
+    friction and springs. Both count as no second oscillation.
     """
     residual = samples.value - first.fitted
     time = samples.time - samples.time[0]
-    apart = _LINES_APART * 2.0 * np.pi / float(time[-1])
+    least = _LINE_DISTANCE * 2.0 * np.pi / float(time[-1])
     omega, own = first.angular_frequency.value, first.decay_rate.value
     try:
         start = spectral_peak(replace(samples, value=residual))
@@ -81,7 +81,7 @@ def second_oscillation(samples: DecaySamples, first: ExponentialDecay) -> Second
     multiple = max(round(other / omega), 1) * omega
     explained = 1.0 - float(left @ left) / float(residual @ residual)
     noise = residual_test(left, float(np.max(np.abs(samples.value))), omega * samples.mean_interval).adequate
-    if not other > apart or abs(other - multiple) < apart or not (noise or explained > _EXPLAINED):
+    if not other > least or abs(other - multiple) < least or not (noise or explained > _EXPLAINED):
         return None
     count = len(time)
     aic = count * float(np.log(max(float(left @ left) / count, 1e-300))) + 2.0 * _PARAMETERS

@@ -1,4 +1,4 @@
-"""The frequency response that a simulated sweep of the forcing frequency draws."""
+"""The frequency response from a simulated sweep of the forcing frequency."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ def swept_response(
 ) -> tuple[Curve, tuple[str, ...]]:
     """Return the amplitude against the forcing frequency over the runs of a campaign, and remarks.
 
-    The amplitude is half of the range of the displacement, over the amplitude of the drive; runs that hit a stop are
-    left out, for they have no frequency response.
+    The amplitude is half the range of the displacement, over the amplitude of the drive. Runs that hit a stop have no
+    frequency response, and are left out.
 
     Parameters
     ----------
     path : path
         Dataset of a campaign that sweeps `forcing.angular_frequency` or `forcing.frequency`.
     drive_amplitude : float
-        In `drive_unit`; 1: the modal constant then contains it.
+        Amplitude of the drive in `drive_unit`; with 1, the modal constant contains it.
     drive_unit : str
         CF unit: `N`, or `1`.
     band : tuple of float, optional
-        Hz; runs outside are left out.
+        Band in Hz; runs outside are left out.
 
     Raises
     ------
@@ -76,12 +76,12 @@ def swept_response(
 
 
 def _remarks(left_out: int, others: list[str], half: Floats) -> tuple[str, ...]:
-    said = []
+    found = []
     if left_out:
-        said.append(f"{left_out} runs that hit a stop, or did not finish, are left out.")
+        found.append(f"{left_out} runs that hit a stop, or did not finish, are left out.")
     if others:
-        said.append(f"{', '.join(others)} is swept too: runs of all its values are taken together.")
+        found.append(f"{', '.join(others)} is swept too: runs of all its values are taken together.")
     spread = float(np.max(np.ptp(half, axis=1) / np.max(half)))
     if spread > 1e-6:
-        said.append(f"amplitudes still change by {spread:.1g} between periods: the transients are not over.")
-    return tuple(said)
+        found.append(f"amplitudes still change by {spread:.1g} between periods: the transients are not over.")
+    return tuple(found)

@@ -1,9 +1,9 @@
 """Estimation of parameters from impacting motion, measured or simulated: `estimate_impacts`.
 
-A displacement that hits a stop is cut at its impacts, found from the signal alone; then energy balance, weak form and
-a fit of whole trajectories each say what restitution, damping, natural frequency and forcing are, side by side with
-95 % intervals. docs/estimation.md says how to read them. For bounces without a force: `estimate_bounces`; for bodies
-of several modes: `estimate_modes`.
+The displacement of a body that hits a stop is cut at its impacts, found from the signal alone. Energy balance, weak
+form and a fit of whole trajectories then give restitution, damping, natural frequency and forcing. Their estimates
+stand side by side with 95 % intervals; docs/estimation.md explains them. Use `estimate_bounces` for bounces without
+a force, and `estimate_modes` for bodies with several modes.
 
 Examples
 --------

@@ -1,8 +1,8 @@
 """Fit all flights of a bouncing body at once: parabolas of one acceleration g that meet at one stop.
 
-In the coordinate of an upper stop: y = stop - g/2 (t - a)(b - t) on a flight from a to b; the next one begins at b.
-Unknown are the stop, g, and the instants. A flight of which a part was recorded has an instant outside the record:
-there its parabola passes the stop, so that its length still says how fast the body arrives, g T / 2.
+In the coordinate of an upper stop, a flight from a to b is y = stop - g/2 (t - a)(b - t). The next flight starts at b.
+The unknowns are the stop, g, and the instants. A flight recorded in part has an instant outside the record, where its
+parabola passes the stop. So its length T still gives the speed of the body on arrival, g T / 2.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.estimation.signals import Signal
 
 # Probability of a larger deviation by chance alone, below which a flight does not follow the others' parabolas.
-_SELDOM = 1e-4
-# Largest relative difference of two bends of one acceleration, where their errors do not explain it.
+_REJECTION = 1e-4
+# Relative difference of two bends up to which they have one acceleration, even where their errors are smaller.
 _SAME_BEND = 0.25
-# The jump of the velocity at an impact is g (T1 + T2) / 2. Below half of it the boundary is none.
+# Jump of the velocity over g (T1 + T2) below which a boundary is no impact: half of the 1/2 at a true impact.
 _LEAST_JUMP = 0.25
-# Longest pairs of neighbouring pieces from which a chain of flights is grown.
+# Number of pairs of neighbouring pieces, the longest first, from which a chain of flights is grown.
 _MOST_SEEDS = 4
 _MOST_STEPS, _HALVINGS = 40, 8
-# Samples above which no instant is tried a sample earlier and later: it then has many samples on both sides.
+# Number of samples above which instants are not shifted by a sample: each side then has many samples.
 _MOST_TO_RELOCATE = 2_000
 # Relative change of the sum of squares below which a fit has converged.
 _CONVERGED = 1e-12
 # Residual, over the range, below which it is rounding: simulated flights follow their parabolas to the last digits.
 _EXACT = 1e-9
-# Degree of the polynomials of single flights that are compared with the parabolas of one acceleration.
+# Degree of the polynomials of single flights, for comparison with the parabolas of one acceleration.
 _DEGREE = 4
 
 
@@ -43,37 +43,37 @@ class BounceFit:
     """Parabolas of one acceleration between neighbouring instants."""
 
     instants: Floats
-    """Starts and ends of flights, s, shape (instant,); the first and the last one lie outside the samples."""
+    """Starts and ends of flights, s, shape (instant,); the first and the last instant lie outside the samples."""
     stop: float
     acceleration: float
-    """`stop` and `acceleration`: coordinate of an upper stop, unit of the displacement (per s^2)."""
+    """`stop` and `acceleration` in the coordinate of an upper stop: unit of the displacement, and this unit per s^2."""
     covariance: Floats
     """Covariance of stop, acceleration, instants, per variance of the noise; shape (2 + instant, 2 + instant)."""
     square: float
     """Sum of squared residuals."""
     fitted: Floats
-    """Shape (sample,)."""
+    """Fitted displacements, shape (sample,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class FittedBounces:
-    """The flights of a record, and how well parabolas of one acceleration follow them."""
+    """The flights of a record, and the quality of their fit by parabolas of one acceleration."""
 
     signal: Signal
-    """Mirrored where the stop is a lower one."""
+    """The signal, mirrored for a lower stop."""
     index: NDArray[np.intp]
-    """Samples of the flights, shape (sample,)."""
+    """Places of the samples of the flights, shape (sample,)."""
     fit: BounceFit
     noise: float
     """Standard deviation of the residuals."""
     excess: float
-    """Variance that polynomials of single flights take from the residuals, over that of the noise; 1 by chance."""
+    """Variance that polynomials of single flights remove from the residuals, over the noise variance; 1 by chance."""
     adequate: bool
     """Whether chance explains the excess."""
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of stop, acceleration and instants; residuals that are no noise widen it."""
+        """Covariance of stop, acceleration and instants, widened where residuals are more than noise."""
         found: Floats = max(1.0, self.excess) * self.noise**2 * self.fit.covariance
         return found
 
@@ -81,7 +81,7 @@ class FittedBounces:
 def fitted_bounces(raw: Signal, side: str | None) -> FittedBounces | None:
     """Return the longest chain of flights in a record, all fitted together; None where there is none.
 
-    The signal is not mirrored; the side is that of an `upper` or `lower` stop, None as the flights show.
+    The signal is not mirrored. `side` names an `upper` or `lower` stop; None: the flights decide.
     """
     plain = np.flatnonzero(raw.good)
     points = points_of(raw.time[plain], raw.values[plain])
@@ -95,7 +95,7 @@ def fitted_bounces(raw: Signal, side: str | None) -> FittedBounces | None:
         return None
     chain, sign = best
     signal = Signal(raw.time, sign * raw.values, raw.good, raw.interval, sign, raw.noise)
-    # the end of the last piece may have samples of flights that are too short to be seen
+    # the end of the last piece may hold samples of flights too short to be seen
     half = chain[-1].first + (chain[-1].count + 1) // 2
     index = plain[chain[0].first * points.size : half * points.size]
     start = _start(points, chain, sign)
@@ -108,12 +108,12 @@ def fitted_bounces(raw: Signal, side: str | None) -> FittedBounces | None:
 
 
 def _reach(chain: Sequence[Piece]) -> tuple[int, int]:
-    """Return flights and points of a chain: the more, the better."""
+    """Return the numbers of flights and points of a chain; larger is better."""
     return len(chain), sum(piece.count for piece in chain)
 
 
 def _relocated(time: Floats, values: Floats, fit: BounceFit) -> BounceFit:
-    """Return the best fit with instants tried a sample earlier and later: each side has a minimum of its own."""
+    """Return the best fit after shifting instants by a sample: each side of a sample has its own minimum."""
     step = float(np.median(np.diff(time)))
     for k in range(1, len(fit.instants) - 1):
         for shift in (-step, step):
@@ -127,7 +127,7 @@ def _relocated(time: Floats, values: Floats, fit: BounceFit) -> BounceFit:
 
 
 def _judged(signal: Signal, index: NDArray[np.intp], fit: BounceFit) -> FittedBounces | None:
-    """Return a fit with its noise, and what polynomials of single flights follow better; None without any freedom."""
+    """Return a fit with its noise, and its excess over polynomials of single flights; None without any freedom."""
     from scipy.special import fdtrc
 
     time, residual = signal.time[index], signal.values[index] - fit.fitted
@@ -137,19 +137,19 @@ def _judged(signal: Signal, index: NDArray[np.intp], fit: BounceFit) -> FittedBo
     noise = math.sqrt(fit.square / freedom)
     least = _EXACT * signal.range
     places = np.searchsorted(time, fit.instants[1:-1])
-    left, lost = 0.0, 0
+    left, spent = 0.0, 0
     for since, rest in zip(np.split(time, places), np.split(residual, places), strict=True):
         degree = min(_DEGREE, len(since) - 1)
         if degree >= 0:
             abscissa = (since - since[0]) / max(float(np.ptp(since)), 1e-300)
             columns = np.polynomial.legendre.legvander(2.0 * abscissa - 1.0, degree)
             after = rest - columns @ np.linalg.lstsq(columns, rest, rcond=None)[0]
-            left, lost = left + float(after @ after), lost + degree + 1
-    more, over = lost - len(fit.covariance), len(index) - lost
+            left, spent = left + float(after @ after), spent + degree + 1
+    more, over = spent - len(fit.covariance), len(index) - spent
     if noise < least or more < 1 or over < 1 or not left > 0.0:
         return FittedBounces(signal, index, fit, max(noise, signal.noise), 1.0, True)
     ratio = (fit.square - left) / more / (left / over)
-    adequate = bool(fdtrc(more, over, ratio) > _SELDOM)
+    adequate = bool(fdtrc(more, over, ratio) > _REJECTION)
     return FittedBounces(signal, index, fit, noise, 1.0 if adequate else ratio, adequate)
 
 
@@ -158,7 +158,7 @@ def fit_bounces(
 ) -> BounceFit | None:
     """Fit stop, acceleration and instants by least squares (Gauss-Newton); None where flights vanish.
 
-    Time is in s, shape (sample,), values are displacements with an upper stop. Instants (s), stop and acceleration are
+    Time is in s, shape (sample,); values are displacements with an upper stop. Instants (s), stop and acceleration are
     start values.
     """
     unknown = np.concatenate([[stop, acceleration], instants])
@@ -245,7 +245,7 @@ def _longest_chain(points: Points, pieces: Sequence[Piece], sign: float) -> list
 
 
 def _grown(points: Points, pieces: Sequence[Piece], k: int, sign: float) -> tuple[int, int]:
-    """Return first and end of the chain that begins with pieces k and k + 1: neighbours join while they follow it."""
+    """Return the start and end of the chain around pieces k and k + 1: neighbours join while they follow it."""
     first, end = k, k + 2
     while end < len(pieces) and _joins(points, pieces[first : end + 1], True, sign):
         end += 1
@@ -261,7 +261,7 @@ def _joins(points: Points, chain: Sequence[Piece], last: bool, sign: float) -> b
 
 
 def _is_impact(points: Points, one: Piece, other: Piece, sign: float) -> bool:
-    """Tell whether two pieces are flights of one acceleration, and the velocity jumps away from the stop between."""
+    """Tell whether two pieces have one acceleration, and the velocity between them jumps away from the stop."""
     bends = sign * one.bend, sign * other.bend
     if not min(bends) > 0.0:
         return False
@@ -279,7 +279,7 @@ def _is_impact(points: Points, one: Piece, other: Piece, sign: float) -> bool:
 
 
 def _bend_error(points: Points, piece: Piece, square: float, freedom: int) -> float:
-    """Return the standard error of a bend: even samples over L give 2 sqrt(180 / n) sigma / L^2."""
+    """Return the standard error of a bend: n even samples over a length L give 2 sqrt(180 / n) sigma / L^2."""
     length = float(points.time[piece.end - 1] - points.time[piece.first])
     return 2.0 * math.sqrt(180.0 / piece.count * square / max(freedom, 1)) / length**2
 
@@ -298,7 +298,7 @@ def _follows(points: Points, chain: Sequence[Piece], last: bool, sign: float) ->
     piece = chain[-1 if last else 0]
     part = slice(len(index) - piece.count, None) if last else slice(0, piece.count)
     square = float(np.sum((values[part] - fit.fitted[part]) ** 2))
-    return square <= variance * float(chdtri(piece.count, _SELDOM)) * (1.0 + 3.0 / math.sqrt(free))
+    return square <= variance * float(chdtri(piece.count, _REJECTION)) * (1.0 + 3.0 / math.sqrt(free))
 
 
 def _start(points: Points, chain: Sequence[Piece], sign: float) -> tuple[Floats, float, float]:
@@ -319,9 +319,9 @@ def _start(points: Points, chain: Sequence[Piece], sign: float) -> tuple[Floats,
 
 
 def _outer(
-    piece: Piece, sign: float, stop: float, acceleration: float, edge: float, impact: float, way: float
+    piece: Piece, sign: float, stop: float, acceleration: float, edge: float, impact: float, direction: float
 ) -> float:
     """Return the instant at which the parabola of the first or last flight passes the stop, away from its impact."""
-    # from the impact on the flight takes 2 V / g; an edge inside it says that it is longer
+    # the flight lasts 2 V / g from the impact on; an edge beyond this instant means a longer flight
     speed = abs(piece.at(impact)[1])
-    return impact + way * max(2.0 * speed / acceleration, abs(edge - impact))
+    return impact + direction * max(2.0 * speed / acceleration, abs(edge - impact))

@@ -1,7 +1,7 @@
-"""The flights of a bouncing body, found as parabolas of one acceleration, or between kinks where they are no parabolas.
+"""The flights of a bouncing body, found as parabolas of one acceleration, otherwise as motion between kinks.
 
-Parabolas take all samples of a flight, so they answer where noise is strong or samples are few. Drag, a spring and a
-contact of some length bend flights: kinks make no assumption about their form.
+Parabolas use all samples of a flight, so they work with strong noise or few samples. Drag, a spring and a contact of
+some length bend the flights; kinks make no assumption about their form.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError
 
 FEWEST_FLIGHTS = 3
-# Periods in a record of the fastest smooth motion; windows are shortened until impacts appear.
+# Assumed number of periods of the fastest smooth motion in a record; windows are shortened until impacts appear.
 _TURNS = 4.0
 # Smallest error of an instant, in sampling intervals.
 _INSTANT = 1e-4
-# Ratio of a flight's length to that of the one before above which impacts in it were not seen ...
+# Ratio of a flight's length to the length before, above which impacts in the flight were missed ...
 _LONGER = 1.02
-# ... if it is longer by more than this many standard errors.
+# ... if the flight is also longer by more than this many standard errors.
 _LONGER_BEYOND = 3.0
-# Relative standard error of a length above which the first flight is left out.
+# Relative standard error of the first flight's length above which this flight is left out.
 _LEAST_KNOWN = 0.1
 
 
@@ -37,20 +37,20 @@ class BounceFlights:
     """Successive flights, each shorter than the one before."""
 
     lengths: Floats
-    """s, shape (flight,)."""
+    """Lengths of the flights, s, shape (flight,)."""
     covariance: Floats
     """Covariance of the logarithms of the lengths: neighbours share the error of an instant."""
     acceleration: float
-    """Towards the stop, unit of the channel per s^2; 0 where no flight shows it."""
+    """Acceleration towards the stop, unit of the channel per s^2; 0 where no flight shows it."""
     impact_times: Floats
-    """Instants that were seen, s, shape (impact,)."""
+    """Observed instants of impact, s, shape (impact,)."""
     stop_position: float
-    """As measured, unit of the channel."""
+    """Position in the channel's own coordinate and unit."""
     stop_error: float
     stop_freedom: float
     """Degrees of freedom of the standard error."""
     fitted: Floats
-    """Motion of constant acceleration that is nearest to the flights, shape (sample,); NaN elsewhere."""
+    """Motion of constant acceleration nearest to the flights, shape (sample,); NaN elsewhere."""
     facts: dict[str, float | str]
     doubts: tuple[Doubt, ...] = ()
 
@@ -63,10 +63,10 @@ class BounceFlights:
 
 
 def flights_of(channel: Channel, side: str | None, window: float | None) -> BounceFlights:
-    """Return the flights of a channel of displacement at an `upper` or `lower` stop; None: as the flights show.
+    """Return the flights of a displacement channel at an `upper` or `lower` stop; None: the flights decide.
 
-    The window is that of one-sided fits at kinks, s; None: parabolas, else kinks with a window that suits. Another
-    channel, or one without impacts, raises EstimationError.
+    The window of one-sided fits at kinks is in s; None: parabolas, or kinks with an automatic window. EstimationError:
+    the channel has another quantity, or no impacts.
     """
     refuse_other_quantities(channel)
     if window is not None:
@@ -82,21 +82,21 @@ def flights_of(channel: Channel, side: str | None, window: float | None) -> Boun
         if parabolas is None or not enough:
             raise
         return parabolas
-    # parabolas with a doubt are better than too few kinks
+    # doubtful parabolas are better than too few kinks
     return parabolas if parabolas is not None and enough and len(kinks.lengths) < FEWEST_FLIGHTS else kinks
 
 
 def _of_parabolas(channel: Channel, found: FittedBounces) -> BounceFlights | None:
-    """Return the flights whose lengths the parabolas tell, up to where one is longer than the one before it."""
+    """Return the flights with a known length from parabolas, up to the first flight longer than its predecessor."""
     fit, signal = found.fit, found.signal
-    # the last flight is known by its first half alone: it says when it begins, and hardly when it ends
+    # only the first half of the last flight is known: it gives the start, and hardly the end
     instants = fit.instants[:-1]
     lengths, step = np.diff(instants), _differences(len(instants))
     covariance = step @ found.covariance[2:-1, 2:-1] @ step.T
     covariance += 2.0 * (_INSTANT * signal.interval) ** 2 * np.eye(len(lengths))
     if not lengths.size:
         return None
-    # of the first one too little may have been recorded
+    # too little of the first flight may have been recorded
     first = int(math.sqrt(covariance[0, 0]) > _LEAST_KNOWN * lengths[0])
     end = first + _shrinking(lengths[first:], covariance[first:, first:])
     used, scale = slice(first, end), 1.0 / lengths[first:end]
@@ -145,13 +145,13 @@ def _shrinking(lengths: Floats, covariance: Floats) -> int:
 
 
 def _differences(count: int) -> Floats:
-    """Return the matrix that takes differences of neighbours."""
+    """Return the matrix of the differences of neighbours."""
     found: Floats = np.eye(count)[1:] - np.eye(count)[:-1]
     return found
 
 
 def _between_kinks(channel: Channel, side: str | None, window: float | None) -> BounceFlights:
-    """Return the flights between kinks, up to where one is longer than the one before it."""
+    """Return the flights between kinks, up to the first flight longer than its predecessor."""
     fastest = 2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0])
     cut = segment_channel(channel, fastest, Known(side=side), window)
     impacts = _falling(cut.impacts)
@@ -177,7 +177,7 @@ def _between_kinks(channel: Channel, side: str | None, window: float | None) -> 
 
 
 def _falling(impacts: tuple[Impact, ...]) -> list[Impact]:
-    """Return the impacts up to where a flight is longer than the one before it."""
+    """Return the impacts up to the first flight longer than its predecessor."""
     lengths = np.diff([impact.time for impact in impacts])
     longer = np.flatnonzero(lengths[1:] > _LONGER * lengths[:-1])
     return list(impacts[: int(longer[0]) + 2] if longer.size else impacts)
@@ -205,7 +205,7 @@ def _acceleration(cut: Segmentation, impacts: int) -> float:
 
 
 def _parabolas(cut: Segmentation, impacts: int) -> Floats:
-    """Return the motion of constant acceleration that is nearest to each flight; NaN elsewhere."""
+    """Return the motion of constant acceleration nearest to each flight; NaN elsewhere."""
     signal = cut.signal
     found = np.full(len(signal.values), np.nan)
     for flight in cut.flights[: impacts - 1]:

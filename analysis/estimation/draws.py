@@ -1,7 +1,7 @@
 """Energy balance with intervals: the estimators on draws of the noise about the fitted motion (parametric bootstrap).
 
-The draws give the standard error and the systematic part (smoothing, noise in squares), which is subtracted. Values
-that came from the weak form vary with the same noise.
+The draws give the standard error and the systematic error (smoothing, noise in squares), which is subtracted. Values
+from the weak form vary with the same noise.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.smoothing import choose_window
 from vibroimpact.fmus.errors import EstimationError
 
-# Window of the noiseless motion, in periods of the fastest motion: short enough to smooth nothing away.
-_FINE = 0.15
+# Window of the noiseless motion, in periods of the fastest motion: short enough to leave the motion unchanged.
+_NOISELESS_WINDOW = 0.15
 _SAMPLES_PER_SPAN = 6
 _MOST_FAILED = 0.1
 # Quantities whose true value is known for the noiseless motion.
@@ -32,10 +32,10 @@ Estimator = Callable[["Resampled", HalfEnergies, Drawn], Mapping[str, Floats]]
 
 @dataclass(frozen=True, slots=True)
 class Resampled:
-    """Energies of a record, of its noiseless motion and of draws about it."""
+    """Energies of a record, of its noiseless motion, and of draws about this motion."""
 
     balance: EnergyBalance
-    """With the window that suits the noise."""
+    """Balance with the window that suits the noise."""
     parameters: Parameters
     """Numbers that the methods take as known."""
     measured: HalfEnergies
@@ -53,13 +53,13 @@ def resample(record: Prepared, draws: int, seed: int) -> Resampled:
     level = (parameters.stop_position if record.stop is None else record.stop) - parameters.offset
     flights = flights_to_level(signal, fitted, level, parameters)
     fastest = max(parameters.angular_frequency, parameters.natural_frequency)
-    # samples less residuals of the exact flow are the motion without noise
+    # samples minus residuals of the exact flow are the motion without noise
     motion = signal.values.copy()
     for one in fitted:
         motion[one.flight.index] -= one.residual
     rounding = 1e-12 * float(np.ptp(motion[signal.good]))
     noiseless = replace(signal, values=motion, noise=rounding)
-    fine_window = max(_FINE * 2.0 * np.pi / fastest, _SAMPLES_PER_SPAN * signal.interval)
+    fine_window = max(_NOISELESS_WINDOW * 2.0 * np.pi / fastest, _SAMPLES_PER_SPAN * signal.interval)
     window = choose_window(noiseless, flights, fine_window, fastest, record.fit.noise)
     balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)
     fine = EnergyBalance(noiseless, flights, parameters.angular_frequency, fine_window)
@@ -85,10 +85,10 @@ def resample(record: Prepared, draws: int, seed: int) -> Resampled:
 def with_intervals(
     resampled: Resampled, confidence: float, inflation: float, estimator: Estimator
 ) -> dict[str, MethodEstimate]:
-    """Return an energy estimator's values less their systematic part, with standard errors and intervals.
+    """Return an energy estimator's values minus their systematic error, with standard errors and intervals.
 
-    The inflation widens standard errors, for noise that is not white. The estimator returns values by name, shape
-    (draw,); its EstimationError is raised, or one if more than a tenth of the draws fail.
+    `inflation` widens standard errors, for noise that is not white. The estimator returns values by name, shape
+    (draw,). EstimationError comes from the estimator, or if more than a tenth of the draws fail.
     """
     from scipy.stats import t as student
 
@@ -108,7 +108,7 @@ def with_intervals(
             )
         error = inflation * float(np.std(known, ddof=1))
         if name in _FITTED:
-            # error of smoothing and first-order ends, seen on the noiseless motion: without noise the only one
+            # error of smoothing and first-order ends, from the noiseless motion: the only error without noise
             error = math.hypot(error, float(exact[name][0]) - getattr(resampled.parameters, name))
         centre = float(value[0] - np.mean(known))
         reach = float(student.ppf(0.5 + confidence / 2.0, len(known) - 1)) * error
@@ -125,7 +125,7 @@ def known_damping(record: Resampled, halves: HalfEnergies, drawn: Drawn) -> dict
 
 
 def all_loss_at_impact(record: Resampled, halves: HalfEnergies, drawn: Drawn) -> dict[str, Floats]:
-    """Estimate the energy-loss factor: the restitution if nothing else took energy out."""
+    """Estimate the energy-loss factor: the restitution if only impacts took energy."""
     energy = halves.energy(record.parameters, {**drawn, "damping_ratio": np.zeros(1)})
     return {"energy_loss_factor": record.balance.restitution(energy)}
 

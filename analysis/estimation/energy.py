@@ -1,14 +1,14 @@
 """Energy balance of half orbits: restitution, damping and forcing amplitude (thesis eqs. 4.2 to 4.20), any motion.
 
-A flight is halved at its deepest point, where y' = 0 and y = y_m. Per unit mass, with y counted from the offset,
-g0 = wn^2 y_st, F = int cos(Omega t + psi) y' dt and D = int y'^2 dt over the half:
+A flight is halved at its deepest point, where y' = 0 and y = y_m. Quantities are per unit mass, with y counted from
+the offset. With g0 = wn^2 y_st, F = int cos(Omega t + psi) y' dt and D = int y'^2 dt over the half:
 
-    before an impact   V^2     = wn^2 (y_m^2 - y_s^2) + 2 g0 F - 4 zeta wn D      (thesis eq. 4.14)
-    after an impact    (r V)^2 = wn^2 (y_m^2 - y_s^2) - 2 g0 F + 4 zeta wn D
+    before an impact   V^2     = wn^2 (y_m^2 - y_s^2) + 2 g0 F - 4 zeta wn D      (thesis eq. 4.14).
+    after an impact    (r V)^2 = wn^2 (y_m^2 - y_s^2) - 2 g0 F + 4 zeta wn D.
 
-so that r^2 = sum (r V)^2 / sum V^2 over the impacts. For P(1,1) this is thesis eq. 4.13. No velocity at an end is
-needed where damping and forcing are known. F is y cos at the ends plus Omega int y sin: no derivative. Only D needs
-y', whose noise adds to it: that is subtracted.
+So r^2 = sum (r V)^2 / sum V^2 over the impacts; for P(1,1) this is thesis eq. 4.13. No velocity at an end is needed
+where damping and forcing are known. F is y cos at the ends plus Omega int y sin, without a derivative. Only D needs
+y'; the noise of y' adds to D, and this part is subtracted.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from vibroimpact.fmus.errors import EstimationError
 
 Drawn = Mapping[str, Floats]
 
-# Newton steps to the deepest point of a flight.
+# Number of Newton steps to the deepest point of a flight.
 _NEWTON_STEPS = 4
-# Condition number above which the unknowns cannot be told apart.
+# Condition number above which the unknowns are not separable.
 _DEPENDENT = 1e3
 # Floor of the squared speeds in the weights, relative to the largest.
 _SLOW = 0.04
@@ -38,7 +38,7 @@ _SLOW = 0.04
 
 @dataclass(frozen=True, slots=True)
 class HalfMaps:
-    """The weights of a flight's samples in the quantities of one half."""
+    """Weights of a flight's samples for the quantities of one half."""
 
     sign: float
     """1 before an impact (from the deepest point to the end), -1 after one."""
@@ -46,13 +46,13 @@ class HalfMaps:
     """Time of the impact, s."""
     edge_value: Floats
     edge_slope: Floats
-    """Spline's value and slope at the impact; shape (sample,), as `deepest`."""
+    """Value and slope of the spline at the impact; shape (sample,), like `deepest`."""
     deepest: Floats
-    """Spline's value at the deepest point."""
+    """Value of the spline at the deepest point."""
     waves: Floats
-    """Omega int y sin and Omega int y cos, shape (2, sample): int cos y' and -int sin y' beside their ends."""
+    """Omega int y sin and Omega int y cos, shape (2, sample): int cos y' and -int sin y' without their end terms."""
     speeds: Floats
-    """Slopes, times the root of the weights of their squares, shape (node, sample): D = sum of squares."""
+    """Slopes times the root of the weights of their squares, shape (node, sample): D is their sum of squares."""
     turning: float
     """Time of the deepest point, s."""
 
@@ -61,8 +61,9 @@ class HalfMaps:
 class HalfEnergies:
     """Energies of half orbits, for one set of samples or for many draws; shape (draw, half) each.
 
-    The works are int cos(Omega t) y' dt and int -sin(Omega t) y' dt from the deepest point to the impact, or from the
-    impact to the deepest point with the other sign: what adds to the speed at the impact.
+    The works are int cos(Omega t) y' dt and int -sin(Omega t) y' dt. Before an impact they run from the deepest point
+    to the impact. After it they run from the impact to the deepest point, with the other sign. So positive work adds
+    to the speed at the impact.
     """
 
     elastic: Floats
@@ -70,7 +71,7 @@ class HalfEnergies:
     work_cos: Floats
     work_sin: Floats
     drag: Floats
-    """int y'^2 dt with the sign of its effect on the speed at the impact: negative after one."""
+    """int y'^2 dt with the sign of its effect on the speed at the impact: negative after an impact."""
     speed_squared: Floats
     """Square of the measured slope at the impact."""
 
@@ -83,13 +84,13 @@ class HalfEnergies:
         return found - 4.0 * value["damping_ratio"] * value["natural_frequency"] * self.drag
 
     def work(self, phase: Floats) -> Floats:
-        """Return the work of the force of a phase, over its amplitude per unit mass."""
+        """Return the work of a force with this phase, over its amplitude per unit mass."""
         found: Floats = np.cos(phase) * self.work_cos + np.sin(phase) * self.work_sin
         return found
 
 
 def _values(p: Parameters, drawn: Drawn | None) -> dict[str, Floats]:
-    """Return the parameters, shape (draw, 1) or (1, 1), so that they multiply arrays of shape (draw, half)."""
+    """Return the parameters in shape (draw, 1) or (1, 1), for products with arrays of shape (draw, half)."""
     names = ("natural_frequency", "damping_ratio", "static_deflection", "phase")
     given = drawn or {}
     return {name: np.asarray(given.get(name, getattr(p, name)), dtype=float).reshape(-1, 1) for name in names}
@@ -98,7 +99,7 @@ def _values(p: Parameters, drawn: Drawn | None) -> dict[str, Floats]:
 class EnergyBalance:
     """The half orbits of all flights of a record, ready for its samples or for other draws of their noise.
 
-    The angular frequency is that of the force, rad/s, the window that of the smoothing, s.
+    The angular frequency of the force is in rad/s, the window of the smoothing in s.
     """
 
     def __init__(
@@ -123,17 +124,17 @@ class EnergyBalance:
         return math.sqrt(squares / max(freedom, 1.0))
 
     def energies(self, samples: Floats, parameters: Parameters, stop_position: float | None) -> HalfEnergies:
-        """Return the energies of the halves, ordered after and before an impact for each flight.
+        """Return the energies of the halves: for each flight the half after, then the half before an impact.
 
-        Samples are of the whole record, shape (draw, sample). Parameters give the offset, and to first order the
-        acceleration at the ends. Without a stop position it is the level where flights meet.
+        Samples cover the whole record, shape (draw, sample). Parameters give the offset and, to first order, the
+        acceleration at the ends. Without a stop position the stop is the level where flights meet.
         """
         parts = [
             samples[:, half_flight.index] - parameters.offset for half_flight in self.flights for _ in (0, 1)
         ]
 
         def mapped(name: str) -> Floats:
-            """Return what one of the maps makes of the samples of all halves, shape (draw, half, ...)."""
+            """Return the product of one map with the samples of all halves, shape (draw, half, ...)."""
             return np.stack([y @ getattr(h, name).T for y, h in zip(parts, self.halves, strict=True)], 1)
 
         value, slope, deepest, waves = map(mapped, ("edge_value", "edge_slope", "deepest", "waves"))
@@ -145,11 +146,11 @@ class EnergyBalance:
             stop = self._stop(value, slope, parameters)
         else:
             stop = np.full(len(samples), stop_position - parameters.offset)
-        # the flight was cut at about the impact: what is missing to the stop, to first order
+        # the flight was cut near the impact: the distance missing to the stop, to first order
         missing = stop[:, None] - value
         edge = self.angular_frequency * np.array([half.edge for half in self.halves])
         turn = self.angular_frequency * np.array([half.turning for half in self.halves])
-        # int cos y' = [y cos] + Omega int y sin from the turning point to the impact, or the other way
+        # int cos y' = [y cos] + Omega int y sin, from the turning point to the impact or backwards
         bounds_cos = stop[:, None] * np.cos(edge) - deepest * np.cos(turn)
         bounds_sin = -stop[:, None] * np.sin(edge) + deepest * np.sin(turn)
         variance = self.noise**2
@@ -164,13 +165,13 @@ class EnergyBalance:
             deepest**2 - variances("deepest", "deepest") - stop[:, None] ** 2,
             bounds_cos + sign * waves[:, :, 0],
             bounds_sin + sign * waves[:, :, 1],
-            # value and slope at an end have their noise in common
+            # value and slope at an end share their noise
             sign * (drag - drag_noise + sign * (slope * missing + variances("edge_value", "edge_slope"))),
             slope**2 - variances("edge_slope", "edge_slope") + 2.0 * pull * missing,
         )
 
     def _stop(self, value: Floats, slope: Floats, p: Parameters) -> Floats:
-        """Return the mean level where flights meet, from the offset; shape (draw,)."""
+        """Return the mean level where flights meet, measured from the offset; shape (draw,)."""
         levels = []
         for one, other in self.pairs:
             end, start = 2 * one + 1, 2 * other
@@ -184,7 +185,7 @@ class EnergyBalance:
     def restitution(self, energy: Floats) -> Floats:
         """Return r from the energies of the halves, over all impacts between flights; shape (draw,).
 
-        A residual energy that is negative, or above the kinetic energy at the impacts, raises EstimationError.
+        A negative residual energy, or one above the kinetic energy at the impacts, raises EstimationError.
         """
         before = np.sum([energy[:, 2 * one + 1] for one, _ in self.pairs], axis=0)
         after = np.sum([energy[:, 2 * other] for _, other in self.pairs], axis=0)
@@ -206,7 +207,7 @@ class EnergyBalance:
 
 
 def _halves(one: Smoother, signal: Signal, angular_frequency: float) -> list[HalfMaps]:
-    """Return the maps after the impact at the start of a flight, and before that at its end."""
+    """Return the maps for the impact at the start of a flight, and for the impact at its end."""
     flight = one.flight
     samples = signal.values[flight.index]
     turning = _turning_time(one, samples)
@@ -247,15 +248,15 @@ def unknowns_by_speed(
     drawn: Drawn | None = None,
     squares: Floats | None = None,
 ) -> tuple[Floats, float]:
-    """Return what the speeds measured at the impacts say of damping or forcing, by weighted least squares.
+    """Return damping or forcing from the speeds measured at the impacts, by weighted least squares.
 
-    The unknown are damping_ratio, static_deflection, and phase, in this order; a phase only with a static_deflection.
-    Values that differ between draws have shape (draw,), those returned (draw, unknown). The condition is the ratio of
+    The unknowns are damping_ratio, static_deflection, and phase, in this order; phase needs static_deflection. Values
+    that differ between draws have shape (draw,); the result has shape (draw, unknown). The condition is the ratio of
     the largest to the smallest singular value of the columns, each scaled to 1. Nearly dependent columns, as for P(1,1)
     with more than two unknowns, raise EstimationError.
 
-    `squares` of the speeds without noise, shape (half,), are for the weights: by its own noise a speed read too low
-    would weigh more. None: those that were measured.
+    `squares` of the speeds without noise, shape (half,), give the weights: noisy weights would favour speeds that are
+    too low. None: the measured squares.
     """
     value = _values(p, drawn)
     square, drag = value["natural_frequency"] ** 2, -4.0 * value["natural_frequency"] * halves.drag
@@ -272,7 +273,7 @@ def unknowns_by_speed(
     else:
         target = target - 2.0 * square * value["static_deflection"] * work
     matrix = np.stack(columns, axis=2)
-    # the square of a slope is the less certain the larger it is
+    # the error of a squared slope grows with the slope
     speeds = np.abs(halves.speed_squared[0] if squares is None else squares)
     weight = 1.0 / np.sqrt(np.maximum(speeds, _SLOW * np.max(speeds)))
     matrix, target = matrix * weight[:, None], target * weight
@@ -293,10 +294,10 @@ def unknowns_by_speed(
 def sensitivities(
     restitution: float, speed: float, drag: float, half_drag: float, natural_frequency: float
 ) -> dict[str, float]:
-    """Return how errors of the speed V, or of a known damping ratio, move the estimates of P(1,1).
+    """Return the sensitivities of P(1,1) estimates to errors of the speed V, or of a known damping ratio.
 
-    From V^2 (1 - r^2) / 2 = fe - 2 zeta wn D and thesis eq. 4.14, D (`drag`) over the flight and D* (`half_drag`) from
-    its deepest point on; the natural frequency is in rad/s.
+    They follow from V^2 (1 - r^2) / 2 = fe - 2 zeta wn D and thesis eq. 4.14. D (`drag`) is over the whole flight, D*
+    (`half_drag`) from its deepest point on; the natural frequency is in rad/s.
 
     >>> found = sensitivities(0.8, 2.0, 3.0, 1.5, 10.0)
     >>> round(found["restitution_per_relative_velocity"], 12)

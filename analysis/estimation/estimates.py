@@ -1,4 +1,4 @@
-"""What an estimation from impacting motion returns: one row for each method and quantity, printed or as a dataset."""
+"""Results of an estimation from impacting motion: one row for each method and quantity, printed or as a dataset."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ METHODS = (
     "trajectory",
     "period_one",
 )
-"""In the order in which they are shown; `period_one` gives start values only, without an interval."""
+"""Methods in the order of display; `period_one` gives start values only, without an interval."""
 
 SHOWN = (*METHODS, "flight_times")
-"""In the order of tables; `flight_times` is the method of bounces without a force."""
+"""Methods in the order of tables; `flight_times` is the method for bounces without a force."""
 
 ANSWERING = tuple(name for name in SHOWN if name != "period_one")
-"""Those that give intervals."""
+"""Methods that give intervals."""
 
 QUANTITIES: Mapping[str, tuple[str, str]] = {
     "restitution": ("1", "coefficient of restitution"),
@@ -60,7 +60,7 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
     "offset": ("channel", "reading at rest"),
     "impact_velocity": ("channel s-1", "root mean square speed of approach"),
 }
-"""Unit (`channel`: that of the displacement) and meaning."""
+"""Unit (`channel`: the unit of the displacement) and meaning."""
 
 
 _REASONS_IN_LINE = 2
@@ -68,13 +68,13 @@ _REASONS_IN_LINE = 2
 
 @dataclass(frozen=True, slots=True)
 class MethodEstimate:
-    """One number with its doubt.
+    """One number with its uncertainty.
 
     Attributes
     ----------
     value, standard_error : float
     low, high : float
-        Ends of the interval; NaN where none is stated.
+        Ends of the interval; NaN without an interval.
     """
 
     value: float
@@ -84,7 +84,7 @@ class MethodEstimate:
 
     @classmethod
     def within(cls, value: float, error: float, reach: float) -> MethodEstimate:
-        """Return an estimate whose interval ends as far below the value as above it."""
+        """Return an estimate with an interval symmetric about the value."""
         return cls(value, error, value - reach, value + reach)
 
     def covers(self, truth: float) -> bool:
@@ -94,7 +94,7 @@ class MethodEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Why a method gave no answer: the message of its EstimationError."""
+    """A method without an answer, and the reason: the message of its EstimationError."""
 
     method: str
     reason: str
@@ -102,14 +102,14 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """Why estimates are not to be relied on.
+    """A reason why estimates are unreliable.
 
     Attributes
     ----------
     reason : str
         Part of a sentence.
     methods : tuple of str
-        Whose estimates; empty: all.
+        Methods with this doubt; empty: all.
     """
 
     reason: str
@@ -118,14 +118,14 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class FittedMotion:
-    """What was measured, and the motion that fits it best.
+    """The measured motion, and the motion that fits it best.
 
     Attributes
     ----------
     time, measured, fitted : ndarray, shape (sample,)
-        s, unit of the channel; NaN where nothing was fitted.
+        Time in s, others in the unit of the channel; NaN where nothing was fitted.
     method : str
-        Whose motion it is.
+        Method of the fitted motion.
     """
 
     time: Floats
@@ -143,7 +143,7 @@ class RestitutionOfSpeed:
     speed : ndarray, shape (bounce,)
         Unit of the channel per s.
     single : ndarray, shape (bounce,)
-        Ratio at each impact alone.
+        Ratio at each single impact.
     fitted, low, high : ndarray, shape (bounce,)
         r(v) and the ends of its interval.
     """
@@ -155,7 +155,7 @@ class RestitutionOfSpeed:
     high: Floats
 
     def words(self, unit: str) -> str:
-        """Return how the restitution changes, as a sentence; `unit` is that of the channel."""
+        """Return the change of the restitution as a sentence; `unit` is the unit of the channel."""
         slow, fast = int(np.argmin(self.speed)), int(np.argmax(self.speed))
         shown = written_unit(f"{'' if unit == '1' else unit} s-1".strip())
         return (
@@ -177,21 +177,21 @@ class ImpactEstimates:
     values : dict
         Estimates by method, then quantity.
     conditioning : dict
-        How far an error of the data or of what is held moves an estimate (thesis eqs. 4.14 to 4.20): name to number.
+        Sensitivity of an estimate to an error of the data or of a held value (thesis eqs. 4.14 to 4.20), by name.
     facts : dict
-        Impacts, flights, window, noise, side, ...: name to number or word.
+        Numbers or words about the record, by name: impacts, flights, window, noise, side, ...
     refusals : tuple of Refusal
     doubts : tuple of Doubt
-        What makes the estimates of all or of some methods unsure.
+        Reasons why the estimates of all or of some methods are unreliable.
     remarks : tuple of str
-        What a reader must know.
+        Remarks for the reader.
     confidence : float
-        Of the intervals.
+        Confidence of the intervals.
     impact_times : ndarray, shape (impact,)
         s.
     motion : FittedMotion or None
     of_speed : RestitutionOfSpeed or None
-        r(v), in place of one restitution that the data contradict.
+        r(v), instead of a single restitution that the data contradict.
     """
 
     channel: str
@@ -210,35 +210,35 @@ class ImpactEstimates:
     """`impacts`, or `bounces` under a constant force."""
 
     def reasons(self, method: str) -> list[str]:
-        """Return what makes the estimates of a method unsure."""
+        """Return the reasons why the estimates of a method are unreliable."""
         return [doubt.reason for doubt in self.doubts if method in doubt.methods or not doubt.methods]
 
     @property
     def verdict(self) -> str:
-        """Whether the estimates are to be relied on, in one line: sure of which methods, not sure of which, and why."""
+        """One line that says which methods are reliable, which are not, and why."""
         answered = [name for name in ANSWERING if name in self.values]
-        sure = [name for name in answered if not self.reasons(name)]
-        unsure = [name for name in answered if name not in sure]
+        reliable = [name for name in answered if not self.reasons(name)]
+        unreliable = [name for name in answered if name not in reliable]
         if not answered:
             why = ["no method has an answer", *(doubt.reason for doubt in self.doubts)]
             return message("not sure, because ", _listed(why), ".")
-        if not sure:
+        if not reliable:
             return message("not sure, because ", _listed([doubt.reason for doubt in self.doubts]), ".")
-        if not unsure:
-            return f"sure of {_named(sure)}."
-        why = [reason for name in unsure for reason in self.reasons(name)]
-        said = f"sure of {_named(sure)}; not sure of {_named(unsure)}, because "
-        return message(said, _listed(why), ".")
+        if not unreliable:
+            return f"sure of {_named(reliable)}."
+        why = [reason for name in unreliable for reason in self.reasons(name)]
+        opening = f"sure of {_named(reliable)}; not sure of {_named(unreliable)}, because "
+        return message(opening, _listed(why), ".")
 
     def unit_of(self, quantity: str) -> str:
-        """Return the unit of a quantity, the channel's filled in."""
+        """Return the unit of a quantity; the channel's unit is filled in."""
         unit = QUANTITIES[quantity][0]
         return unit.replace("channel", self.unit if self.unit != "1" else "").strip() or "1"
 
     def dataset(self) -> xr.Dataset:
         """Return dims estimator and quantity: estimate, standard_error, interval_low, interval_high; measured, fitted.
 
-        Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
+        Units differ by quantity, so the variables carry `1`, and the coordinate `unit` gives the unit of each quantity.
         Conditioning, facts, refusals and remarks are attributes.
         """
         methods = [name for name in SHOWN if name in self.values]
@@ -251,7 +251,7 @@ class ImpactEstimates:
         return xr.merge(parts, combine_attrs="override").assign_attrs(self._attributes())
 
     def _motion(self) -> xr.Dataset:
-        """Return impacts, the fitted motion, and r(v) over the impacts between two flights, where there are such."""
+        """Return impacts, the fitted motion, and r(v) over the impacts between two flights, where available."""
         motion, found = self.motion, self.of_speed
         values = {"impact_time": self.impact_times}
         if motion is not None:
@@ -264,7 +264,7 @@ class ImpactEstimates:
         return TABLE.dataset(values, unit=self.unit, speed=speed, method=method).set_coords("impact_time")
 
     def _attributes(self) -> dict[str, str | float]:
-        """Return what belongs to the whole table."""
+        """Return the attributes of the whole table."""
         return {
             "estimates": self.kind,
             "channel": self.channel,
@@ -282,7 +282,7 @@ class ImpactEstimates:
 
 
 def _listed(reasons: Sequence[str]) -> str:
-    """Return the gravest reasons in one line."""
+    """Return the most serious reasons in one line."""
     different = list(dict.fromkeys(reasons))
     more = len(different) - _REASONS_IN_LINE
     shown = joined("; ", different[:_REASONS_IN_LINE])
@@ -294,7 +294,7 @@ def _named(methods: Sequence[str]) -> str:
 
 
 def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
-    """Print the verdict, all methods side by side, how far errors move the estimates, refusals and remarks."""
+    """Print the verdict, all methods side by side, the sensitivities, refusals and remarks."""
     console.print(estimates.verdict)
     console.print(_estimates(estimates))
     if estimates.of_speed is not None:
@@ -314,7 +314,7 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
 
 
 def _estimates(estimates: ImpactEstimates) -> Table:
-    """Return a block of methods for each quantity: as many as answer, side by side they would not be read."""
+    """Return a block of methods for each quantity; columns side by side for all methods would be unreadable."""
     title = f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals"
     rows = table(title, "<quantity", "<method", ">estimate", ">from", ">to", "<unit")
     for quantity in QUANTITIES:
@@ -339,7 +339,7 @@ def _speeds(estimates: ImpactEstimates, found: RestitutionOfSpeed) -> Table:
 
 
 def _cells(estimate: MethodEstimate) -> tuple[str, str, str]:
-    """Return value and interval with the digits that the doubt leaves."""
+    """Return value and interval with the digits that the standard error allows."""
     if not math.isfinite(estimate.standard_error):
         return f"{estimate.value:.4g}", "", ""
     ends = (estimate.value, estimate.low, estimate.high)
@@ -348,7 +348,7 @@ def _cells(estimate: MethodEstimate) -> tuple[str, str, str]:
 
 
 def _conditioning(estimates: ImpactEstimates) -> Table:
-    """Return how errors move the estimates."""
+    """Return the table of the sensitivities of the estimates."""
     title = "conditioning: change of the estimate per change of what it rests on"
     rows = table(title, "<sensitivity of the energy balance", ">value")
     for name, value in estimates.conditioning.items():

@@ -1,8 +1,8 @@
 """Velocities at the impacts, restitution and stop: the exact flow fitted to each flight by linear least squares.
 
-With damping, natural frequency and forcing given, a flight is linear in its state (x0, v0) at its start:
-y = y0 + C x0 + S v0 + forced response. The states at both ends give the speed of approach V and the velocity after the
-impact, -r V, of flights that follow each other.
+With given damping, natural frequency and forcing, a flight is linear in its state (x0, v0) at its start. The motion is
+y = y0 + C x0 + S v0 + forced response. The states at both ends of consecutive flights give the speed of approach V
+and the velocity after the impact, -r V.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ _STEP = 1e-5
 # Unit of the search over flights, relative to a coordinate, and the step of its derivatives in that unit.
 _STEP_OF_SEARCH, _DIFFERENCE = 0.1, 1e-4
 _MOST_STEPS, _MOST_HALVINGS = 10, 12
-# Decrease of chi squared that a step promises, below which the search ends.
+# Predicted decrease of chi squared in a step below which the search ends.
 _SETTLED = 1e-3
-# Residual of a trial that is no oscillator, in ranges of the signal.
-_FAR = 1e3
-# Newton steps to an instant on motion of constant acceleration.
+# Residual, in ranges of the signal, assigned to a trial that is no oscillator.
+_UNPHYSICAL_RESIDUAL = 1e3
+# Number of Newton steps to an instant on motion of constant acceleration.
 _NEWTON_STEPS = 4
-# Part of its duration by which an end of a flight may be moved.
+# Largest shift of an end of a flight, over the duration of the flight.
 _REACH = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class FittedFlight:
-    """A flight as the exact flow has it."""
+    """A flight of the exact flow."""
 
     flight: Flight
     state: Floats
-    """Displacement from the offset and velocity at the start, shape (2,)."""
+    """Displacement from the offset, and velocity, at the start; shape (2,)."""
     gain: Floats
     """The state's least-squares weights of the samples, shape (2, sample)."""
     to_end: Floats
@@ -67,11 +67,11 @@ def fit_flight(signal: Signal, flight: Flight, parameters: Parameters) -> Fitted
 
 @dataclass(frozen=True, slots=True)
 class FlightSearch:
-    """Parameters with which the exact flow is nearest to all flights, each from a free start state."""
+    """Parameters with which the exact flow is nearest to all flights, each with a free start state."""
 
     parameters: Parameters
     names: tuple[str, ...]
-    """Those that were free."""
+    """Names of the free parameters."""
     covariance: Floats
     influence: list[Floats]
     """Change of the parameters for a change of the samples of each flight, to first order; shape (name, sample)."""
@@ -82,7 +82,7 @@ def search_flights(
 ) -> FlightSearch:
     """Return the least squares of all samples of the flights, near a start: maximum likelihood for white noise.
 
-    The start is near the answer, as the weak form gives it; the names are what is free.
+    The start must be near the answer, for example from the weak form; `names` are the free parameters.
     """
     coordinates = Coordinates(tuple(names), start)
     origin = coordinates.of(start)
@@ -92,8 +92,8 @@ def search_flights(
     def residual(x: Floats) -> Floats:
         trial = coordinates.parameters(origin + scale * x)
         if trial is None or trial.damping_ratio < 0.0:
-            # no oscillator; so bad a trial makes the search take a shorter step
-            return np.full(sum(counts), _FAR * signal.range)
+            # no oscillator; the large residual makes the search shorten its step
+            return np.full(sum(counts), _UNPHYSICAL_RESIDUAL * signal.range)
         return np.concatenate([fit_flight(signal, flight, trial).residual for flight in flights])
 
     freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
@@ -110,7 +110,7 @@ def search_flights(
 def _gauss_newton(
     function: Callable[[Floats], Floats], count: int, freedom: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the unknowns from 0 on at which the squares are least, the residual there, and their derivatives."""
+    """Return the unknowns with the least squares, searched from 0, with their residual and derivatives."""
     x = np.zeros(count)
     left = function(x)
     columns = np.empty((len(left), count))
@@ -135,11 +135,11 @@ def _gauss_newton(
 
 
 def flow_of(time: Floats, flight: Flight, parameters: Parameters) -> tuple[Floats, Floats, Floats]:
-    """Return the flow's displacements for unit start states, the forced one, and the map to the end's state."""
+    """Return the flow's displacements for unit start states, the forced displacement, and the map to the end state."""
     instants = np.append(time - flight.start, flight.duration)
     forced_one = parameters.oscillator()
     free_one = replace(forced_one, amplitude=0.0)
-    # a body without force needs no phase, and none with a force of another frequency
+    # a body without force needs neither phase nor angular frequency
     one, one_speed = motion(free_one, (1.0, 0.0), instants)
     other, other_speed = motion(free_one, (0.0, 1.0), instants)
     forced, forced_speed = motion(forced_one, (0.0, 0.0), instants, phase=parameters.phase_at(flight.start))
@@ -151,20 +151,20 @@ def flow_of(time: Floats, flight: Flight, parameters: Parameters) -> tuple[Float
 
 @dataclass(frozen=True, slots=True)
 class ImpactReading:
-    """What the fitted flights say of the impacts."""
+    """Impact quantities from the fitted flights."""
 
     restitution: float
-    """By least squares of the velocities after impacts on those before."""
+    """Restitution, by least squares of the velocities after impacts on the velocities before."""
     impact_velocity: float
     """Root mean square of V."""
     stop_position: float
-    """Mean level where flights meet; the given stop where it is known."""
+    """Mean level where flights meet, or the given stop."""
     periodic: bool = False
-    """There was no impact with a flight on both sides: P(1,1) was assumed."""
+    """Whether no impact had a flight on both sides, and P(1,1) was assumed."""
 
 
 def pairs_of(flights: Sequence[Flight]) -> list[tuple[int, int]]:
-    """Return which flights meet at an impact; a single flight, taken as P(1,1), meets itself."""
+    """Return the pairs of flights that meet at an impact; a single flight, taken as P(1,1), meets itself."""
     place = {flight.first: k for k, flight in enumerate(flights)}
     found = [(k, place[flight.first + 1]) for k, flight in enumerate(flights) if flight.first + 1 in place]
     return found or [(k, k) for k in range(len(flights))]
@@ -181,9 +181,9 @@ def read_impacts(
 ) -> ImpactReading:
     """Return restitution, speed and stop from the states at both ends of the flights.
 
-    States have the displacement from the offset, shape (flight, 2). Without a stop position it is where the flights
-    meet. An impact is within `interval` (s) of where the flights were cut. The speed's noise is its variance at the end
-    of each flight: the squares of speeds have it in them, products do not.
+    States have the displacement from the offset, shape (flight, 2). Without a stop position the stop is the level where
+    flights meet. Each impact lies within `interval` (s) of the cut. `speed_noise` is the variance of the speed at the
+    end of each flight: squares of speeds contain it, products do not.
     """
     pairs = pairs_of(flights)
     periodic = pairs[0][0] == pairs[0][1]
@@ -198,7 +198,7 @@ def read_impacts(
     before, after = (_after(side, _shifts_to(side, level, interval))[1] for side in (earlier, later))
     square = float(before @ before)
     excess = float(np.sum(speed_noise[one]))
-    # noise that is as large as the speeds leaves nothing to correct by
+    # noise as large as the speeds allows no correction
     square -= excess if excess < 0.5 * square else 0.0
     return ImpactReading(-float(before @ after) / square, math.sqrt(square / len(before)), stop, periodic)
 
@@ -210,13 +210,13 @@ def with_acceleration(states: Floats, times: Sequence[float] | Floats, p: Parame
 
 
 def _after(side: Floats, shift: Floats) -> tuple[Floats, Floats]:
-    """Return displacement and velocity a short time on."""
+    """Return displacement and velocity a short time later."""
     place, speed, push = side.T
     return place + shift * (speed + 0.5 * shift * push), speed + shift * push
 
 
 def _meeting_levels(earlier: Floats, later: Floats, late: Floats) -> Floats:
-    """Return where motion before and after impacts meets; the earlier one is `late` s short of the instant (Newton)."""
+    """Return the levels where motion before and after impacts meets; the earlier motion is `late` s short (Newton)."""
     shift = np.zeros(len(earlier))
     for _ in range(_NEWTON_STEPS):
         (place, speed), (other, other_speed) = _after(earlier, late + shift), _after(later, shift)
@@ -225,7 +225,7 @@ def _meeting_levels(earlier: Floats, later: Floats, late: Floats) -> Floats:
 
 
 def _shifts_to(side: Floats, level: float, reach: Floats | float) -> Floats:
-    """Return how much later motion meets a level, at most `reach` away (Newton)."""
+    """Return the shifts in time to where motion meets a level, at most `reach` (Newton)."""
     shift = np.zeros(len(side))
     for _ in range(_NEWTON_STEPS):
         place, speed = _after(side, shift)
@@ -238,8 +238,8 @@ def flights_to_level(
 ) -> list[Flight]:
     """Return the flights from and to the instants at which their exact flow meets a level.
 
-    All samples of a flight have a part in these; instants of kinks rest on the few samples about them, and share their
-    noise with the slopes there. The level is from the offset.
+    All samples of a flight contribute to these instants. Instants of kinks come from few samples, and share their noise
+    with the slopes there. The level is measured from the offset.
     """
     found = []
     for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
@@ -251,7 +251,7 @@ def flights_to_level(
 def _instants_at(
     fitted: Sequence[FittedFlight], level: float, p: Parameters
 ) -> tuple[list[float], list[float]]:
-    """Return when the exact flow of flights leaves a level and meets it again, s."""
+    """Return the instants at which the exact flow of flights leaves a level and meets it again, s."""
     starts, ends = (np.array([getattr(one.flight, name) for one in fitted]) for name in ("start", "end"))
     reach = _REACH * (ends - starts)
     first = _shifts_to(with_acceleration(np.array([one.state for one in fitted]), starts, p), level, reach)
@@ -264,19 +264,19 @@ def cut_at_level(
 ) -> list[Flight]:
     """Return the flights with the samples between the instants at which their exact flow meets a level.
 
-    The instant of a kink shares its noise with the samples beside it. Were these chosen by it, their noise would not be
-    0 on average, and at few samples in a flight the estimates were off by more than they state. The level is from the
-    offset, the noise the standard deviation of the samples.
+    The instant of a kink shares its noise with the samples next to it. A choice of samples by this instant would give
+    them noise of nonzero mean. With few samples in a flight, the estimates were then off by more than their errors. The
+    level is measured from the offset; `noise` is the standard deviation of the samples.
     """
     found = []
     for one, start, end in zip(fitted, *_instants_at(fitted, level, p), strict=True):
         weights = one.gain[0], one.to_end[0, :2] @ one.gain
-        doubts = [
+        margins = [
             DOUBTFUL * noise * float(np.linalg.norm(row)) / max(abs(float(speed)), 1e-300)
             for row, speed in zip(weights, (one.state[1], one.end_state[1]), strict=True)
         ]
-        first = int(np.searchsorted(signal.time, start + doubts[0], side="right"))
-        last = int(np.searchsorted(signal.time, end - doubts[1], side="left"))
+        first = int(np.searchsorted(signal.time, start + margins[0], side="right"))
+        last = int(np.searchsorted(signal.time, end - margins[1], side="left"))
         index = np.arange(first, last)
         index = index[signal.good[index]]
         enough = len(index) >= FEWEST_IN_FLIGHT
@@ -288,7 +288,7 @@ def _speed_noise(fitted: Sequence[FittedFlight], p: Parameters, noise: float) ->
     """Return the variance of the speed at which each flight meets the stop."""
     ends = np.array([one.end_state for one in fitted])
     sides = with_acceleration(ends, np.array([one.flight.end for one in fitted]), p)
-    # earlier at the stop, by what the place is further on: another speed there
+    # a displacement further on reaches the stop earlier, where the speed is different
     weights = [
         (one.to_end[1, :2] - push / speed * one.to_end[0, :2]) @ one.gain
         for one, (_, speed, push) in zip(fitted, sides, strict=True)
@@ -298,14 +298,14 @@ def _speed_noise(fitted: Sequence[FittedFlight], p: Parameters, noise: float) ->
 
 @dataclass(frozen=True, slots=True)
 class FlightFit:
-    """All flights fitted."""
+    """The fit of all flights."""
 
     reading: ImpactReading
     standard_errors: dict[str, float]
-    """Of restitution, impact_velocity and stop_position, with the doubt of the parameters in them."""
+    """Errors of restitution, impact_velocity and stop_position, with the uncertainty of the parameters included."""
     fitted: list[FittedFlight]
     noise: float
-    """Standard deviation of the noise that the residuals show."""
+    """Standard deviation of the noise, from the residuals."""
 
 
 _READ = ("restitution", "impact_velocity", "stop_position")
@@ -321,8 +321,8 @@ def fit_flights(
 ) -> FlightFit:
     """Fit all flights and read the impacts, with standard errors to first order in the noise.
 
-    The names are parameters estimated from the same samples; the influence is their change for a change of the samples
-    of each flight, shape (name, sample).
+    `names` are parameters estimated from the same samples; `influence` is their change for a change of the samples of
+    each flight, shape (name, sample).
     """
     fitted = [fit_flight(signal, flight, parameters) for flight in flights]
     states = np.array([one.state for one in fitted])

@@ -1,7 +1,7 @@
-"""What the instants of impact alone say: bounces without a force that oscillates, and start values of P(1,1) motion.
+"""Estimates from the instants of impact alone: bounces under a constant force, and start values of P(1,1) motion.
 
-Under a constant force alone a body comes back as fast as it has left, and flies for 2 V / g: T[n+1] = r T[n].
-P(1,1) motion gives natural frequency and stop as if it were free and undamped (thesis eq. 2.35).
+Under a constant force a body arrives as fast as it left, and flies for 2 V / g: T[n+1] = r T[n]. For P(1,1) motion,
+natural frequency and stop follow as if it were free and undamped (thesis eq. 2.35).
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from vibroimpact.fmus.errors import EstimationError
 
 FLIGHT_TIMES = "flight_times"
 # Probability of a larger scatter of the ratios by chance alone, below which they are not one ratio.
-_SELDOM = 1e-4
-# The same for r(v), below which it needs one power of the speed's logarithm more.
-_RATHER = 0.1
-# Change of r(v) below which it is one ratio, and the largest part of the scatter about one ratio that r(v) leaves.
+_REJECTION = 1e-4
+# Probability of the scatter about r(v) below which r(v) gets one more power of the speed's logarithm.
+_TERM_PROBABILITY = 0.1
+# Change of r(v) below which one ratio is given; largest share of the scatter about one ratio that r(v) may leave.
 _SAME_RATIO, _CLEARER = 2e-3, 0.1
-# Relative deviation of a flight's length from the median above which it is none of P(1,1); the largest part of such.
+# Deviation from the median length, relative, above which a flight is not of P(1,1); largest share of such flights.
 _SAME_LENGTH, _OTHER_LENGTHS = 0.05, 0.2
 
 
@@ -44,30 +44,30 @@ def estimate_bounces(
 ) -> ImpactEstimates:
     """Estimate the restitution of a body that bounces under a constant force, such as its weight.
 
-    Flights are parabolas of one acceleration, fitted together; kinks cut the record where they are none.
+    Flights are parabolas of one acceleration, fitted together. Where they are no parabolas, kinks cut the record.
 
     Parameters
     ----------
     channel : Channel or xarray.DataArray
         Displacement, in any unit.
     side : str or None
-        `upper` or `lower` stop; None: as the signal shows.
+        `upper` or `lower` stop; None: the signal decides.
     window : float or None
-        Of one-sided fits at kinks, s, which then are taken; None: parabolas, else kinks with a window from the noise.
+        Window of one-sided fits at kinks, s; None: parabolas, otherwise kinks with a window from the noise.
     confidence : float
-        Of the interval.
+        Confidence of the interval.
 
     Returns
     -------
     ImpactEstimates
-        One method, `flight_times`; restitution and stop. A restitution that is not the same at all speeds is no
-        single number: `of_speed` has r(v) instead.
+        One method, `flight_times`; restitution and stop. Where the restitution differs between speeds, `of_speed` has
+        r(v) instead of a single number.
 
     Raises
     ------
     EstimationError
         No impacts were found, or fewer than three flights, each shorter than the one before; side or confidence is
-        none.
+        invalid.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def estimate_bounces(
 
 
 def _ratio(seen: BounceFlights, confidence: float) -> tuple[MethodEstimate, float]:
-    """Return the ratio of successive flight times, and its scatter over what errors of the instants explain.
+    """Return the ratio of successive flight times, and its scatter over the scatter from errors of the instants.
 
     Generalized least squares of log T[n] = log T[0] + n log r: neighbouring flights share the error of an instant.
     """
@@ -160,18 +160,18 @@ def _generalized(columns: Floats, target: Floats, covariance: Floats) -> tuple[F
     return solution, uncertain, float(np.sum((aim - scaled @ solution) ** 2))
 
 
-def _by_chance(square: float, freedom: int, probability: float = _SELDOM) -> bool:
+def _by_chance(square: float, freedom: int, probability: float = _REJECTION) -> bool:
     from scipy.stats import chi2
 
     return square <= float(chi2.isf(probability, freedom))
 
 
 def _of_speed(seen: BounceFlights, confidence: float) -> tuple[RestitutionOfSpeed | None, float]:
-    """Return r(v), and its scatter over what errors of the instants explain, 0 where these explain it.
+    """Return r(v), and its scatter over the scatter from errors of the instants; 0 where errors explain the scatter.
 
-    The logarithm of the ratio of the flights before and after an impact is a line in that of the speed, or a parabola
-    where a line is not enough; what one power more changes widens the interval. v = g T / 2 with the acceleration g of
-    the flights' parabolas.
+    The logarithm of the ratio of the flights before and after an impact is a polynomial in the logarithm of the speed.
+    It is a line, or a parabola where a line is not enough; the effect of one more power widens the interval. v = g T /
+    2, with the acceleration g of the flights' parabolas.
     """
     from scipy.stats import t as student
 
@@ -192,14 +192,14 @@ def _of_speed(seen: BounceFlights, confidence: float) -> tuple[RestitutionOfSpee
         reach = float(student.ppf(0.5 + confidence / 2.0, freedom)) * error
         level = columns @ solution
         if freedom > 1:
-            # the next power shows how far the form of r(v) may be wrong
+            # the next power shows the possible error in the form of r(v)
             columns = np.vander(relative, degree + 2)
             reach = reach + np.abs(columns @ _generalized(columns, ratios, covariance)[0] - level)
         found = RestitutionOfSpeed(
             speeds, np.exp(ratios), np.exp(level), np.exp(level - reach), np.exp(level + reach)
         )
         excess = 0.0 if _by_chance(square, freedom) else widened
-        if _by_chance(square, freedom, _RATHER):
+        if _by_chance(square, freedom, _TERM_PROBABILITY):
             break
     return found, excess
 
@@ -207,8 +207,8 @@ def _of_speed(seen: BounceFlights, confidence: float) -> tuple[RestitutionOfSpee
 def natural_frequency_of(stop_position: float, deepest: float, flight_time: float) -> float:
     """Return the natural angular frequency of free, undamped motion cut off by a stop, rad/s.
 
-    wn = (2 pi / T) arccos(-a / x_m) / pi: a stop position, x_m > |a| deepest excursion, both from rest, T flight time
-    (thesis eq. 2.35). For driven or damped motion it is biased, by several percent: a start value.
+    wn = (2 pi / T) arccos(-a / x_m) / pi (thesis eq. 2.35). The stop position a and the deepest excursion x_m > |a| are
+    measured from rest; T is the flight time. Driven or damped motion biases it by several percent: it is a start value.
 
     >>> round(natural_frequency_of(0.0, 1.0, 1.0), 12)  # half of each swing is missing
     3.14159265359
@@ -217,7 +217,7 @@ def natural_frequency_of(stop_position: float, deepest: float, flight_time: floa
 
 
 def stop_position_of(natural_frequency: float, deepest: float, flight_time: float) -> float:
-    """Return the stop position from rest of the same motion, the natural frequency being known.
+    """Return the stop position from rest of the same motion, from its natural frequency.
 
     >>> abs(round(stop_position_of(3.141592653589793, 1.0, 1.0), 12))
     0.0
@@ -228,13 +228,13 @@ def stop_position_of(natural_frequency: float, deepest: float, flight_time: floa
 def period_one(
     segmentation: Segmentation, natural_frequency: float, offset: float
 ) -> dict[str, MethodEstimate]:
-    """Return both start values; the stop with the natural frequency and offset that the better methods found.
+    """Return both start values; the stop uses the natural frequency and offset of the better methods.
 
     EstimationError: the motion is not P(1,1), or its deepest point is not further from rest than the stop.
     """
     lengths = np.array([flight.duration for flight in segmentation.flights])
     typical = float(np.median(lengths))
-    # a few impacts may not have been seen
+    # a few impacts may have been missed
     if np.mean(np.abs(lengths - typical) > _SAME_LENGTH * typical) > _OTHER_LENGTHS:
         raise EstimationError(
             f"period_one: expected flights of one length, got {lengths.min():.4g} to {lengths.max():.4g} s. "

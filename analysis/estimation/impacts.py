@@ -30,15 +30,15 @@ from vibroimpact.fmus.errors import EstimationError, UsageError
 
 Estimates = dict[str, MethodEstimate]
 
-# Standard errors from which a damping ratio is told from the restitution and, with more unknowns, from the force.
-_CLEAR = {"energy_joint": 0.5, "energy_amplitude": 3.0}
+# Size of a damping ratio in standard errors above which it counts as separated from restitution or force, by method.
+_SEPARABLE = {"energy_joint": 0.5, "energy_amplitude": 3.0}
 _RESTITUTIONS = ("restitution", "energy_loss_factor")
-# Standard error of the restitution, relative to what noise and samples allow, below which the interval has no width.
+# Standard error of the restitution, relative to noise over samples, below which the interval has no width.
 _NO_WIDTH = 1e-3
-# Errors of a method's numbers on motion far from its model; one method's failure leaves the others.
+# Numerical errors of a method on motion far from its model; the failure of one method leaves the others.
 _FAILURES = (EstimationError, UsageError, ArithmeticError, ValueError)
-# Uncertainty of the instants (rad of the fastest motion) above which speeds at impacts are off by more than they state.
-_INSTANT_DOUBT = 0.1
+# Uncertainty of the instants (rad of the fastest motion) above which impact speeds err by more than stated.
+_INSTANT_ERROR = 0.1
 
 
 def estimate_impacts(
@@ -54,26 +54,26 @@ def estimate_impacts(
 ) -> ImpactEstimates:
     """Estimate restitution, damping, natural frequency, forcing and stop from a displacement that hits a stop.
 
-    Energy balance (thesis eqs. 4.2 to 4.20), weak form and trajectory fit, each as far as the data allow.
+    Methods: energy balance (thesis eqs. 4.2 to 4.20), weak form and trajectory fit, as far as the data allow.
 
     Parameters
     ----------
     channel : Channel or xarray.DataArray
         Displacement of the oscillator, in any unit; measured or simulated.
     forcing : Forcing
-        What is known of the force, on the channel's clock.
+        The force on the channel's clock, as far as it is known.
     known : Known or None
-        What is known of the oscillator and its stop, and so held.
+        Known values of the oscillator and its stop, which are held.
     methods : sequence of str
-        Of `METHODS`.
+        Some of `METHODS`.
     window : float or None
-        Of the one-sided fits at the impacts, s; None: from the noise.
+        Window of the one-sided fits at the impacts, s; None: chosen from the noise.
     draws : int
-        Of noise, for the intervals of the energy balance.
+        Draws of noise, for the intervals of the energy balance.
     confidence : float
-        Of the intervals.
+        Confidence of the intervals.
     seed : int
-        Of the draws.
+        Seed of the draws.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def estimate_impacts(
         )
     _check(methods, draws, confidence, held)
     record = prepare(channel, forcing, held, window)
-    values, refusals, resampled = _attempted(record, methods, draws, confidence, seed)
+    values, refusals, resampled = _run_methods(record, methods, draws, confidence, seed)
     doubts = doubts_of(record, values, confidence)
     sign = record.signal.sign
     return ImpactEstimates(
@@ -111,12 +111,12 @@ def estimate_impacts(
     )
 
 
-def _attempted(
+def _run_methods(
     record: Prepared, methods: Sequence[str], draws: int, confidence: float, seed: int
 ) -> tuple[dict[str, Estimates], list[Refusal], Resampled | None]:
-    """Return what each method says, why others refuse, and the draws of the energy balance."""
+    """Return the estimates of each method, the refusals of the others, and the draws of the energy balance."""
     natural, offset = record.parameters.natural_frequency, record.parameters.offset
-    ways: dict[str, Callable[[], Estimates]] = {
+    estimators: dict[str, Callable[[], Estimates]] = {
         "weak_form": lambda: _weak_values(record, confidence),
         "trajectory": lambda: _trajectory_values(record, confidence),
         "period_one": lambda: period_one(record.segmentation, natural, offset),
@@ -130,9 +130,9 @@ def _attempted(
         refusals = [Refusal(name, _reason(name, problem)) for name in energies]
     if resampled is not None:
         for name in energies:
-            ways[name] = partial(_energy_values, name, record, resampled, confidence)
+            estimators[name] = partial(_energy_values, name, record, resampled, confidence)
     values: dict[str, Estimates] = {}
-    for name, run in ways.items():
+    for name, run in estimators.items():
         if name not in methods:
             continue
         try:
@@ -146,7 +146,7 @@ def _attempted(
 
 
 def _reason(method: str, problem: Exception) -> str:
-    """Return why a method gave no answer: what it says, or what went wrong in its numbers."""
+    """Return the reason why a method gave no answer: its own message, or its numerical failure."""
     if isinstance(problem, EstimationError):
         return str(problem)
     return (
@@ -156,7 +156,7 @@ def _reason(method: str, problem: Exception) -> str:
 
 
 def _check_answer(method: str, found: Estimates, record: Prepared) -> None:
-    """Refuse an answer that cannot be: its interval has no width though there is noise, or nothing physical in it."""
+    """Raise EstimationError for an impossible answer: an interval without width despite noise, or unphysical values."""
     size = record.signal.range * math.sqrt(len(record.signal.time))
     restitution = found.get("restitution")
     if restitution is not None and restitution.standard_error < _NO_WIDTH * record.fit.noise / size:
@@ -192,7 +192,7 @@ def _check(methods: Sequence[str], draws: int, confidence: float, held: Known) -
 def _with_coordinates(
     found: Parameters, names: tuple[str, ...], covariance: Floats, confidence: float
 ) -> Estimates:
-    """Return estimates whose intervals are those of the coordinates in which the equation is linear."""
+    """Return estimates whose intervals come from the coordinates in which the equation is linear."""
     intervals = Coordinates(names, found).intervals(found, covariance, confidence)
     return {
         name: MethodEstimate(getattr(found, name), math.sqrt(float(covariance[k, k])), *intervals[name])
@@ -202,7 +202,7 @@ def _with_coordinates(
 
 
 def _weak_values(record: Prepared, confidence: float) -> Estimates:
-    """Return what weak form and flights say."""
+    """Return the estimates of the weak form and the flights."""
     from scipy.stats import norm
 
     quantile = float(norm.ppf(0.5 + confidence / 2.0))
@@ -220,7 +220,7 @@ def _weak_values(record: Prepared, confidence: float) -> Estimates:
 
 
 def _trajectory_values(record: Prepared, confidence: float) -> Estimates:
-    """Return what the fit of whole trajectories says."""
+    """Return the estimates of the fit of whole trajectories."""
     free = ("restitution", *record.names, *(("stop_position",) if record.stop is None else ()))
     found = fit_trajectory(record.segmentation, record.fit.fitted, record.parameters, free, record.fit.noise)
     record.trajectory = found
@@ -228,24 +228,24 @@ def _trajectory_values(record: Prepared, confidence: float) -> Estimates:
 
 
 def _check_instants(method: str, record: Prepared) -> None:
-    """Refuse to read speeds off at impacts whose instants are not known well enough."""
+    """Raise EstimationError if the instants of impact are too uncertain for speeds at the impacts."""
     fastest = max(record.parameters.angular_frequency, record.parameters.natural_frequency)
-    doubt = fastest * float(np.median([impact.time_error for impact in record.segmentation.impacts]))
-    if doubt > _INSTANT_DOUBT:
+    error = fastest * float(np.median([impact.time_error for impact in record.segmentation.impacts]))
+    if error > _INSTANT_ERROR:
         raise EstimationError(
-            f"{method}: expected instants of impact known to {_INSTANT_DOUBT} rad of the fastest motion, got "
-            f"{doubt:.2g}. Weak impacts in this noise have no certain speeds: use the weak form or the trajectories."
+            f"{method}: expected instants of impact known to {_INSTANT_ERROR} rad of the fastest motion, got "
+            f"{error:.2g}. Weak impacts in this noise have no certain speeds: use the weak form or the trajectories."
         )
 
 
 def _energy_values(method: str, record: Prepared, resampled: Resampled, confidence: float) -> Estimates:
-    """Return what one of the energy balances says."""
+    """Return the estimates of one of the energy balances."""
     held, intervals = record.held, partial(with_intervals, resampled, confidence, record.inflation)
     if method == "energy_known_damping":
         if held.damping_ratio is None:
             return intervals(all_loss_at_impact)
         found = intervals(known_damping)
-        # strong damping takes more than an impact could: it has no energy-loss factor
+        # strong damping takes more energy than an impact could: there is no energy-loss factor then
         with suppress(EstimationError):
             found = intervals(all_loss_at_impact) | found
         return found
@@ -256,10 +256,10 @@ def _energy_values(method: str, record: Prepared, resampled: Resampled, confiden
         unknown += ["static_deflection"] + (["phase"] if record.forcing.phase is None else [])
     found = intervals(by_speeds(unknown))
     damping = found.get("damping_ratio")
-    # judged by the size that the weak form gives: judged by its own, only chance excesses would pass
+    # judged by the damping of the weak form: by its own damping, only chance excesses would pass
     if (
         damping is not None
-        and not resampled.parameters.damping_ratio > _CLEAR[method] * damping.standard_error
+        and not resampled.parameters.damping_ratio > _SEPARABLE[method] * damping.standard_error
     ):
         raise EstimationError(
             f"{method}: expected data that separate damping from restitution, got a damping ratio of "
@@ -270,7 +270,7 @@ def _energy_values(method: str, record: Prepared, resampled: Resampled, confiden
 
 
 def _as_measured(values: Estimates, sign: float) -> Estimates:
-    """Return estimates in the coordinate of the channel, restitutions from 0 on: a lower stop was mirrored."""
+    """Return estimates in the coordinate of the channel, restitutions clipped at 0: a lower stop was mirrored."""
     found = dict(values)
     for name in _RESTITUTIONS:
         if name in found:

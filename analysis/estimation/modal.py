@@ -1,10 +1,12 @@
 """Bodies of several modes: measured coordinates projected on modes, then weak form and restitution (thesis 6.3).
 
 With mass-normalised shapes the kinetic energy is half the sum of the squares of the modal velocities. At an impact at
-a point of shape phi, displacements stay and the speed of the point changes from V to -r V; with the contact mass
-m_c = 1 / (phi . phi) the energy lost is RE = sum_j (q_j'(before)^2 - q_j'(after)^2) / 2 = (1 - r^2) m_c V^2 / 2, so
-that r = sqrt(1 - RE / KE), KE = m_c V^2 / 2 (thesis eq. 6.38). Modes that are left out take energy that then counts as
-lost: the restitution of too few modes is too low.
+a point of shape phi, displacements stay, and the speed of the point changes from V to -r V.
+
+With the contact mass m_c = 1 / (phi . phi), the energy lost is
+RE = sum_j (q_j'(before)^2 - q_j'(after)^2) / 2 = (1 - r^2) m_c V^2 / 2.
+So r = sqrt(1 - RE / KE) with KE = m_c V^2 / 2 (thesis eq. 6.38). Modes that are left out take energy that then counts
+as lost: the restitution from too few modes is too low.
 """
 
 from __future__ import annotations
@@ -36,20 +38,20 @@ _BEYOND_NOISE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class ModalEstimates:
-    """What impacting motion says of a body of several modes.
+    """Estimates for a body of several modes from its impacting motion.
 
     Attributes
     ----------
     damping_ratio, natural_frequency, force : tuple of MethodEstimate
-        Of each mode; rad/s, and N kg^(-1/2).
+        Of each mode: the ratio, rad/s, and N kg^(-1/2).
     restitution : MethodEstimate
         From the speeds of the contact point.
     restitution_from_energy : MethodEstimate
-        From the residual energy and the contact mass: equal to the other where all modes are there.
+        From the residual energy and the contact mass; equal to `restitution` where all modes are included.
     contact_mass : float
-        1 / (phi . phi), kg: of the modes in use.
+        1 / (phi . phi) of the modes in use, kg.
     impacts : int
-        With a usable flight on both sides.
+        Number of impacts with a usable flight on both sides.
     """
 
     damping_ratio: tuple[MethodEstimate, ...]
@@ -62,7 +64,7 @@ class ModalEstimates:
 
 
 def modal_coordinates(displacements: Floats, shapes: Floats) -> Floats:
-    """Return the modal displacements that sensors saw, by least squares.
+    """Return the modal displacements from sensor displacements, by least squares.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def modal_coordinates(displacements: Floats, shapes: Floats) -> Floats:
     Raises
     ------
     EstimationError
-        Fewer sensors than modes, or sensors that do not tell the modes apart.
+        Fewer sensors than modes, or sensors that cannot separate the modes.
 
     Examples
     --------
@@ -143,17 +145,17 @@ def estimate_modes(
     forcing : Forcing
         Angular frequency and phase; amplitudes are estimated for each mode.
     fastest : float
-        Natural angular frequency of the highest mode, about, rad/s.
+        Approximate natural angular frequency of the highest mode, rad/s.
     stop_position, side
         As in `Known`.
     draws, confidence, seed
-        Of the noise, for the intervals.
+        Number of noise draws, confidence of the intervals, and seed of the draws.
 
     Raises
     ------
     EstimationError
-        No impacts, flights that a mode does not follow, or energies that contradict themselves by more than noise
-        can: within it a nearly elastic stop may show a restitution above 1.
+        No impacts; flights that a mode does not follow; or energies that contradict themselves by more than the
+        noise. Within the noise, a nearly elastic stop may show a restitution above 1.
     """
     from scipy.stats import t as student
 
@@ -176,7 +178,7 @@ def estimate_modes(
     ]
     errors = np.std(drawn, axis=0, ddof=1)
     if not found[-1] - _BEYOND_NOISE * errors[-1] <= 1.0:
-        restitution_from_energy(*_energies(fitted, contact_shape, flights))  # which refuses
+        restitution_from_energy(*_energies(fitted, contact_shape, flights))  # raises
     reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
     rows = np.column_stack([found, errors, reach]).tolist()
     estimates = [MethodEstimate.within(*row) for row in rows]
@@ -195,7 +197,7 @@ def estimate_modes(
 def _draws(
     signals: Sequence[Signal], fitted: Sequence[Sequence[FittedFlight]], draws: int, seed: int
 ) -> Iterator[list[Signal]]:
-    """Yield the fitted motion with other draws of the noise."""
+    """Yield the fitted motion with new draws of the noise."""
     motion = np.array([signal.values for signal in signals])
     for row, fits in zip(motion, fitted, strict=True):
         for one in fits:
@@ -210,7 +212,7 @@ def _draws(
 def _followed(
     signals: Sequence[Signal], flights: list[Flight], start: Parameters, free: Sequence[str]
 ) -> list[Flight]:
-    """Return the flights that every mode follows: in the others an impact was not seen."""
+    """Return the flights that every mode follows; other flights contain a missed impact."""
     if not flights:
         raise EstimationError("modes: expected flights of at least 10 samples between impacts, got none.")
     kept = set(range(len(flights)))

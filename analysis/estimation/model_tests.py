@@ -1,7 +1,7 @@
-"""What speaks against one oscillator, one stop and one restitution: each alternative tried as one more unknown.
+"""Tests of the model of one oscillator, one stop and one restitution: each alternative adds one unknown.
 
-The residual of a fit is regressed on what the alternative would add to it, beside all that is estimated: the size of
-the alternative comes with a standard error, however alike it is to damping or to a force.
+The residual of a fit is regressed on the alternative's contribution, together with all estimated unknowns. The size of
+the alternative thus has a standard error, even if the alternative resembles damping or a force.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from vibroimpact.fmus.core import motion
 
 _STEP = 1e-5
 _SLOPE_STEP = 1e-6
-# Residual up to which a flight follows motion from before it, in units of the noise, or relative to the motion's size:
-# parameters that are not exact lead astray through impacts that are not seen.
+# Largest residual of a flight that follows the motion before it, over the noise, and over the motion's size.
+# Inexact parameters diverge through missed impacts.
 _FOLLOWED, _OF_SIZE = 1.5, 0.05
 _POINTS = 200
 
@@ -29,10 +29,10 @@ Sized = tuple[float, float]
 
 
 def excess_of_trajectories(record: Prepared) -> float:
-    """Return by how many standard errors of chance the trajectories leave more than the single flights do.
+    """Return the excess of the trajectories' residual over that of the single flights, in standard errors of chance.
 
-    A flight alone has a free state at its start; on a trajectory the impact before gives it. What that takes away is
-    chi-squared while stop and restitution are the same at all impacts. NaN without a trajectory of several impacts.
+    A single flight has a free start state; on a trajectory the impact before gives the start state. The loss of freedom
+    is chi-squared if stop and restitution are the same at all impacts. NaN without a trajectory of several impacts.
     """
     found = record.trajectory
     if found is None or not record.fit.noise > 0.0:
@@ -53,7 +53,7 @@ def excess_of_trajectories(record: Prepared) -> float:
 
 
 def slope_of_restitution(record: Prepared) -> Sized:
-    """Return how much the restitution of impacts at double the typical speed differs, with its standard error."""
+    """Return the change of the restitution when the typical impact speed doubles, with its standard error."""
     found = record.trajectory
     if found is None:
         return math.nan, math.nan
@@ -71,7 +71,7 @@ def slope_of_restitution(record: Prepared) -> Sized:
 
 
 def dry_friction(record: Prepared) -> Sized:
-    """Return the dry friction over the stiffness that the single flights show, with its standard error."""
+    """Return the dry friction over the stiffness from the single flights, with its standard error."""
     p, fitted, signal = record.parameters, record.fit.fitted, record.signal
 
     def residual_with(values: Floats) -> Floats:
@@ -88,7 +88,7 @@ def dry_friction(record: Prepared) -> Sized:
 
 
 def _size_of(column: Floats, others: Floats, residual: Floats) -> Sized:
-    """Return the size of a column in the residual beside others, and its standard error; NaN where it is not seen."""
+    """Return the size of a column in the residual next to others, with standard error; NaN if it is not separable."""
     scale = np.linalg.norm(others, axis=0)
     basis = np.linalg.qr(others[:, scale > 0.0] / scale[scale > 0.0])[0]
     own, residual = (values - basis @ (basis.T @ values) for values in (column, residual))
@@ -102,7 +102,7 @@ def _size_of(column: Floats, others: Floats, residual: Floats) -> Sized:
 
 
 def _friction_column(time: Floats, one: FittedFlight, p: Parameters) -> Floats:
-    """Return what dry friction of 1 (over the stiffness) adds to a flight, less what its start state takes up."""
+    """Return the effect of unit dry friction (over the stiffness) on a flight, without the part in its start state."""
     flight, body = one.flight, p.oscillator()
     state, phase = (float(one.state[0]), float(one.state[1])), p.phase_at(flight.start)
     grid = np.linspace(0.0, flight.duration, _POINTS)
@@ -117,7 +117,7 @@ def _friction_column(time: Floats, one: FittedFlight, p: Parameters) -> Floats:
     for begin, step in zip(starts, steps, strict=True):
         reached = later > begin
         if np.any(reached):
-            # answer to a force that begins: static, less free motion from there
+            # response to a force that begins: static deflection minus free motion from there
             column[reached] += step * (1.0 - motion(free, (1.0, 0.0), later[reached] - begin)[0])
     basis = flow_of(time[flight.index], flight, p)[0]
     residual: Floats = column - basis @ (one.gain @ column)
@@ -125,9 +125,9 @@ def _friction_column(time: Floats, one: FittedFlight, p: Parameters) -> Floats:
 
 
 def unexplained_flights(record: Prepared) -> int:
-    """Return how many of the flights that were left out the fitted motion does not go through either.
+    """Return the number of left-out flights that the fitted motion does not follow either.
 
-    Between weak impacts that were not seen, as of chatter, the fitted motion follows from the flight before.
+    Through weak impacts that were missed, as in chatter, the fitted motion continues from the flight before.
     """
     p = record.parameters if record.trajectory is None else record.trajectory.parameters
     signal, cut = record.signal, record.segmentation
@@ -145,7 +145,7 @@ def unexplained_flights(record: Prepared) -> int:
 
 
 def _distance(record: Prepared, before: FittedFlight, last: int, index: np.ndarray, p: Parameters) -> float:
-    """Return the root mean square distance of a flight from the motion that goes on from one before it."""
+    """Return the rms distance of a flight from the continued motion of an earlier flight."""
     signal = record.signal
     again = fit_flight(signal, before.flight, p)
     place, state = deepest(signal, again, p)

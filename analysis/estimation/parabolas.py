@@ -1,11 +1,11 @@
 """Cut a displacement into parabolas: the flights of a body under a constant force.
 
-A flight is a parabola from end to end, so all its samples say where it begins and ends. A kink has only the samples
-around it. At few samples in a flight, or in strong noise, parabolas are plain where kinks are not.
+A flight is a parabola from end to end, so all its samples determine its start and end. A kink has only the samples
+around it. With few samples in a flight, or in strong noise, parabolas are clear where kinks are not.
 
-The cut is the cheapest one: sum of squared residuals of one parabola for each piece, and a price for each piece
-(optimal partitioning by dynamic programming, Jackson et al. 2005). Long records are cut on means of neighbouring
-samples.
+The best cut has the least cost: the sum of squared residuals of one parabola for each piece, plus a price for each
+piece. Dynamic programming finds it (optimal partitioning, Jackson et al. 2005). Long records are cut on means of
+neighbouring samples.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.estimation.physics import Floats
 
-# Points on which a record is cut: more make the cut finer, at a cost of their square (.05 s here).
+# Number of points on which a record is cut; the cost grows with its square (0.05 s at this number).
 _MOST_POINTS = 500
-# Fewest points in a piece: one more than a parabola has coefficients.
+# Smallest number of points in a piece: one more than the coefficients of a parabola.
 FEWEST_IN_PIECE = 4
-# Price of a piece, in variances of the noise: two parabolas in place of one save less by chance in 1 of 10,000.
-_PRICE = 24.0
-# Factors of the noise with which a record is cut: coloured noise and contacts of some length look like more pieces.
+# Price of a piece, in variances of the noise: by chance, a second parabola saves more in 1 of 10,000 cases.
+_PIECE_PENALTY = 24.0
+# Factors of the noise for repeated cuts: coloured noise and contacts of some length look like more pieces.
 _FACTORS = (1.0, 2.0, 4.0, 8.0)
-# Smallest noise, relative to the range, in which a cut is made: sums of squares are rounded below it.
+# Smallest noise for a cut, relative to the range; below it sums of squares are rounded.
 _ROUNDING = 1e-6
 
 
@@ -35,9 +35,9 @@ class Points:
 
     time: Floats
     values: Floats
-    """Unit of the displacement; both have shape (point,), time in s."""
+    """Values in the unit of the displacement; both arrays have shape (point,), time in s."""
     size: int
-    """Samples in a mean; in means of several, one may have both sides of an impact in it."""
+    """Samples in a mean; with several samples, a mean may contain both sides of an impact."""
 
     @property
     def skipped(self) -> int:
@@ -47,12 +47,12 @@ class Points:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Neighbouring points, without `end`, that one parabola follows."""
+    """Neighbouring points, `end` excluded, that one parabola follows."""
 
     first: int
     end: int
     coefficients: Floats
-    """Of 1, t - middle, (t - middle)^2; the middle is in s."""
+    """Coefficients of 1, t - middle, (t - middle)^2; the middle is in s."""
     middle: float
     square: float
     """Sum of squared residuals."""
@@ -75,7 +75,7 @@ class Piece:
 
 
 def points_of(time: Floats, values: Floats) -> Points:
-    """Return means of as many neighbouring samples as leave 500 points at most."""
+    """Return means of neighbouring samples, at most 500 of them."""
     size = -(-len(time) // _MOST_POINTS)
     whole = len(time) // size * size
     means = [np.mean(one[:whole].reshape(-1, size), axis=1) for one in (time, values)]
@@ -83,19 +83,19 @@ def points_of(time: Floats, values: Floats) -> Points:
 
 
 def cuts(points: Points, noise: float) -> list[list[Piece]]:
-    """Return the pieces of a record, cut once for each factor of its noise, the standard deviation of a sample."""
+    """Return the pieces of a record, cut once for each factor of its noise (standard deviation of a sample)."""
     if len(points.time) < FEWEST_IN_PIECE:
         return []
     least = _ROUNDING * float(np.ptp(points.values))
     variance = noise**2 / points.size + least**2
-    prices = _PRICE * variance * np.square(_FACTORS)
-    ends = [_walked(row, points.skipped) for row in _cheapest(points, prices)]
+    penalties = _PIECE_PENALTY * variance * np.square(_FACTORS)
+    ends = [_traced(row, points.skipped) for row in _cheapest(points, penalties)]
     different = [one for k, one in enumerate(ends) if one not in ends[:k]]
     return [[piece_of(points, first, end) for first, end in one] for one in different]
 
 
 def piece_of(points: Points, first: int, end: int) -> Piece:
-    """Return the parabola through points."""
+    """Return the parabola through points first to end - 1."""
     time, values = points.time[first:end], points.values[first:end]
     middle = 0.5 * float(time[0] + time[-1])
     vander = np.vander(time - middle, 3, increasing=True)
@@ -104,8 +104,8 @@ def piece_of(points: Points, first: int, end: int) -> Piece:
     return Piece(first, end, coefficients, middle, float(residual @ residual))
 
 
-def _walked(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
-    """Return first and end of the pieces of a cut, from where each one's end says that it begins."""
+def _traced(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
+    """Return the start and end of each piece of a cut, followed backwards from the last end."""
     ends, end = [], len(before) - 1
     while end > 0:
         start = int(before[end])
@@ -114,17 +114,17 @@ def _walked(before: NDArray[np.intp], skipped: int) -> list[tuple[int, int]]:
     return ends[::-1]
 
 
-def _cheapest(points: Points, prices: Floats) -> NDArray[np.intp]:
-    """Return, for each price and each end of a piece, where the piece begins in the cheapest cut up to there."""
+def _cheapest(points: Points, penalties: Floats) -> NDArray[np.intp]:
+    """Return the start of the last piece in the cheapest cut up to each end, for each price."""
     count = len(points.time)
-    cost = np.full((len(prices), count + 1), np.inf)
+    cost = np.full((len(penalties), count + 1), np.inf)
     cost[:, 0] = 0.0
     before = np.zeros(cost.shape, dtype=np.intp)
     for start in range(count - FEWEST_IN_PIECE + 1):
         first = start + (points.skipped if start else 0)
         squares = _squares(points.time[first:], points.values[first:])
         ends = slice(first + FEWEST_IN_PIECE, count + 1)
-        trial = cost[:, start, None] + squares + prices[:, None]
+        trial = cost[:, start, None] + squares + penalties[:, None]
         cheaper = trial < cost[:, ends]
         cost[:, ends] = np.where(cheaper, trial, cost[:, ends])
         before[:, ends] = np.where(cheaper, start, before[:, ends])
@@ -134,7 +134,7 @@ def _cheapest(points: Points, prices: Floats) -> NDArray[np.intp]:
 def _squares(time: Floats, values: Floats) -> Floats:
     """Return the sums of squared residuals of parabolas through the first 4, 5, ... points.
 
-    Moments of time are scaled to the length of each piece, and the parabola is eliminated term by term.
+    Moments of time are scaled to the length of each piece; the parabola is eliminated term by term.
     """
     last = slice(FEWEST_IN_PIECE - 1, None)
     since, level = time - time[0], values - values[0]

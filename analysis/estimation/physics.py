@@ -1,12 +1,13 @@
-"""What is known and what is asked of an oscillator that hits a stop, and the coordinates in which it is linear.
+"""Known and unknown numbers of an oscillator that hits a stop, and the coordinates in which its equation is linear.
 
-Per unit mass, in the unit of the displacement: y'' + 2 zeta wn y' + wn^2 (y - y0) = wn^2 y_st cos(Omega t + psi)
-for y below the stop y_s; at the stop the velocity V becomes -r V. zeta damping ratio, wn natural angular frequency, y0
-offset (where the channel reads at rest), y_st static deflection, Omega and psi of the force, r restitution.
+The equation y'' + 2 zeta wn y' + wn^2 (y - y0) = wn^2 y_st cos(Omega t + psi) holds for y below the stop y_s. It is per
+unit mass, in the unit of the displacement. At the stop the velocity V becomes -r V, with the restitution r. The damping
+ratio is zeta, the natural angular frequency wn, the offset y0 (reading of the channel at rest). The static deflection
+is y_st; Omega and psi are frequency and phase of the force.
 
 Stiffness wn^2, drag 2 zeta wn, force wn^2 y_st (cos psi, sin psi) and rest force wn^2 y0 enter the equation linearly.
-Motion that hardly determines the stiffness leaves a valley, straight in these coordinates and bent in those that a
-person asks for: searches go along it, and intervals follow it.
+Motion that hardly determines the stiffness leaves a valley of good fits. The valley is straight in these coordinates
+and bent in the physical parameters: searches and intervals follow it.
 """
 
 from __future__ import annotations
@@ -39,11 +40,11 @@ class Forcing:
     angular_frequency : float
         rad/s.
     static_deflection : float or None
-        Force amplitude over stiffness, in the unit of the displacement; None: not known, estimated.
+        Force amplitude over stiffness, in the unit of the displacement; None: unknown, estimated.
     phase : float or None
-        At time 0 of the recording, rad; None: not known, estimated.
+        At time 0 of the recording, rad; None: unknown, estimated.
     clock_drifts : bool
-        The recording's clock and the generator's do not agree: the angular frequency is only a start value.
+        The clocks of the recording and of the generator disagree: the angular frequency is only a start value.
     """
 
     angular_frequency: float
@@ -54,7 +55,7 @@ class Forcing:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known beforehand, and so held instead of estimated; None: not known.
+    """Known values, which are held instead of estimated; None: unknown.
 
     Attributes
     ----------
@@ -64,9 +65,9 @@ class Known:
     stop_position : float or None
         In the unit of the displacement.
     offset : float or None
-        What the channel reads at rest, in the unit of the displacement.
+        Reading of the channel at rest, in the unit of the displacement.
     side : str or None
-        `upper` or `lower`; None: as the signal shows.
+        `upper` or `lower`; None: the signal decides.
     """
 
     damping_ratio: float | None = None
@@ -78,22 +79,22 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """All numbers of the model; the stop is an upper one (a lower one is mirrored before)."""
+    """All numbers of the model; the stop is an upper stop (a lower stop is mirrored before)."""
 
     restitution: float
     damping_ratio: float
     natural_frequency: float
     angular_frequency: float
-    """rad/s, as the natural one."""
+    """rad/s, like the natural frequency."""
     static_deflection: float
-    """Unit of the displacement, as stop position and offset."""
+    """Unit of the displacement, like stop position and offset."""
     phase: float
     """rad."""
     stop_position: float
     offset: float = 0.0
 
     def oscillator(self) -> Oscillator:
-        """Return the oscillator of unit mass whose flow this is, about the offset."""
+        """Return the oscillator of unit mass with these parameters, about the offset."""
         stiffness = self.natural_frequency**2
         damping = 2.0 * self.damping_ratio * self.natural_frequency
         force = stiffness * self.static_deflection
@@ -104,23 +105,23 @@ class Parameters:
         return self.angular_frequency * time + self.phase
 
     def short_of_periods(self, duration: float) -> float:
-        """Return what a flight of P(1,q), which meets its own start, is short of whole periods, s."""
+        """Return the time from the end of a P(1,q) flight, which meets its own start, to whole periods, s."""
         period = 2.0 * math.pi / self.angular_frequency
         return max(1, round(duration / period)) * period - duration
 
     def acceleration(self, y: Floats, v: Floats, angle: Floats) -> Floats:
-        """Return the acceleration at displacements from the offset and velocities; angle: Omega t, rad."""
+        """Return the acceleration for displacements from the offset and velocities; angle: Omega t, rad."""
         square = self.natural_frequency**2
         load = square * self.static_deflection * np.cos(angle + self.phase)
         found: Floats = load - 2.0 * self.damping_ratio * self.natural_frequency * v - square * y
         return found
 
     def values_of(self, names: Sequence[str]) -> Floats:
-        """Return the numbers of some names, shape (name,)."""
+        """Return the numbers with these names, shape (name,)."""
         return np.array([getattr(self, name) for name in names])
 
     def with_values(self, names: Sequence[str], values: Sequence[float] | Floats) -> Parameters:
-        """Return the same but for the numbers of some names."""
+        """Return a copy with new numbers for some names."""
         changes: dict[str, Any] = {name: float(value) for name, value in zip(names, values, strict=True)}
         return replace(self, **changes)
 
@@ -130,7 +131,7 @@ def central_differences(
 ) -> Floats:
     """Return the derivatives of a function by its arguments, shape (value, argument).
 
-    The step is the `relative` part of an argument; an argument of 0 has the `size_of_zero`.
+    The step is the `relative` share of an argument; an argument of 0 counts as `size_of_zero`.
     """
     columns = []
     for k, value in enumerate(at):
@@ -145,13 +146,13 @@ class Coordinates:
     """The linear coordinates of some of the parameters; the others are held."""
 
     names: tuple[str, ...]
-    """What is free."""
+    """Names of the free parameters."""
     held: Parameters
-    """Values of the others."""
+    """Values of the other parameters."""
 
     @property
     def both(self) -> bool:
-        """Amplitude and phase of the force are both free."""
+        """Whether amplitude and phase of the force are both free."""
         return "static_deflection" in self.names and "phase" in self.names
 
     def of(self, p: Parameters) -> Floats:
@@ -173,9 +174,9 @@ class Coordinates:
         return self.held.with_values(self.names, numbers[0]) if there[0] else None
 
     def numbers(self, values: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """Return where the stiffness of many coordinates is positive, shape (row,), and there the numbers of the names.
+        """Return a mask of the coordinates with a positive stiffness, shape (row,), and the numbers of the names.
 
-        Values and numbers have shape (row, name); numbers are of no meaning elsewhere.
+        Values and numbers have shape (row, name); numbers outside the mask are meaningless.
         """
         given = dict(zip(self.names, values.T, strict=True))
         square = given.get("natural_frequency", np.full(len(values), self.held.natural_frequency**2))
@@ -199,10 +200,10 @@ class Coordinates:
     def intervals(
         self, p: Parameters, covariance: Floats, confidence: float
     ) -> Mapping[str, tuple[float, float]]:
-        """Return intervals of parameters whose coordinates are normal: parts of draws, the same draws every time.
+        """Return intervals of parameters with normal coordinates: quantiles of draws, the same draws every time.
 
-        The covariance, shape (name, name), is to first order. No interval has what the stiffness is in, where the data
-        do not exclude a stiffness of 0.
+        The covariance, shape (name, name), is to first order. Parameters that contain the stiffness have no interval
+        where the data do not exclude a stiffness of 0.
         """
         slope = self.derivative(p)
         values, vectors = np.linalg.eigh(slope @ covariance @ slope.T)

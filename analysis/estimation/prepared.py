@@ -1,4 +1,4 @@
-"""What all methods share: a record cut at its impacts, its weak form, and the exact flow on each flight."""
+"""The common preparation of all methods: a record cut at its impacts, its weak form, and the exact flow per flight."""
 
 from __future__ import annotations
 
@@ -29,59 +29,59 @@ from vibroimpact.analysis.estimation.weak_form import (
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError
 
-# Correlation of neighbouring residuals, in standard errors, from which it widens the intervals.
+# Correlation of neighbouring residuals, in standard errors, above which it widens the intervals.
 _CORRELATED = 3.0
 _LEAST_DAMPING = 1e-6
-# Standard errors of chance beyond which the residuals of a flight are so large or so correlated that it has an impact.
+# Standard errors of chance beyond which the size or correlation of a flight's residuals reveals an impact in it.
 _BEYOND_CHANCE = 4.5
-# A record is cut again if its natural frequency exceeds that for which it was cut by more than the first factor; beyond
-# the second it is that of no oscillator.
+# Natural frequency, over the frequency assumed for the cut, above which a record is cut again; and ratio above which it
+# belongs to no oscillator.
 _FASTER, _MUCH_FASTER = 1.05, 4.0
 
 
 @dataclass(slots=True)
 class Prepared:
-    """A record with what all methods share."""
+    """A record with the preparation that all methods share."""
 
     forcing: Forcing
     held: Known
     segmentation: Segmentation
     flights: list[Flight]
-    """Those that follow the model."""
+    """Flights that follow the model."""
     search: FlightSearch
-    """What weak form and exact flow say of what is not held."""
+    """Estimates of the free parameters by weak form and exact flow."""
     fit: FlightFit
     parameters: Parameters
-    """What is held, and what search and flights say of the rest."""
+    """Held values, and values of the rest from the search and the flights."""
     left_out: int
-    """Flights that do not follow the model."""
+    """Number of flights that do not follow the model."""
     correlation: float
     inflation: float
     """Factor by which the correlation of neighbouring residuals widens standard errors."""
     trajectory: Trajectory | None = None
-    """Set when it was fitted."""
+    """Set once it is fitted."""
 
     @property
     def signal(self) -> Signal:
-        """The displacement, mirrored where its stop is a lower one."""
+        """The displacement, mirrored for a lower stop."""
         return self.segmentation.signal
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What weak form and search estimated."""
+        """Names of the parameters that weak form and search estimated."""
         return self.search.names
 
     @property
     def stop(self) -> float | None:
-        """The known stop, mirrored where it is a lower one."""
+        """The known stop, mirrored for a lower stop."""
         return None if self.held.stop_position is None else self.signal.sign * self.held.stop_position
 
 
 def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> Prepared:
-    """Cut a record, find what the weak form says and fit the exact flow to each flight.
+    """Cut a record, estimate the weak form, and fit the exact flow to each flight.
 
-    A natural frequency above that of the force makes the motion faster than the record was cut for: it is cut again. No
-    impacts, or no flight that follows a forced oscillator, raise EstimationError.
+    A natural frequency above that of the force means faster motion than the cut assumed: the record is cut again.
+    EstimationError: there are no impacts, or no flight follows a forced oscillator.
     """
     fastest = max(forcing.angular_frequency, held.natural_frequency or 0.0)
     found = _prepared(channel, forcing, held, window, fastest)
@@ -113,7 +113,7 @@ def _prepared(
     search, parameters, fit = _searched(signal, flights, start, free, stop)
     followed = _followed(fit)
     if free and len(followed) < len(flights):
-        # residuals of all samples show a weak impact that the few integrals of the weak form do not
+        # residuals of all samples reveal a weak impact that the few integrals of the weak form miss
         flights = [flights[k] for k in followed]
         start, _ = weak_form(weighted_flights(signal, flights, fastest), search.parameters, free)
         search, parameters, fit = _searched(signal, flights, start, free, stop)
@@ -130,7 +130,7 @@ def _prepared(
 
 
 def _start(forcing: Forcing, held: Known, cut: Segmentation) -> tuple[Parameters, tuple[str, ...]]:
-    """Return the held values (start values for the others), and the names of what is estimated."""
+    """Return the held values (start values for the others), and the names of the free parameters."""
     unknown = {
         "damping_ratio": held.damping_ratio is None,
         "natural_frequency": held.natural_frequency is None,
@@ -157,7 +157,7 @@ def _start(forcing: Forcing, held: Known, cut: Segmentation) -> tuple[Parameters
 def _followed_by_weak_form(
     signal: Signal, flights: list[Flight], start: Parameters, free: tuple[str, ...], fastest: float
 ) -> tuple[Parameters, list[Flight]]:
-    """Return the weak form over the flights that follow the model, and those flights."""
+    """Return the weak form over the flights that follow the model, and these flights."""
     if not free:
         return start, flights
     whole = weighted_flights(signal, flights, fastest)
@@ -170,7 +170,7 @@ def _followed_by_weak_form(
 def _searched(
     signal: Signal, flights: list[Flight], start: Parameters, free: tuple[str, ...], stop: float | None
 ) -> tuple[FlightSearch, Parameters, FlightFit]:
-    """Return what is free as found near a start, all parameters of the flow, and the exact flow on each flight."""
+    """Return the search for the free parameters, all parameters of the flow, and the exact flow on each flight."""
     if not free:
         nothing = FlightSearch(start, (), np.empty((0, 0)), [])
         return nothing, start, fit_flights(signal, flights, start, stop)
@@ -180,12 +180,12 @@ def _searched(
 
 
 def _damped(parameters: Parameters) -> Parameters:
-    """Return parameters of a flow: noise may put weak damping below zero, where there is none."""
+    """Return the parameters of a damped flow: noise may give weak damping below zero, where no flow exists."""
     return replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
 
 
 def _followed(fit: FlightFit) -> list[int]:
-    """Return the flights whose residuals are no larger and no more correlated than noise; all where most are not."""
+    """Return the flights with residuals like noise in size and correlation; all flights where most are not."""
     found = []
     for k, one in enumerate(fit.fitted):
         correlation, square, count = _correlation([one.residual])
@@ -211,7 +211,7 @@ def _correlation(residuals: Sequence[Floats]) -> tuple[float, float, int]:
 
 
 def fitted_motion(channel: Channel, record: Prepared) -> FittedMotion:
-    """Return the motion of the trajectories, or of the single flights where there are none."""
+    """Return the motion of the trajectories, or of the single flights without trajectories."""
     signal, found = record.signal, record.trajectory
     fitted = np.full(len(signal.values), np.nan)
     for one in record.fit.fitted:

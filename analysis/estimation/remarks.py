@@ -1,4 +1,4 @@
-"""What is said beside the estimates: conditioning, facts of the record, remarks, and doubts: each in one sentence."""
+"""Conditioning, facts of the record, remarks and doubts that accompany the estimates, each in one sentence."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
 from vibroimpact.fmus.messages import Argument, message
 
-# Standard errors from which evidence against the model counts: chance gets there once in a thousand times.
-_CLEAR = 3.3
-# Kinks the other way are those of a second stop from this number, and from this part of the impacts, on.
+# Standard errors above which evidence against the model counts: chance exceeds them once in a thousand times.
+_SIGNIFICANT = 3.3
+# Number of kinks the other way, and their share of the impacts, above which there is a second stop.
 _FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
-# Largest part of kinks that are not at the stop, and of flights that nothing explains, without a doubt.
-_PART_STRAY = 0.15
+# Shares of kinks away from the stop, and of unexplained flights, above which there is a doubt.
+_PART_AWAY = 0.15
 _PART_UNEXPLAINED = 0.15
 # Noise, relative to the motion's range, below which it is the rounding of a simulation.
 _ROUNDING = 1e-6
 _FEWEST_IMPACTS = 5
 _FEWEST_SAMPLES = 12
-# Standard errors of both together from which two methods contradict each other.
-_APART = 3.0
-# Relative standard error of a natural frequency, above which stiffness, force and offset fit alike along a valley. Of
-# the intervals in 300 records 72 to 82 % held the truth between .04 and .07, and 94 % below .03.
+# Difference of two methods, in their joint standard errors, above which they contradict each other.
+_CONTRADICTION = 3.0
+# Relative standard error of a natural frequency above which stiffness, force and offset fit equally well along a
+# valley. In 300 records, 72 to 82 % of the intervals held the truth between .04 and .07, and 94 % below .03.
 _DETERMINED = 0.04
 _CLOCKS = message(", or clocks that differ (", Argument("clock_drifts"), ")")
 
@@ -56,7 +56,7 @@ def conditioning_of(record: Prepared, resampled: Resampled | None) -> dict[str, 
 
 
 def facts_of(record: Prepared, resampled: Resampled | None) -> dict[str, float | str]:
-    """Return what the record is like."""
+    """Return the facts about the record."""
     cut, signal = record.segmentation, record.signal
     peak = float(np.max(np.abs(signal.values[signal.good] - record.parameters.offset)))
     facts: dict[str, float | str] = {
@@ -79,7 +79,7 @@ def facts_of(record: Prepared, resampled: Resampled | None) -> dict[str, float |
 
 
 def _scatter(record: Prepared) -> float:
-    """Return the standard deviation of the restitution of single impacts; NaN of less than two."""
+    """Return the standard deviation of the restitution of single impacts; NaN for fewer than two."""
     ratios = [
         -other.state[1] / one.end_state[1]
         for one, other in zip(record.fit.fitted, record.fit.fitted[1:], strict=False)
@@ -89,7 +89,7 @@ def _scatter(record: Prepared) -> float:
 
 
 def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
-    """Yield what a reader must know."""
+    """Yield the remarks for a reader."""
     if record.fit.reading.periodic:
         yield "No impact has a usable flight on both sides: P(1,1) was assumed."
     if record.left_out:
@@ -123,9 +123,9 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
 
 
 def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doubt, ...]:
-    """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
+    """Return the doubts about the estimates of a record, the most serious first; intervals have this confidence."""
     clocks = "" if record.forcing.clock_drifts else _CLOCKS
-    # without noise the residual is rounding, and standard errors of it say nothing
+    # without noise the residual is rounding, and its standard errors mean nothing
     noisy = record.fit.noise > _ROUNDING * record.signal.range
     return (
         *_of_stops(record),
@@ -138,13 +138,13 @@ def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doub
 
 
 def _of_stops(record: Prepared) -> Iterator[Doubt]:
-    """Yield what kinks say that are not those of one stop."""
+    """Yield doubts from kinks that do not belong to one stop."""
     cut = record.segmentation
     if cut.opposite >= max(_FEWEST_OPPOSITE, _PART_OPPOSITE * len(cut.impacts)):
         yield Doubt(f"{cut.opposite} impacts turn the motion the other way: there is a second stop")
     if cut.passed:
         yield Doubt("the motion goes beyond the level of its impacts: they are not those of one stop")
-    if cut.stray > _PART_STRAY * (cut.stray + len(cut.impacts)):
+    if cut.stray > _PART_AWAY * (cut.stray + len(cut.impacts)):
         yield Doubt(
             f"{cut.stray} of {cut.stray + len(cut.impacts)} jumps of the velocity are not where the others are: "
             "the stop is not one place, or the channel is not the displacement of the contact"
@@ -152,7 +152,7 @@ def _of_stops(record: Prepared) -> Iterator[Doubt]:
 
 
 def _of_flights(record: Prepared, clocks: str) -> Iterator[Doubt]:
-    """Yield what the flights show: how many, and how well they are followed."""
+    """Yield doubts from the number of flights, and from flights that do not follow the model."""
     missed, used = unexplained_flights(record), len(record.flights)
     pairs = sum(one != other for one, other in pairs_of(record.flights))
     if pairs < _FEWEST_IMPACTS:
@@ -171,26 +171,26 @@ def _of_flights(record: Prepared, clocks: str) -> Iterator[Doubt]:
 
 
 def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
-    """Yield what speaks against one linear oscillator with white noise and one restitution."""
+    """Yield doubts about one linear oscillator with white noise and one restitution."""
     if record.inflation > 1.0:
         yield Doubt(
             f"what the motion leaves is no white noise (correlation {record.correlation:.2f} from sample to sample): "
             "a sensor that filters, or motion that the model lacks"
         )
     slope, error = slope_of_restitution(record)
-    if abs(slope) > _CLEAR * error:
+    if abs(slope) > _SIGNIFICANT * error:
         yield Doubt(
             f"the restitution changes with the speed of impact ({slope:+.2g} +- {error:.1g} at double the typical "
             "speed), or friction does"
         )
     friction, error = dry_friction(record)
-    if abs(friction) > _CLEAR * error:
+    if abs(friction) > _SIGNIFICANT * error:
         yield Doubt(
             f"the flights show dry friction ({abs(friction):.2g} +- {error:.1g} over the stiffness), or other damping "
             "that is not viscous"
         )
     excess = excess_of_trajectories(record)
-    if excess > _CLEAR:
+    if excess > _SIGNIFICANT:
         yield Doubt(
             message(
                 f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
@@ -198,7 +198,7 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
                 clocks,
             )
         )
-    if excess < -_CLEAR:
+    if excess < -_SIGNIFICANT:
         yield Doubt(
             f"the trajectories follow the flights better than the weak form does, by {-excess:.0f} standard errors",
             tuple(name for name in ANSWERING if name != "trajectory"),
@@ -206,7 +206,7 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
 
 
 def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
-    """Yield trajectories that do not follow at all what single flights do."""
+    """Yield a doubt if trajectories do not follow motion that single flights follow."""
     if record.trajectory is not None and not record.trajectory.adequate:
         yield Doubt(
             message(
@@ -218,29 +218,29 @@ def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
 
 
 def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
-    """Yield methods that differ by more than chance explains.
+    """Yield a doubt for each method that differs by more than chance explains.
 
-    Intervals of 95 % beside much narrower ones have no point in common with them once in twenty times.
+    Once in twenty times, a 95 % interval does not meet a much narrower interval.
     """
     best = next((name for name in ("trajectory", "weak_form") if name in values), None)
     for method in ANSWERING:
         if best is None or method not in values or method == best:
             continue
-        apart = [
+        disjoint = [
             name
             for name, one in values[method].items()
-            if name in values[best] and _apart(name, one, values[best][name], confidence)
+            if name in values[best] and _contradict(name, one, values[best][name], confidence)
         ]
-        if apart:
-            said = " and ".join(name.replace("_", " ") for name in apart)
+        if disjoint:
+            quantities = " and ".join(name.replace("_", " ") for name in disjoint)
             yield Doubt(
-                f"{method} and {best} contradict each other about {said}",
+                f"{method} and {best} contradict each other about {quantities}",
                 () if method == "weak_form" else (method,),
             )
 
 
-def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
-    """Tell whether two intervals have nothing in common, and by more than chance explains."""
+def _contradict(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
+    """Tell whether two intervals are disjoint, by more than chance explains."""
     from scipy.stats import norm
 
     turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
@@ -248,12 +248,12 @@ def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: fl
     between = one.value - one.low, other.high - other.value
     if gap <= 0.0:
         between = one.high - one.value, other.value - other.low
-    reach = _APART / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*between)
+    reach = _CONTRADICTION / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*between)
     return abs(gap) > max(sum(between), reach)
 
 
 def _of_precision(record: Prepared, values: Values) -> Iterator[Doubt]:
-    """Yield methods that the data hardly determine."""
+    """Yield a doubt for each method whose numbers the data hardly determine."""
     for method in ANSWERING:
         found = values.get(method, {})
         natural = found.get("natural_frequency")

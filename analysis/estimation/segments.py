@@ -1,9 +1,9 @@
 """Cut a displacement at its impacts, found as kinks of the signal alone, with the instants between samples.
 
 Symbols: V speed of approach, r restitution. At an impact the velocity jumps by -(1 + r) V; on both sides the motion is
-smooth. Each side has its own one-sided cubic over a window fixed in time; the instant is where the two meet, or, with
-the stop known, where each meets the stop (weights by their speeds). The window balances noise against the motion's
-curvature; where flights are shorter than it, a shorter one shows more impacts and is taken.
+smooth. Each side has its own one-sided cubic over a window fixed in time. The instant is where the two cubics meet. If
+the stop is known, it is where each meets the stop (weights by their speeds). The window balances noise against the
+motion's curvature. Where flights are shorter than the window, a shorter window that shows more impacts is used.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
-# A jump of the velocity is a kink from this many standard errors on ...
+# Size of a jump of the velocity, in standard errors, above which it is a kink ...
 _JUMPS_BEYOND = 5.0
-# ... and from this multiple of the jump that smooth motion of the largest size and the fastest rate seems to have.
+# ... if it also exceeds this multiple of the apparent jump in smooth motion of the largest size and fastest rate.
 _BIAS_BEYOND = 1.5
 FEWEST_IN_FLIGHT = 10
 # Relative deviation of a sampling step from the median beyond which it is a gap or a repeated sample, without a kink.
 _UNEVEN = 0.5
 _REFINEMENTS = 4
-# A kink is not at the stop if its level is more than this many standard errors from the median level ...
+# A kink is away from the stop if its level differs from the median level by more than this many standard errors ...
 _LEVEL_BEYOND = 8.0
-# ... and more than this part of the motion's size.
+# ... and by more than this share of the motion's size.
 _LEVEL_OF_SIZE = 0.02
-# Each trial window is this part of the one before, down to the fewest samples ...
+# Ratio of each trial window to the one before, down to the smallest number of samples ...
 _SHORTER = 0.6
 _FEWEST_IN_WINDOW = 6
-# ... and is taken if it shows more impacts than the longer one, by more than this factor.
-_MORE = 1.1
+# ... the shorter window is used if it shows more impacts by more than this factor.
+_MORE_IMPACTS = 1.1
 # No shorter window is tried if all impacts are further apart than this many windows.
-_APART = 2.5
-# A kink the other way counts if it is further from all kinks at the stop than this many windows ...
+_SEPARATE = 2.5
+# A kink the other way counts if it is further than this many windows from all kinks at the stop ...
 _CLEAR_OF = 1.1
-# ... and larger than this part of the largest of them: smooth motion makes small ones.
+# ... and larger than this share of the largest kink there: smooth motion makes small kinks.
 _PART_OF_LARGEST = 0.1
-# A known stop is refused if it is this part of the motion's size off the impacts; checked from this many impacts on.
+# Distance of a known stop from the impacts, over the motion's size, above which it is refused; impacts for this check.
 _STOP_OF_SIZE, _FEWEST_TO_CHECK = 0.1, 5
-# Motion goes beyond a level if more than this part of its samples is further than this part of its size on.
+# Motion passes a level if more than this share of its samples is further beyond it than this share of its size.
 _PART_BEYOND, _BEYOND_OF_SIZE = 0.05, 0.1
-# Fewest jumps of the velocity without a kink from which their own scatter is taken as their error.
+# Smallest number of jumps without a kink whose scatter serves as their error.
 _FEWEST_FREE = 50
 # Samples within this many standard errors of the instant of an impact belong to no flight.
 DOUBTFUL = 2.5
@@ -63,24 +63,24 @@ class Impact:
     time_error: float
     """Standard error of the instant, s."""
     level: float
-    """Displacement where the two sides meet."""
+    """Displacement where both sides meet."""
     before: float
     after: float
-    """`before` and `after`: velocities of the two sides there."""
+    """`before` and `after`: velocities of the two sides at the impact."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """Smooth motion between two impacts that follow each other, from start to end, s."""
+    """Smooth motion between two consecutive impacts, from start to end, s."""
 
     start: float
     end: float
     index: NDArray[np.intp]
-    """Good samples between, less those so near an impact that they may be on its other side; shape (sample,)."""
+    """Good samples of the flight, without samples too near an impact for their side to be known; shape (sample,)."""
     first: int
-    """Index of the impact at its start; that at its end is the next."""
+    """Index of the impact at its start; the next impact is at its end."""
     usable: bool
-    """Has samples enough."""
+    """Whether it has enough samples."""
 
     @property
     def duration(self) -> float:
@@ -95,31 +95,31 @@ class Segmentation:
     signal: Signal
     impacts: tuple[Impact, ...]
     flights: tuple[Flight, ...]
-    """Those between impacts, first to last."""
+    """Flights between impacts, first to last."""
     window: float
-    """Of the one-sided cubics, s."""
+    """Window of the one-sided cubics, s."""
     stray: int = 0
-    """Kinks that are at no stop: their level is not that of the others."""
+    """Number of kinks away from the stop: their level differs from the others."""
     opposite: int = 0
-    """Kinks the other way, far from all others: those of a stop on the other side."""
+    """Number of kinks the other way, far from all others: impacts on a stop on the other side."""
 
     @property
     def stop_position(self) -> float:
-        """Level of the kinks: mean weighted by the square of their jumps."""
+        """Level of the kinks: their mean, weighted by the squares of their jumps."""
         weight = np.array([(impact.before - impact.after) ** 2 for impact in self.impacts])
         return float(np.average([impact.level for impact in self.impacts], weights=weight))
 
     @property
     def passed(self) -> bool:
-        """Whether the motion goes beyond the level of the kinks: it is that of no stop."""
-        return bool(self.impacts) and _goes_beyond(self.signal, self.stop_position)
+        """Whether the motion passes the level of the kinks, so that no stop is there."""
+        return bool(self.impacts) and _exceeds_level(self.signal, self.stop_position)
 
 
 def segment_channel(channel: Channel, fastest: float, known: Known, window: float | None) -> Segmentation:
     """Cut a channel at its impacts; errors are those of `segment`.
 
-    A channel that is no displacement raises EstimationError: velocities jump at impacts, accelerations and forces have
-    spikes.
+    EstimationError: the channel has another quantity than displacement. Velocities jump at impacts; accelerations and
+    forces have spikes.
     """
     refuse_other_quantities(channel)
     return segment(
@@ -145,9 +145,9 @@ def segment(
 ) -> Segmentation:
     """Find the impacts of a displacement and cut it there; arrays have shape (sample,), time in s.
 
-    `fastest` is the angular frequency of the fastest smooth part of the motion, such as that of the force, rad/s. The
-    side is `upper` or `lower` (None: as the kinks show), the window that of the one-sided cubics, s (None: from the
-    noise). Too few samples, or fewer than two impacts, raise EstimationError.
+    `fastest` is the angular frequency of the fastest smooth part of the motion, for example of the force, rad/s.
+    `side` is `upper` or `lower` (None: the kinks decide). The window of the one-sided cubics is in s (None: chosen from
+    the noise). Too few samples, or fewer than two impacts, raise EstimationError.
     """
     noise = noise_level(values, good)
     interval = float(np.median(np.diff(time)))
@@ -164,12 +164,12 @@ def segment(
         try:
             trial = _possible_cut(signal, fastest, count, side, stop_position)
         except EstimationError as problem:
-            # the kinks of a window that is too long are not where the impacts are
+            # a window that is too long shows kinks away from the impacts
             misplaced = misplaced or problem
             continue
-        if found is None or _better(trial, found):
+        if found is None or _is_better(trial, found):
             found = trial
-        if _uncrowded(trial, count) and not trial.passed:
+        if _are_separate(trial, count) and not trial.passed:
             break
     if misplaced is not None and (found is None or len(found.impacts) < _FEWEST_TO_CHECK):
         raise misplaced
@@ -184,38 +184,38 @@ def segment(
 
 
 def _counts(most: float) -> list[int]:
-    """Return the samples in a one-sided window, longest first."""
+    """Return the numbers of samples in a one-sided window, longest first."""
     counts = [max(_FEWEST_IN_WINDOW, round(most))]
     while counts[-1] > _FEWEST_IN_WINDOW:
         counts.append(max(_FEWEST_IN_WINDOW, round(_SHORTER * counts[-1])))
     return counts
 
 
-def _better(trial: Segmentation, found: Segmentation) -> bool:
-    """Tell whether a shorter window shows more impacts, or a stop where the longer one shows none."""
+def _is_better(trial: Segmentation, found: Segmentation) -> bool:
+    """Tell whether a shorter window shows more impacts, or shows a stop where the longer one does not."""
     if trial.passed != found.passed:
         return _is_stopped(trial)
-    return len(trial.impacts) > _MORE * len(found.impacts)
+    return len(trial.impacts) > _MORE_IMPACTS * len(found.impacts)
 
 
-def _goes_beyond(signal: Signal, level: float) -> bool:
-    """Tell whether more samples are above a level than a stop there leaves, noise and its yielding counted."""
+def _exceeds_level(signal: Signal, level: float) -> bool:
+    """Tell whether more samples are above a level than a stop there allows, given noise and yielding of the stop."""
     limit = level + max(_BEYOND_OF_SIZE * 0.5 * signal.range, _JUMPS_BEYOND * signal.noise)
     return bool(np.mean(signal.values[signal.good] > limit) > _PART_BEYOND)
 
 
-def _uncrowded(cut: Segmentation, count: int) -> bool:
-    """Tell whether no impact has another so near that a shorter window would show more."""
-    apart = np.diff([impact.time for impact in cut.impacts])
-    return bool(len(apart) and not cut.stray and np.min(apart) > _APART * count * cut.signal.interval)
+def _are_separate(cut: Segmentation, count: int) -> bool:
+    """Tell whether all impacts are so far apart that a shorter window would show no more."""
+    spacing = np.diff([impact.time for impact in cut.impacts])
+    return bool(len(spacing) and not cut.stray and np.min(spacing) > _SEPARATE * count * cut.signal.interval)
 
 
 def _possible_cut(
     raw: Signal, fastest: float, count: int, side: str | None, stop_position: float | None
 ) -> Segmentation:
-    """Return a signal cut at the impacts of windows of `count` samples, of the side that the motion does not pass.
+    """Return a signal cut at the impacts of windows of `count` samples, on the side that the motion does not pass.
 
-    In a window that is too long for the motion, smooth motion turns as an impact on the other side would.
+    In a window that is too long for the motion, smooth motion turns like an impact on the other side.
     """
     sign = _side_sign(_jumps_and_least(raw, fastest, count)[0], side)
     cuts: list[Segmentation | EstimationError] = []
@@ -239,12 +239,12 @@ def _is_stopped(cut: Segmentation) -> bool:
 
 
 def _mirrored(raw: Signal, sign: float) -> Signal:
-    """Return a signal whose stop is an upper one: a lower one, of sign -1, is mirrored."""
+    """Return a signal with an upper stop: a lower stop (sign -1) is mirrored."""
     return replace(raw, values=sign * raw.values, sign=sign)
 
 
 def _cut(raw: Signal, fastest: float, count: int, sign: float, stop_position: float | None) -> Segmentation:
-    """Return a signal cut at the impacts on one side that windows of `count` samples on each side show."""
+    """Return a signal cut at the impacts on one side, found with windows of `count` samples on each side."""
     jump, least = _jumps_and_least(raw, fastest, count)
     signal = _mirrored(raw, sign)
     places = _kinks(-sign * jump, least, count)
@@ -258,10 +258,10 @@ def _cut(raw: Signal, fastest: float, count: int, sign: float, stop_position: fl
 
 
 def _opposite(signal: Signal, fastest: float, count: int) -> int:
-    """Return how many kinks the other way windows of `count` samples show, away from those of the stop.
+    """Return the number of kinks the other way in windows of `count` samples, away from kinks at the stop.
 
-    Noise that is not white moves slopes by more than its differences from sample to sample show. The jumps away from
-    kinks show by how much.
+    Noise that is not white moves slopes by more than its differences from sample to sample suggest. The scatter of the
+    jumps away from kinks measures this.
     """
     jump, least = _jumps_and_least(signal, fastest, count)
     ours = _kinks(-jump, least, count)
@@ -276,7 +276,7 @@ def _opposite(signal: Signal, fastest: float, count: int) -> int:
 
 
 def _jumps_and_least(signal: Signal, fastest: float, count: int) -> tuple[Floats, float]:
-    """Return the jumps of the velocity, and the smallest that is more than noise and smooth motion seem to have."""
+    """Return the jumps of the velocity, and the smallest jump beyond noise and smooth motion."""
     even = np.abs(np.diff(signal.time) - signal.interval) < _UNEVEN * signal.interval
     weights = _hinge(count)
     jump = _jumps(signal.values, signal.good, even, weights) / signal.interval
@@ -287,9 +287,9 @@ def _jumps_and_least(signal: Signal, fastest: float, count: int) -> tuple[Floats
 
 
 def _hinge(count: int) -> Floats:
-    """Return the weights of 2 `count` samples that give the kink in their middle beside a cubic, per interval.
+    """Return the weights of 2 `count` samples for the kink in their middle, in addition to a cubic, per interval.
 
-    Least squares of a cubic + kink * max(0, t): what the cubic can follow has no weight.
+    Least squares of a cubic + kink * max(0, t): the part that the cubic can follow has no weight.
     """
     abscissa = np.arange(2 * count) - (count - 0.5)
     cubic = np.vander(abscissa / count, 4)
@@ -300,7 +300,7 @@ def _hinge(count: int) -> Floats:
 
 
 def _jumps(values: Floats, good: Mask, even: Mask, weights: Floats) -> Floats:
-    """Return the jump of the velocity in each sampling interval, times its length; NaN where it is not known."""
+    """Return the jump of the velocity in each sampling interval, times its length; NaN where it is unknown."""
     from scipy.signal import oaconvolve
 
     count = len(weights) // 2
@@ -313,7 +313,7 @@ def _jumps(values: Floats, good: Mask, even: Mask, weights: Floats) -> Floats:
 
 
 def _all_of(mask: Mask, count: int) -> Mask:
-    """Return whether `count` neighbours from each one on are all true."""
+    """Return a mask of the places from which `count` neighbours are all true."""
     missing = np.concatenate([[0], np.cumsum(~mask)])
     found: Mask = missing[count:] == missing[:-count]
     return found
@@ -332,7 +332,7 @@ def _kinks(drop: Floats, least: float, count: int) -> list[int]:
     from scipy.signal import find_peaks
 
     height = np.where(np.isfinite(drop), drop, -np.inf)
-    # within a window of a larger kink the one-sided fits have that kink in them
+    # near a larger kink, the one-sided fits contain that kink
     edges = np.concatenate([[-np.inf], height, [-np.inf]])
     places = find_peaks(edges, height=least, distance=count)[0] - 1
     return [int(place) for place in places]
@@ -354,7 +354,7 @@ def _located(signal: Signal, places: list[int], count: int, stop: float | None) 
 def _meeting(
     signal: Signal, instant: float, limits: tuple[float, float], count: int, stop: float | None
 ) -> Impact | None:
-    """Fit both sides, let them meet, and choose the samples of each side anew; None where that fails."""
+    """Fit both sides, find where they meet, and choose the samples of each side anew; None where that fails."""
     impact = None
     reach = count * signal.interval
     for _ in range(_REFINEMENTS):
@@ -367,7 +367,7 @@ def _meeting(
         if not abs(shift) <= 3.0 * signal.interval:
             return impact
         instant += shift
-        # of the end of a cubic of m samples: 4 sigma / sqrt(m); two sides
+        # error at the end of a cubic of m samples: 4 sigma / sqrt(m); two sides
         error = 4.0 * signal.noise * math.sqrt(1.0 / len(before) + 1.0 / len(after))
         s = shift / reach
         level = 0.5 * (polyval(s, one) + polyval(s, other))
@@ -400,7 +400,7 @@ def _one_sided(signal: Signal, index: NDArray[np.intp], instant: float, reach: f
 
 
 def _crossing(one: Floats, other: Floats, reach: float) -> float:
-    """Return the time from the present instant to where two cubics meet, s (Newton)."""
+    """Return the time from the present instant to the intersection of two cubics, s (Newton)."""
     a, b, c, d = map(float, one - other)
     s = 0.0
     for _ in range(6):
@@ -414,7 +414,7 @@ def _crossing(one: Floats, other: Floats, reach: float) -> float:
 
 
 def _at_stop(one: Floats, other: Floats, stop: float, reach: float) -> float:
-    """Return the time to where each cubic meets the stop, weighted by their speeds squared, s."""
+    """Return the mean time to where each cubic meets the stop, weighted by their speeds squared, s."""
     level = np.array([stop, 0.0, 0.0, 0.0])
     found = [(_crossing(side, level, reach), float(side[1]) ** 2) for side in (one, other)]
     known = [(shift, weight) for shift, weight in found if math.isfinite(shift)]
@@ -423,7 +423,7 @@ def _at_stop(one: Floats, other: Floats, stop: float, reach: float) -> float:
 
 
 def _check_stop(impacts: list[Impact], signal: Signal, stop: float) -> None:
-    """Refuse a known stop that is not where the impacts are."""
+    """Raise EstimationError if a known stop is away from the impacts."""
     if len(impacts) < _FEWEST_TO_CHECK:
         return
     middle, scatter, _ = _levels(impacts)
@@ -436,7 +436,7 @@ def _check_stop(impacts: list[Impact], signal: Signal, stop: float) -> None:
 
 
 def _consistent(impacts: list[Impact], signal: Signal, count: int) -> list[Impact]:
-    """Leave out kinks that are not where the others are: they are not at the stop."""
+    """Return the impacts without kinks at another level than the others, which are not at the stop."""
     if len(impacts) < 4:
         return impacts
     _, scatter, off = _levels(impacts)
@@ -446,24 +446,24 @@ def _consistent(impacts: list[Impact], signal: Signal, count: int) -> list[Impac
 
 
 def _levels(impacts: list[Impact]) -> tuple[float, float, Floats]:
-    """Return the median level of impacts, the scatter about it, and how far each is off it."""
+    """Return the median level of impacts, the scatter about it, and the deviation of each impact."""
     levels = np.array([impact.level for impact in impacts])
     middle = float(np.median(levels))
     return middle, robust_sigma(levels - middle), levels - middle
 
 
 def _flights(signal: Signal, impacts: list[Impact]) -> tuple[Flight, ...]:
-    """Return the flights between impacts that follow each other."""
+    """Return the flights between consecutive impacts."""
     flights = []
     for k in range(len(impacts) - 1):
         start, end = impacts[k].time, impacts[k + 1].time
-        # a sample so near an impact may belong to the other side of it
-        doubt = [DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
-        first = int(np.searchsorted(signal.time, start + doubt[0], side="right"))
-        last = int(np.searchsorted(signal.time, end - doubt[1], side="left"))
+        # a sample this near an impact may belong to its other side
+        margins = [DOUBTFUL * impact.time_error for impact in impacts[k : k + 2]]
+        first = int(np.searchsorted(signal.time, start + margins[0], side="right"))
+        last = int(np.searchsorted(signal.time, end - margins[1], side="left"))
         index = np.arange(first, last)
         index = index[signal.good[index]]
         # a gap leaves a flight that cannot be followed
-        usable = len(index) >= max(FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(doubt)) / signal.interval - 2)
+        usable = len(index) >= max(FEWEST_IN_FLIGHT, 0.8 * (end - start - sum(margins)) / signal.interval - 2)
         flights.append(Flight(start, end, index, k, usable))
     return tuple(flights)

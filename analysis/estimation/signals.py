@@ -1,4 +1,4 @@
-"""A displacement as the estimations take it: its samples, which of them are good, and the noise."""
+"""A displacement in the form for estimations: samples, quality mask, and noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A displacement with an upper stop, mirrored where the stop is a lower one."""
+    """A displacement with an upper stop, mirrored for a lower stop."""
 
     time: Floats
     values: Floats
@@ -38,12 +38,12 @@ class Signal:
 
     @property
     def range(self) -> float:
-        """Largest less smallest good sample."""
+        """Largest minus smallest good sample."""
         return float(np.ptp(self.values[self.good]))
 
 
 def refuse_other_quantities(channel: Channel) -> None:
-    """Raise EstimationError if the unit of a channel is that of a velocity, an acceleration or a force."""
+    """Raise EstimationError if a channel has the unit of a velocity, an acceleration or a force."""
     si = measured_unit(channel.unit).si
     if si in _OTHER_UNITS:
         raise EstimationError(

@@ -1,8 +1,8 @@
-"""Velocities of flights by regression splines: one-sided at both ends, with windows that suit the motion and its noise.
+"""Velocities of flights by regression splines, one-sided at both ends, with windows for the motion and its noise.
 
-Each flight has its own least-squares spline with knots one window apart, so that no impact is smoothed over and there
-are no end effects but the larger noise of one-sided derivatives. Values, slopes and integrals are linear or quadratic
-in the samples, and what the noise adds to the squares is known and subtracted.
+Each flight has its own least-squares spline with knots one window apart. So no impact is smoothed over, and the only
+end effect is the larger noise of one-sided derivatives. Values, slopes and integrals are linear or quadratic in the
+samples; the known contribution of the noise to squares is subtracted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vibroimpact.fmus.errors import EstimationError
 
 _DEGREE = 5
 _GAUSS_POINTS = 6
-# Windows tried, in periods of the fastest motion.
+# Windows to try, in periods of the fastest motion.
 _WINDOWS = (4.0, 2.0, 1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)
 _SAMPLES_PER_COEFFICIENT = 2.0
 _FLIGHTS_TRIED = 5
@@ -32,9 +32,9 @@ class Smoother:
 
     flight: Flight
     gain: Floats
-    """Shape (coefficient, sample)."""
+    """Map from samples to coefficients, shape (coefficient, sample)."""
     knots: Floats
-    """s, about the start of the flight."""
+    """Knots, s, from the start of the flight."""
 
     def row(self, time: Floats, order: int = 0) -> Floats:
         """Return the weights of the samples for the value, or a derivative, at times; shape (time, sample)."""
@@ -47,7 +47,7 @@ class Smoother:
         return weights
 
     def integration(self, start: float, end: float) -> tuple[Floats, Floats]:
-        """Return times and weights of an integral over a part of the flight that is exact for the spline's square."""
+        """Return times and weights of an integral over a part of the flight, exact for the spline's square."""
         inner = np.unique(self.knots) + self.flight.start
         edges = np.concatenate([[start], inner[(inner > start) & (inner < end)], [end]])
         node, weight = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
@@ -72,10 +72,10 @@ def choose_window(
 ) -> float:
     """Return the window (s) with the smallest mean square error of the slopes at the ends of flights.
 
-    The motion without noise says what a window smooths away: were it chosen from the samples, their noise would choose
-    the window that suits it, and no draw of other noise would show what that does to the answer. A `fine` window (s)
-    smooths nothing of the motion away, `fastest` is its highest angular frequency, rad/s, `noise` the standard
-    deviation. Flights with too few samples for a spline raise EstimationError.
+    The noiseless motion shows the error of smoothing. A choice by the samples would suit their own noise, and no draw
+    of other noise would show the effect on the answer. The `fine` window (s) leaves the motion unchanged; `fastest` is
+    the highest angular frequency of the motion, rad/s; `noise` is the standard deviation. EstimationError: flights
+    have too few samples for a spline.
     """
     tried = flights[:_FLIGHTS_TRIED]
     exact = [_end_slopes(smoother(motion, flight, fine)) @ motion.values[flight.index] for flight in tried]

@@ -1,8 +1,8 @@
 """Whole trajectories through impacts fitted to the samples: maximum likelihood for white noise.
 
-The record is cut at the deepest points of some flights into pieces of several impacts; each piece has its own start
-state, and all share the parameters. Within a piece the exact flow is followed from contact to contact. Pieces are as
-long as the motion allows: chaotic motion forgets its start after some impacts, periodic motion need not be cut.
+The record is cut at the deepest points of some flights into pieces of several impacts. Each piece has its own start
+state; all pieces share the parameters. Within a piece the exact flow is followed from contact to contact. Pieces are
+as long as the motion allows: chaotic motion forgets its start after some impacts, periodic motion needs no cut.
 """
 
 from __future__ import annotations
@@ -22,53 +22,53 @@ from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.core import motion, next_contact
 from vibroimpact.fmus.errors import EstimationError
 
-#: Impacts in a piece: the first of these that follows the samples within their noise.
+#: Numbers of impacts in a piece to try: the first number that follows the samples within their noise is used.
 SPANS = (12, 6, 3, 1)
-#: Most impacts that are fitted at once.
+#: Largest number of impacts fitted at once.
 MOST_IMPACTS = 60
-# Residual, over the noise of the single flights, above which a fit is not adequate, and above which it is refused.
+# Residual, over the noise of the single flights, above which a fit is inadequate, and above which it is refused.
 _ADEQUATE = 1.5
-_HOPELESS = 4.0
+_REFUSED = 4.0
 # Distance of the start from the samples, relative to the motion's size, above which no fit is tried.
 _NEAR = 0.1
 _STEP = 1e-7
-# Time between contacts, relative to the natural period, below which it is chatter, left to the body itself.
+# Time between contacts, relative to the natural period, below which chatter is left to the oscillator model.
 _CHATTER = 1e-5
 _FEWEST_IN_HEAD = 5
 _MOST_TRIALS = 20
-# Residual of a trial that is no oscillator, in ranges of the signal.
-_FAR = 1e3
-# Pieces with a residual above the typical one by more than this many standard errors are left out, up to this part.
+# Residual, in ranges of the signal, assigned to a trial that is no oscillator.
+_UNPHYSICAL_RESIDUAL = 1e3
+# Standard errors above the typical residual beyond which pieces are left out; largest share of pieces left out.
 _BEYOND_CHANCE = 5.0
-_MOST_ODD = 0.34
+_MOST_LEFT_OUT = 0.34
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Samples that are followed from one start state."""
+    """Samples followed from one start state."""
 
     index: NDArray[np.intp]
-    """The good samples, shape (sample,)."""
+    """Places of the good samples, shape (sample,)."""
     state: tuple[float, float]
-    """Displacement from the offset and velocity at the first of them."""
+    """Displacement from the offset, and velocity, at the first sample."""
     impacts: int
-    """Detected in it."""
+    """Number of impacts detected in the piece."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """What the fit found."""
+    """Result of the fit."""
 
     parameters: Parameters
     names: tuple[str, ...]
-    """Estimated, in the order of `covariance`."""
+    """Names of the estimated parameters, in the order of `covariance`."""
     covariance: Floats
     noise: float
     """Standard deviation of the residual."""
     adequate: bool
-    """The residual is not much larger than the noise of the single flights."""
+    """Whether the residual is not much larger than the noise of the single flights."""
     pieces: tuple[Piece, ...]
-    """With their fitted start states."""
+    """Pieces with their fitted start states."""
 
 
 def follow(
@@ -121,9 +121,9 @@ def residual_of(signal: Signal, piece: Piece, parameters: Parameters) -> Floats:
 def pieces_of(
     segmentation: Segmentation, fitted: Sequence[FittedFlight], parameters: Parameters, span: int
 ) -> list[Piece]:
-    """Cut the runs of fitted flights that follow each other at the deepest points of every `span`-th flight.
+    """Cut runs of consecutive fitted flights at the deepest points of every `span`-th flight.
 
-    Where a flight between was left out, an impact was not seen: nothing is followed through it.
+    A flight that was left out contains a missed impact: no piece continues through it.
     """
     pieces: list[Piece] = []
     for run in _runs(fitted):
@@ -134,7 +134,7 @@ def pieces_of(
 
 
 def _runs(fitted: Sequence[FittedFlight]) -> list[list[FittedFlight]]:
-    """Return the flights in groups of those that follow each other."""
+    """Return the flights in groups of consecutive flights."""
     runs: list[list[FittedFlight]] = []
     for one in fitted:
         if not runs or one.flight.first != runs[-1][-1].flight.first + 1 or len(runs[-1]) >= MOST_IMPACTS:
@@ -146,7 +146,7 @@ def _runs(fitted: Sequence[FittedFlight]) -> list[list[FittedFlight]]:
 def _cut(
     segmentation: Segmentation, run: list[FittedFlight], parameters: Parameters, span: int
 ) -> list[Piece]:
-    """Return the pieces of one run, with the motion before its first and after its last impact where there is any."""
+    """Return the pieces of one run, with the motion before the first and after the last impact if recorded."""
     signal, impacts = segmentation.signal, segmentation.impacts
     head = _head(signal, impacts[0].time, parameters) if run[0].flight.first == 0 else None
     cuts = [head or _state_at(signal, run[0], parameters, int(run[0].flight.index[0]))]
@@ -158,7 +158,7 @@ def _cut(
     last = run[-1].flight
     end = int(last.index[-1]) + 1
     if last.first + 2 == len(impacts):
-        # as long as a flight: in more, an impact may not have been seen
+        # the tail is as long as a flight: a longer one may contain a missed impact
         length = float(np.median([one.flight.duration for one in run]))
         end = int(np.searchsorted(signal.time, last.end + length))
         counts.append(len(impacts))
@@ -195,7 +195,7 @@ def deepest(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[
 def _head(
     signal: Signal, first_impact: float, parameters: Parameters
 ) -> tuple[int, tuple[float, float]] | None:
-    """Return a start before the first impact, None where there are too few samples."""
+    """Return a start before the first impact; None where there are too few samples."""
     index = np.flatnonzero(signal.good & (signal.time < first_impact))
     if len(index) < _FEWEST_IN_HEAD:
         return None
@@ -217,8 +217,8 @@ def fit_trajectory(
 ) -> Trajectory:
     """Fit the free parameters and start states to all samples; raise EstimationError if no pieces follow the model.
 
-    Fitted flights give the start states, `start` start values and what is held; `noise`, that of single flights, is
-    what the fit is judged by.
+    `fitted` flights give the start states, `start` the start values and the held values. The fit is judged by `noise`,
+    the noise of single flights.
     """
     signal = segmentation.signal
     size = 0.5 * signal.range
@@ -233,15 +233,15 @@ def fit_trajectory(
         if span > SPANS[-1] and problem.distance() > _NEAR * size:
             continue
         trial = problem.solve(noise)
-        odd = _misfits(signal, trial)
-        if odd and len(odd) <= _MOST_ODD * len(pieces):
-            kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
+        outlying = _misfits(signal, trial)
+        if outlying and len(outlying) <= _MOST_LEFT_OUT * len(pieces):
+            kept = [piece for k, piece in enumerate(trial.pieces) if k not in outlying]
             trial = PathProblem(signal, kept, trial.parameters, tuple(free), size).solve(noise)
         if best is None or trial.noise < best.noise:
             best = trial
         if trial.adequate:
             return trial
-    if best is None or best.noise > _HOPELESS * noise + 1e-9 * size:
+    if best is None or best.noise > _REFUSED * noise + 1e-9 * size:
         residual = math.inf if best is None else best.noise
         raise EstimationError(
             f"trajectory: expected rests of the size of the noise ({noise:.3g}), got {residual:.3g}. The model of one "
@@ -251,7 +251,7 @@ def fit_trajectory(
 
 
 def _scales(coordinates: Coordinates, size: float) -> list[float]:
-    """Return the sizes of changes of linear coordinates, for motion of a size."""
+    """Return the typical changes of linear coordinates, for motion of this size."""
     start = coordinates.held
     square = start.natural_frequency**2
     sizes = {
@@ -268,8 +268,8 @@ def _scales(coordinates: Coordinates, size: float) -> list[float]:
 class PathProblem:
     """The least-squares problem: linear coordinates of the free parameters, then place and velocity of each piece.
 
-    Changes are counted in parts of the size of the motion, in its unit. `start` has start values, and the values of
-    what is held.
+    Changes are counted in shares of the size of the motion, in its unit. `start` has the start values and the held
+    values.
     """
 
     def __init__(
@@ -291,13 +291,13 @@ class PathProblem:
         self.rows = np.cumsum([0, *(len(piece.index) for piece in pieces)])
 
     def parameters(self, x: Floats) -> Parameters | None:
-        """Return the parameters; None where they are those of no oscillator."""
+        """Return the parameters; None where they describe no oscillator."""
         values = self.origin + self.scale * x
         found = self.coordinates.parameters(values[: len(self.names)])
         return None if found is None or found.damping_ratio < 0.0 else found
 
     def piece(self, x: Floats, k: int, parameters: Parameters) -> Piece:
-        """Return a piece with the start state that the unknowns give it."""
+        """Return a piece with its start state from the unknowns."""
         first = len(self.names) + 2 * k
         place, speed = (self.origin + self.scale * x)[first : first + 2]
         return replace(self.pieces[k], state=(float(place) - parameters.offset, float(speed)))
@@ -306,8 +306,8 @@ class PathProblem:
         """Return samples minus trajectories of all pieces."""
         parameters = self.parameters(x)
         if parameters is None:
-            # so bad a trial makes the search take a shorter step
-            return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
+            # the large residual makes the search shorten its step
+            return np.full(self.rows[-1], _UNPHYSICAL_RESIDUAL * float(np.ptp(self.signal.values)))
         pieces = [self.piece(x, k, parameters) for k in range(len(self.pieces))]
         return np.concatenate([residual_of(self.signal, piece, parameters) for piece in pieces])
 
@@ -316,7 +316,7 @@ class PathProblem:
         return float(np.sqrt(np.mean(self.residual(np.zeros(len(self.origin))) ** 2)))
 
     def jacobian(self, x: Floats) -> Floats:
-        """Return differences; a piece's start state moves that piece only."""
+        """Return derivatives by differences; the start state of a piece moves only this piece."""
         jacobian = np.zeros((self.rows[-1], len(x)))
         base = self.residual(x)
         for j in range(len(x)):
@@ -324,7 +324,7 @@ class PathProblem:
             moved[j] += _STEP
             parameters = self.parameters(moved)
             if parameters is None:
-                # at the edge of what is an oscillator, which the search does not cross
+                # the search does not cross the boundary of oscillator parameters
                 continue
             shared = j < len(self.names)
             for k in range(len(self.pieces)) if shared else [(j - len(self.names)) // 2]:
@@ -334,7 +334,7 @@ class PathProblem:
         return jacobian
 
     def solve(self, noise: float) -> Trajectory:
-        """Return the least squares from the start on."""
+        """Return the least-squares solution, searched from the start."""
         from scipy.optimize import least_squares
 
         unit = max(noise, 1e-300)
@@ -370,7 +370,7 @@ class PathProblem:
 
 
 def _misfits(signal: Signal, trajectory: Trajectory) -> list[int]:
-    """Return the pieces whose residuals are larger than those of the typical piece, beyond chance."""
+    """Return the pieces whose residuals exceed those of the typical piece by more than chance."""
     residuals = [residual_of(signal, piece, trajectory.parameters) for piece in trajectory.pieces]
     squares = np.array([float(np.mean(one**2)) for one in residuals])
     counts = np.array([len(one) for one in residuals])

@@ -4,10 +4,10 @@ On one flight, with test functions w_k that vanish at both ends with all derivat
 
     int y w_k'' - 2 zeta wn int y w_k' + wn^2 (int (y - y0) w_k - y_st int w_k cos(Omega t + psi)) = 0
 
-holds for the exact motion, whatever the impacts at its ends are. With samples y of noise sigma the left sides have the
-covariance sigma^2 G, G = L L', L the weights of the samples. Their G-weighted least squares is the maximum of the
-likelihood of the flights: more test functions never hurt, and the noise in the columns (errors in variables), which
-biases the plain linear least squares, does not bias it to first order.
+holds for the exact motion, whatever the impacts at its ends. With samples y of noise sigma, the left sides have the
+covariance sigma^2 G, with G = L L' and the weights L of the samples. The G-weighted least squares is the maximum of the
+likelihood of the flights, so more test functions never hurt. Noise in the columns (errors in variables) biases the
+plain linear least squares; it does not bias this one to first order.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from vibroimpact.analysis.estimation.segments import Flight
 from vibroimpact.analysis.estimation.signals import Signal
 from vibroimpact.fmus.errors import EstimationError
 
-#: Power of s (1 - s) in the test functions: high enough for sums of samples to be integrals.
+#: Power of s (1 - s) in the test functions: high enough for sums of samples to be accurate integrals.
 POWER = 5
-# Test functions on each flight: the fewest, more for each radian of the fastest motion ...
+# Test functions on each flight: the smallest number, and the number for each radian of the fastest motion ...
 _FEWEST_FUNCTIONS, _FUNCTIONS_PER_RADIAN = 3, 1.0
 # ... and at most one for this many samples.
 _SAMPLES_PER_FUNCTION = 4
 # Eigenvalue of G, relative to the largest, below which a test function is a sum of the others.
 _DEPENDENT = 1e-8
-# Singular value of the Jacobian, relative to the largest, below which the parameters cannot be told apart.
+# Singular value of the Jacobian, relative to the largest, below which the parameters are not separable.
 _SINGULAR = 1e-9
 # Probability of a larger misfit by noise alone, below which a flight does not follow the model.
-_SELDOM = 1e-4
-# Relative uncertainty of the noise variance, by which the limit of the misfit is raised.
-_NOISE_DOUBT = 1.2
-# Each round drops the worst flights, this part of them, until all follow the model or only so few are left.
+_REJECTION = 1e-4
+# Factor on the limit of the misfit, for the uncertainty of the noise variance.
+_NOISE_MARGIN = 1.2
+# Share of the flights dropped in a round, the worst, until all follow the model; smallest share that is kept.
 _LEFT_OUT = 0.25
 _FEWEST_KEPT = 0.2
 _FUNCTIONS_OF_START = 3
 # Parameters whose coordinates are the unknowns of the linear system, in its order.
 _LINEAR = ("damping_ratio", "natural_frequency", "static_deflection", "phase", "offset")
-# Natural frequencies, over that of the force, from which the search starts.
+# Natural frequencies, over the frequency of the force, from which the search starts.
 _RATIOS_OF_START = tuple(np.geomspace(0.1, 2.5, 24).tolist())
 _MOST_CLOCKS = 500
 # Relative error of the sums of samples as integrals.
@@ -60,13 +60,13 @@ class WeightedFlight:
     time: Floats
     values: Floats
     weights: Floats
-    """Of the samples in the integrals with w, w' and w''; shape (3, function, sample)."""
+    """Weights of the samples in the integrals with w, w' and w''; shape (3, function, sample)."""
 
 
 def weighted(time: Floats, values: Floats, functions: int, power: int = POWER) -> WeightedFlight:
     """Return a flight with its test functions s^p (1-s)^p Legendre_k(2 s - 1), s from 0 to 1 over its samples.
 
-    Integrals are sums by the trapezoidal rule, exact to the order of `power`, 3 at least; time is in s.
+    Integrals are trapezoidal sums, exact to the order of `power`, at least 3; time is in s.
     """
     length = float(time[-1] - time[0])
     s = (time - time[0]) / length
@@ -103,12 +103,12 @@ def _functions(s: Floats, functions: int, power: int) -> Floats:
 
 
 def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) -> list[WeightedFlight]:
-    """Return the usable flights with their test functions: more of them on flights that are long and well sampled."""
+    """Return the usable flights with their test functions, more of them on long and well-sampled flights."""
     found = []
     for flight in flights:
         if flight.usable:
-            wanted = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * flight.duration)
-            functions = max(2, min(wanted, len(flight.index) // _SAMPLES_PER_FUNCTION))
+            needed = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * flight.duration)
+            functions = max(2, min(needed, len(flight.index) // _SAMPLES_PER_FUNCTION))
             found.append(weighted(signal.time[flight.index], signal.values[flight.index], functions))
     return found
 
@@ -116,7 +116,7 @@ def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) 
 def linear_estimate(flights: Sequence[WeightedFlight], known: Parameters, free: Sequence[str]) -> Parameters:
     """Return the plain linear least squares of the weak form: the start of `weak_form`.
 
-    The free are some of damping_ratio, natural_frequency, static_deflection, phase, offset; all others are known.
+    `free` are some of damping_ratio, natural_frequency, static_deflection, phase, offset; all others are known.
     """
     columns, target = _linear_system(flights, known, free)
     scale = np.linalg.norm(columns, axis=0)
@@ -129,13 +129,13 @@ def linear_estimate(flights: Sequence[WeightedFlight], known: Parameters, free: 
 def _linear_system(
     flights: Sequence[WeightedFlight], known: Parameters, free: Sequence[str]
 ) -> tuple[Floats, Floats]:
-    """Return columns for (2 zeta wn, wn^2, wn^2 y_st (cos psi, sin psi), wn^2 y0) as far as free, and their target."""
+    """Return the free columns of (2 zeta wn, wn^2, wn^2 y_st (cos psi, sin psi), wn^2 y0), and their target."""
     stiffness = known.natural_frequency**2
     drag = 2.0 * known.damping_ratio * known.natural_frequency
     wave_free = "static_deflection" in free or "phase" in free
     blocks, targets = [], []
     for whole in flights:
-        # the lowest functions only: unweighted, the highest would count most
+        # only the lowest functions: unweighted, the highest functions would count most
         flight = WeightedFlight(whole.time, whole.values, whole.weights[:, : _FUNCTIONS_OF_START + len(free)])
         plain, first, second = flight.weights @ flight.values
         angle = known.angular_frequency * flight.time
@@ -167,9 +167,9 @@ def _linear_system(
 
 def _from_linear(solution: Floats, known: Parameters, free: Sequence[str]) -> Parameters:
     """Return parameters from the solution of the linear system, whose unknowns are their coordinates."""
-    # a free phase has two columns, those of amplitude and phase
-    asked = {*free, "static_deflection"} if "phase" in free else set(free)
-    names = [name for name in _LINEAR if name in asked]
+    # a free phase has two columns, for amplitude and phase
+    unknowns = {*free, "static_deflection"} if "phase" in free else set(free)
+    names = [name for name in _LINEAR if name in unknowns]
     found = Coordinates(tuple(names), known).parameters(solution)
     if found is None:
         square = dict(zip(names, solution, strict=True)).get("natural_frequency", known.natural_frequency**2)
@@ -185,8 +185,8 @@ def weak_form(
 ) -> tuple[Parameters, Floats]:
     """Return the G-weighted least squares of the weak form, and the mean square of each flight's whitened residuals.
 
-    `start` also holds what is not free. No flights, fewer equations than unknowns, or data that do not determine them
-    raise EstimationError.
+    `start` also has the values of all other parameters. EstimationError: there are no flights, fewer equations than
+    unknowns, or data that do not determine the unknowns.
     """
     from scipy.optimize import least_squares
 
@@ -219,10 +219,10 @@ def weak_form(
 def robust_weak_form(
     flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], noise: float
 ) -> tuple[Parameters, list[int]]:
-    """Return the weak form over the flights that follow the model, and their places among all.
+    """Return the weak form over the flights that follow the model, and their places among all flights.
 
-    A flight with an impact that was not seen does not follow. The worst are left out until the misfit of all others is
-    that of noise; then all flights are judged once more. The noise is the standard deviation, from the samples alone.
+    A flight with a missed impact does not follow. The worst flights are left out until the misfit of all others is
+    noise; then all flights are judged once more. `noise` is the standard deviation, from the samples alone.
     """
     kept = list(range(len(flights)))
     fewest = max(1, math.ceil(_FEWEST_KEPT * len(flights)))
@@ -230,7 +230,7 @@ def robust_weak_form(
     limits = _misfit_limits(flights)
 
     def better(misfit: Floats) -> list[int]:
-        """Return the flights that are kept: those within the limits, and at least the better part."""
+        """Return the flights to keep: flights within the limits, and at least the better share."""
         count = max(fewest, min(len(kept) - 1, math.ceil((1.0 - _LEFT_OUT) * len(kept))))
         good = set(np.argsort(misfit)[:count].tolist())
         good |= set(np.flatnonzero(misfit <= smallest * limits[kept]).tolist())
@@ -256,21 +256,21 @@ def robust_weak_form(
 
 
 def _misfit_limits(flights: Sequence[WeightedFlight]) -> Floats:
-    """Return the largest mean square of whitened residuals that noise of unit variance gives, for each flight."""
+    """Return the largest mean square of whitened residuals from noise of unit variance, for each flight."""
     from scipy.stats import chi2
 
     ranks = np.array([flight.weights.shape[1] for flight in flights])
-    limits: Floats = _NOISE_DOUBT * chi2.isf(_SELDOM, ranks) / ranks
+    limits: Floats = _NOISE_MARGIN * chi2.isf(_REJECTION, ranks) / ranks
     return limits
 
 
 def _nearest_start(
     flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], ratios: Sequence[float] = ()
 ) -> Parameters:
-    """Return the start that most flights are nearest to: as given, linear, or linear at a held natural frequency.
+    """Return the start nearest to most flights: as given, linear, or linear at a held natural frequency.
 
-    Noise biases the plain linear stiffness, at many samples in a period down to below zero. The ratios are natural
-    frequencies to try, over that of the force.
+    Noise biases the plain linear stiffness, with many samples in a period even below zero. `ratios` are natural
+    frequencies to try, over the frequency of the force.
     """
     linear = [name for name in free if name != "angular_frequency"]
     if not linear:
@@ -287,7 +287,7 @@ def _nearest_start(
 
 
 def _scales(start: Parameters, free: Sequence[str]) -> Floats:
-    """Return a size for each parameter, so that the unknowns of the search are of one size."""
+    """Return a size for each parameter, so that all unknowns of the search have one size."""
     size = {
         "damping_ratio": 0.1,
         "natural_frequency": 0.1 * start.natural_frequency,
@@ -322,7 +322,7 @@ class _Stacked:
             self.pad[j, k:] = 1.0
         self.ranks = functions - self.pad.sum(axis=1)
         self.rows = int(self.ranks.sum())
-        # all products of weights that G is made of, and the integrals of the samples
+        # all products of weights for G, and the integrals of the samples
         self.products = np.einsum("ajkn,bjln->abjkl", self.weights, self.weights)
         self.integrals = np.einsum("ajkn,jn->ajk", self.weights, self.values)
         self.ones = self.weights[0].sum(axis=2)
@@ -355,7 +355,7 @@ class _Stacked:
 def with_own_clock(
     flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], spread: float = 5e-3
 ) -> Parameters:
-    """Return the start with the angular frequency near its own that the flights fit best, by a scan.
+    """Return the start with the angular frequency that the flights fit best, scanned near its own.
 
     Over a long record a slightly wrong clock puts the force out of phase; steps are a quarter radian over the record.
     """

@@ -1,4 +1,4 @@
-"""Figures for one journal column: sweeps, single runs, recordings, replays, estimates, what accuracy costs.
+"""Figures for one journal column: sweeps, single runs, recordings, replays, estimates, cost of accuracy.
 
 The only package that imports matplotlib; it draws without a display.
 """
@@ -57,21 +57,21 @@ def draw(
     width: float | None = None,
     height: float | None = None,
 ) -> Figure:
-    """Draw what a file of this package holds; `vibroimpact plot` does the same with options of these names.
+    """Draw the contents of a file of this package; `vibroimpact plot` does the same with options of these names.
 
     Parameters
     ----------
     data : xarray.Dataset, Recording, or a result with a dataset
-        As `open_dataset` gives a dataset, `open_measured` what an analysis found or a benchmark measured,
-        `open_recording` a recording, `find_orbits` orbits, `classify` classes; what any function of `vi` returns.
+        Data in memory: `open_dataset` gives a dataset of runs, `open_measured` results of an analysis or a benchmark,
+        `open_recording` a recording, `find_orbits` orbits, `classify` classes. Results of any function of `vi` fit.
     kind : str
-        `auto`, or one of `KINDS`. Auto draws of a dataset of runs a single run where nothing is swept or a run is
-        named, else a bifurcation diagram, or colour maps over two swept parameters; of a campaign of replays its
-        scores; of all else what its analysis found.
+        `auto`, or one of `KINDS`. For a dataset of runs, auto draws one run where nothing is swept or a run is named. A
+        sweep becomes a bifurcation diagram, two swept parameters become colour maps, a campaign of replays its scores.
+        All other data have a figure of their own.
     run : int, optional
         `run_index` of the run to draw.
     recording : str, optional
-        Of a replay: the file of a recording, or the name of a comparison.
+        Which comparison of a replay: the file of its recording, or its name.
     start, stop : float, optional
         Window of time, s (`--from`, `--to`).
     periods : float, optional
@@ -79,14 +79,14 @@ def draw(
     over : xarray.Dataset, optional
         Another sweep of the same parameter, drawn below this one: a measured sweep over the simulated one.
     segment : int, optional
-        Of a density: samples of a segment, a power of two.
+        Samples of a segment for a density, a power of two.
     variable : str, optional
-        Of a bifurcation diagram and of branches: what is drawn over the swept parameter, such as `displacement_max`,
-        `strobe_displacement` or `impact_phase`. Default: displacement range and impact velocity.
+        Variable of a bifurcation diagram or of branches, over the swept parameter: `displacement_max`,
+        `strobe_displacement`, `impact_phase` and others. Default: displacement range and impact velocity.
     title : str, optional
-        Above the figure. Default: none, as journals want it; of a ladder that of its dataset. "" is none.
+        Text above the figure. Default: none, as journals want it; a ladder has the title of its dataset. "": none.
     width, height : float, optional
-        mm. Default: one column (85 mm), and what the panels need.
+        mm. Default: one column (85 mm), and the height that the panels need.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def draw(
     Raises
     ------
     DatasetError
-        If the data does not hold what the figure shows; with what fits.
+        If the data lack variables of this figure; the message names the kinds that fit.
     UsageError
         If an option does not apply, the window is empty or the size too small.
 
@@ -126,7 +126,7 @@ def draw_into(
     segment: int | None = None,
     variable: str | None = None,
 ) -> T:
-    """Draw into axes that there are already, in the style that they have, and return them.
+    """Draw into existing axes, in their own style, and return them.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def draw_into(
     Raises
     ------
     DatasetError
-        If the data does not hold what the figure shows; with what fits.
+        If the data lack variables of this figure; the message names the kinds that fit.
     UsageError
-        If an option does not apply, the window is empty, or the number of axes is not that of the panels.
+        If an option does not apply, the window is empty, or the number of axes differs from the number of panels.
 
     Examples
     --------

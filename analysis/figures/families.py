@@ -1,4 +1,4 @@
-"""Families of data that are drawn. A module of drawings registers its family: words, drawings, and the usual one."""
+"""Families of data with figures. A module of drawings registers its family: words, drawings, and the default one."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.window import View
 
 FIRST = ("runs", "recordings")
-"""Modules whose families are listed first: those of what is no result of an analysis."""
+"""Modules whose families are listed first: families that are no results of an analysis."""
 ROOMS = ("motion", "sweep", "measured", "study", "orbits")
-"""Rooms of modules that draw, in the order in which kinds of figures are listed."""
+"""Packages of modules that draw, in the order in which kinds of figures are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,32 +23,32 @@ class Drawing:
     """A kind of figure of one family of data."""
 
     draw: Callable[[Any, View], Figure]
-    """Draws data, or raises a DatasetError where they do not hold what the figure shows."""
+    """Draws data; raises DatasetError where they lack variables of the figure."""
     fits: Callable[[Any], bool] = lambda data: True
-    """Whether data hold what the figure shows."""
+    """Whether data have the variables of the figure."""
     takes: tuple[str, ...] = ()
     """Options: `run`, `recording`, `window`, `over`, `segment`, `variable`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Data that are drawn alike."""
+    """Data with the same kinds of figures."""
 
     name: str
-    """Name; of results it is their attribute `results_kind`."""
+    """Name; for results it is their attribute `results_kind`."""
     words: str
-    """What messages call such data."""
+    """Name of such data in messages."""
     drawings: Mapping[str, Drawing]
-    """By the kind of figure."""
+    """Drawings by the kind of figure."""
     usual: str | Callable[[Any, View], str] = ""
-    """The kind of figure that says most, or returns it of data in a view; by default the first."""
+    """Default kind of figure, or a function that returns it for data in a view; by default the first kind."""
     type: type | None = None
-    """Objects that are of this family, where it is none of results."""
+    """Type of the objects of this family, where they are no datasets."""
     is_of_results: bool = True
     """Whether the attribute `results_kind` of a dataset names this family."""
 
     def usual_kind(self, data: Any, view: View) -> str:
-        """Return the kind of figure that says most of data."""
+        """Return the default kind of figure for data."""
         usual = self.usual or next(iter(self.drawings))
         return usual if isinstance(usual, str) else usual(data, view)
 
@@ -58,28 +58,28 @@ class Family:
 
 
 FAMILIES: dict[str, Family] = {}
-"""By their names."""
+"""All families by their names."""
 
 
 def register(family: Family) -> None:
-    """Take a family up; a second one of its name raises ValueError."""
+    """Add a family; a second family of the same name raises ValueError."""
     if family.name in FAMILIES:
         raise ValueError(f"figure: {family.name}: expected a family of another name, got one twice.")
     FAMILIES[family.name] = family
 
 
 def register_results(name: str, words: str, draw: Callable[[Any], Figure], kind: str = "") -> None:
-    """Take up results with one kind of figure, which has their name unless it is said, and no options."""
+    """Add results with one kind of figure (named like the results, unless given) and no options."""
     register(Family(name, words, {kind or name: Drawing(whole(draw))}))
 
 
 def whole(draw: Callable[[Any], Figure]) -> Callable[[Any, View], Figure]:
-    """Return what draws data whatever the view is."""
+    """Return a drawing that ignores the view."""
     return lambda data, view: draw(data)
 
 
 def load_families() -> None:
-    """Import every module that draws: each registers its families."""
+    """Import every module that draws; each module registers its families."""
     package = __name__.rpartition(".")[0]
     for name in FIRST:
         importlib.import_module(f"{package}.{name}")

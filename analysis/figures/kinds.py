@@ -1,4 +1,4 @@
-"""The kinds of figures: which one data are drawn as, and what is refused."""
+"""The kinds of figures: the choice for given data, and the checks of options."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Result(Protocol):
 
 
 Data = xr.Dataset | Recording | Result
-# More values than this are told by their ends.
+# Number of values above which a message names only the first and the last one.
 _MOST_LISTED = 6
 
 load_families()
@@ -34,7 +34,7 @@ KINDS = tuple(dict.fromkeys(kind for family in FAMILIES.values() for kind in fam
 
 
 def draw_view(data: Data, kind: str, view: View) -> Figure:
-    """Draw data as a kind of figure, or refuse it in one line that says what fits.
+    """Draw data as a kind of figure, or refuse it in one line that names the kinds that fit.
 
     DatasetError: the kind does not fit the data, or there is no such run or recording. UsageError: the kind is unknown,
     or takes no such option.
@@ -75,7 +75,7 @@ def _dataset_of(data: Any) -> Any:
 
 
 def _family(data: Any) -> Family:
-    """Return the family of data: it decides which kinds there are."""
+    """Return the family of data, which decides the available kinds."""
     for family in FAMILIES.values():
         if family.type is not None and isinstance(data, family.type):
             return family
@@ -102,7 +102,7 @@ def _family(data: Any) -> Family:
 
 
 def _refuse_options(data: Any, family: Family, kind: str, view: View) -> None:
-    """Refuse options that a kind does not take: what is asked for is never left out."""
+    """Raise UsageError for options that a kind does not take: no option is silently ignored."""
     for name, is_given in (
         ("run", view.run is not None),
         ("recording", view.recording is not None),
@@ -123,7 +123,7 @@ def _refuse_options(data: Any, family: Family, kind: str, view: View) -> None:
 
 
 def _refuse_run(dataset: Any, family: Family, kind: str, run: int | None) -> None:
-    """Refuse a run that is not there, and no run where one of several must be named."""
+    """Refuse a run that does not exist, and a missing choice where one of several runs must be named."""
     there = np.unique(dataset["run_index"].values)
     there = there[there >= 0]
     if there.size <= _MOST_LISTED:
@@ -136,7 +136,7 @@ def _refuse_run(dataset: Any, family: Family, kind: str, run: int | None) -> Non
         raise DatasetError(
             f"figure: run: expected one run of those there are ({listed}), got none of run_index {run}."
         )
-    # a window of time is one of a single run
+    # a window of time needs a single run
     drawing = family.drawings[kind]
     if "window" in drawing.takes and run is None and there.size > 1:
         if not drawing.fits(dataset):

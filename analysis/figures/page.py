@@ -1,4 +1,4 @@
-"""The page all figures share: one journal column wide, its style, its labels, and how a figure is saved."""
+"""The page of all figures: one journal column wide, its style, its labels, and the writing of figures."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _MM = 1 / 25.4
 COLUMN_WIDTH = 85 * _MM
 _DPI, _SCREEN_DPI = 300, 150
 _SMALLEST, _LARGEST = 20, 1000
-"""mm: of a side of a figure."""
+"""Limits of the side of a figure, mm."""
 LINE = "#20567D"
 MARK = "#D55E00"
 STOP = "0.45"
-# Told apart with every kind of colour vision (Okabe and Ito).
+# Distinguishable with every kind of colour vision (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 STOP_LINE: dict[str, Any] = {"color": STOP, "linestyle": "--", "linewidth": 0.6, "zorder": 0}
 
@@ -45,7 +45,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     UsageError
-        If the ending is none of these.
+        If the ending is another one.
     OSError
         If the file cannot be written.
     """
@@ -61,9 +61,9 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 
 
 def laid_out(figure: Figure, title: str | None, width: float | None, height: float | None) -> Figure:
-    """Return a figure with a title and a size (mm); None leaves what it has.
+    """Return a figure with a title and a size (mm); None keeps the present one.
 
-    Panels without room, or a title with a formula that cannot be set, raise UsageError.
+    UsageError: panels have no room, or the title has a formula that cannot be set.
     """
     if title is not None:
         figure.suptitle(title, fontsize=8, wrap=True)
@@ -75,9 +75,9 @@ def laid_out(figure: Figure, title: str | None, width: float | None, height: flo
             old if given is None else given * _MM
             for given, old in zip((width, height), figure.get_size_inches(), strict=True)
         ]
-        asked = " x ".join(f"{inches / _MM:.4g}" for inches in size)
+        in_mm = " x ".join(f"{inches / _MM:.4g}" for inches in size)
         if not all(_SMALLEST <= inches / _MM <= _LARGEST for inches in size):
-            raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {asked} mm.")
+            raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {in_mm} mm.")
         figure.set_size_inches(size[0], size[1])
     if title or width is not None or height is not None:
         _refuse_undrawable(figure, title)
@@ -85,9 +85,9 @@ def laid_out(figure: Figure, title: str | None, width: float | None, height: flo
 
 
 def _refuse_undrawable(figure: Figure, title: str | None) -> None:
-    """Refuse a size without room for the panels and a title whose formula cannot be set: both show only in drawing."""
+    """Raise UsageError if panels lack room or the title's formula cannot be set; both show only in drawing."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of letters that the font does not have
+        warnings.simplefilter("ignore")  # about letters that the font lacks
         warnings.filterwarnings("error", message="constrained_layout not applied")
         try:
             figure.draw_without_rendering()
@@ -115,7 +115,7 @@ def label(variable: xr.DataArray) -> str:
 
 
 def title(variable: xr.DataArray) -> str:
-    """Return what to call a variable: the name its component gives it, or its own name in words."""
+    """Return the title of a variable: its name in its component, or its own name in words."""
     return str(variable.attrs.get("component_variable") or str(variable.name).replace("_", " "))
 
 
@@ -125,7 +125,7 @@ def unit_symbol(variable: xr.DataArray) -> str:
 
 
 def legend_above(axis: Axes, side: str = "left", *, ncols: int = 3, **options: Any) -> None:
-    """Name the lines of a panel in rows above it, where no data can be: on the left, in the center or on the right."""
+    """Name the lines of a panel in rows above it, outside the data: on the left, in the center or on the right."""
     usual: dict[str, Any] = {"loc": f"lower {side}", "columnspacing": 1.0, "handlelength": 1.5}
     axis.legend(
         bbox_to_anchor=({"left": 0.0, "center": 0.5, "right": 1.0}[side], 1.0),
@@ -137,7 +137,7 @@ def legend_above(axis: Axes, side: str = "left", *, ncols: int = 3, **options: A
 
 
 def legend_outside(figure: Figure, axis: Axes, **options: Any) -> None:
-    """Name the lines of a panel above all panels, where no data can be: each name once."""
+    """Name the lines of a panel above all panels, outside the data: each name once."""
     handles, labels = axis.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
     if entries:
@@ -145,12 +145,12 @@ def legend_outside(figure: Figure, axis: Axes, **options: Any) -> None:
 
 
 _GIVEN: ContextVar[list[Axes] | None] = ContextVar("axes that were given", default=None)
-"""Where `canvas` draws, in place of a figure of its own."""
+"""Axes in which `canvas` draws, instead of a figure of its own."""
 
 
 @contextmanager
 def drawing_into(axes: list[Axes]) -> Iterator[None]:
-    """Let whatever is drawn meanwhile go into these axes."""
+    """Direct all drawing inside the context into these axes."""
     token = _GIVEN.set(axes)
     try:
         yield
@@ -159,7 +159,7 @@ def drawing_into(axes: list[Axes]) -> Iterator[None]:
 
 
 class Page(Figure):
-    """A figure of this package: a notebook shows it, whether pyplot is loaded or not."""
+    """A figure of this package: a notebook shows it, with or without pyplot."""
 
     def _repr_png_(self) -> bytes:
         content = io.BytesIO()
@@ -169,14 +169,14 @@ class Page(Figure):
 
 
 class _GivenAxes(Figure):
-    """Stands for the figure of a drawing whose panels are axes of somebody else's figure."""
+    """Replaces the figure of a drawing whose panels are axes of another program's figure."""
 
     def __init__(self, axes: list[Axes]) -> None:
         super().__init__()
         self._given = axes
 
     def subplots(self, nrows: int = 1, ncols: int = 1, *, squeeze: bool = True, **_others: Any) -> Any:
-        """Return the given axes in the shape that is asked for; what they share and how high they are stays."""
+        """Return the given axes in the requested shape; their shared axes and heights stay."""
         if len(self._given) != nrows * ncols:
             raise UsageError(
                 f"figure: axes: expected {nrows * ncols} for the panels of this figure, got {len(self._given)}."
@@ -185,7 +185,7 @@ class _GivenAxes(Figure):
         return np.squeeze(panels)[()] if squeeze else panels
 
     def subfigures(self, *_sizes: Any, **_others: Any) -> Any:
-        """Refuse: parts with panels of their own are not axes."""
+        """Raise UsageError: subfigures are not axes."""
         raise UsageError(
             "figure: axes: expected a kind whose panels are axes, got one that is made of parts. Use draw."
         )
@@ -197,7 +197,7 @@ class _GivenAxes(Figure):
         return first.legend(*(entries or first.get_legend_handles_labels()), **options)
 
     def suptitle(self, t: str, **options: Any) -> Any:
-        """Leave the title to whose figure it is."""
+        """Leave the title to the owner of the figure."""
         return self._given[0].title
 
     def align_ylabels(self, axs: Any = None) -> None:
@@ -205,7 +205,7 @@ class _GivenAxes(Figure):
 
 
 def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:
-    """Return an empty figure that needs no display; or what stands for axes that were given, see `drawing_into`."""
+    """Return an empty figure that needs no display, or the replacement for given axes, see `drawing_into`."""
     given = _GIVEN.get()
     if given is not None:
         return _GivenAxes(given)

@@ -1,4 +1,4 @@
-"""The figures of recordings, and of replays of them."""
+"""The families of recordings and of replays, with their figures."""
 
 from __future__ import annotations
 

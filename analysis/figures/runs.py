@@ -1,4 +1,4 @@
-"""The figures of datasets of runs, and which of them says most."""
+"""The family of datasets of runs, with its figures and the choice of the default one."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _draw_sweep(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def _usual(data: xr.Dataset, view: View) -> str:
-    """Return the kind that says most of a dataset of runs."""
+    """Return the default kind of figure for a dataset of runs."""
     swept = varied(data)
     for column, kind in ((BRANCH, "branches"), (CLASS_KIND, "classes")):
         if column in data and view.run is None and swept:

@@ -1,6 +1,6 @@
-"""What the text of the scene says of a figure: its stops, its forcing, the order of its keys.
+"""Facts of the scene's text for figures: stops, forcing, order of keys.
 
-The text is provenance: it may be missing or of another version, and a figure without what it says is still right.
+The text is provenance: it may be missing or of another version, and a figure without these facts is still right.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ class ShownStop(NamedTuple):
 
 
 def table(scene: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a table of a scene, empty where it has none of that name."""
+    """Return a table of a scene; empty where the scene lacks it."""
     found = scene.get(name)
     return found if isinstance(found, dict) else {}
 
 
 def swept_keys(scene: dict[str, Any]) -> list[str]:
-    """Return the swept keys as the scene lists them."""
+    """Return the swept keys in the order of the scene."""
     return list(table(scene, "sweep"))
 
 
 def column_of(key: str, names: Sequence[str]) -> str | None:
-    """Return the coordinate of a swept key: the whole key where its last part is that of another too."""
+    """Return the coordinate of a swept key: the whole key if another key has the same last part."""
     written = re.sub(r"\W+", "_", key).strip("_")
     return max((name for name in names if f"_{written}".endswith(f"_{name}")), key=len, default=None)
 
 
 def stops(dataset: xr.Dataset) -> list[ShownStop]:
-    """Return the stops of the scene; none where their places were swept or are not known."""
+    """Return the stops of the scene; empty where their positions were swept or are unknown."""
     scene = scene_of(dataset.attrs)
     if any(key.endswith((".position", ".side", ".location", ".mass")) for key in swept_keys(scene)):
         return []
@@ -54,7 +54,7 @@ def stops(dataset: xr.Dataset) -> list[ShownStop]:
 
 
 def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
-    """Return one stop; points are masses of a chain, places on a beam."""
+    """Return one stop; its point is a mass of a chain, or a place on a beam."""
     point: float | None = None
     if body.get("kind") == "chain":
         point = written.get("mass", len(body["masses"]))
@@ -64,7 +64,7 @@ def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
 
 
 def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
-    """Return the stops that limit the point whose displacement is recorded."""
+    """Return the stops that limit the point of the recorded displacement."""
     found = stops(dataset)
     scene = scene_of(dataset.attrs)
     body, first = table(scene, "body"), found[0].point if found else None
@@ -93,7 +93,7 @@ def limits(dataset: xr.Dataset, name: str) -> list[float]:
 
 
 def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
-    """Return the angular frequency of the forcing of a run, rad/s; None where nothing oscillates.
+    """Return the angular frequency of the forcing of a run, rad/s; None without an oscillating force.
 
     The rows of the run have its swept values as coordinates.
     """
@@ -109,7 +109,7 @@ def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
 
 
 def in_scene_order(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
-    """Return sampled variables as the scene lists them; those that it does not name come last."""
+    """Return sampled variables in the order of the scene; variables that it does not name come last."""
     record = table(scene_of(dataset.attrs), "record")
     listed = (table(record, "time_series") or record).get("variables", ())
     written = [re.sub(r"\W+", "_", name).strip("_") for name in listed if isinstance(name, str)]

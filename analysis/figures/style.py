@@ -1,4 +1,4 @@
-"""The one style of all figures, whatever matplotlibrc there is; imported before all else that imports matplotlib."""
+"""The style of all figures, independent of matplotlibrc; imported before every other use of matplotlib."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-# matplotlib reads a matplotlibrc of the current folder while it is imported, and fails where that is no text.
+# matplotlib reads a matplotlibrc in the current folder during its import, and fails if it is no text.
 with contextlib.chdir(Path(__file__).parent) if os.path.exists("matplotlibrc") else contextlib.nullcontext():
     import matplotlib.style
 
@@ -29,5 +29,5 @@ _STYLE: dict[str, Any] = {
 
 
 def page_style() -> AbstractContextManager[None]:
-    """Return the context in which figures are drawn and saved: matplotlib's defaults, and what is ours."""
+    """Return the context in which figures are drawn and saved: matplotlib's defaults plus the style of this package."""
     return matplotlib.style.context(["default", _STYLE])

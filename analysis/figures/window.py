@@ -1,4 +1,4 @@
-"""Which part of a motion a figure shows: from an instant to another, or so many forcing periods."""
+"""The part of a motion that a figure shows: from one instant to another, or a number of forcing periods."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Either, message, option_of
 
-#: Forcing periods drawn of a longer record; more would run together in one column.
+#: Number of forcing periods drawn from a longer record; more would overlap in one column.
 SHOWN_PERIODS = 8
-# Share of a period by which rounding may lengthen whole ones.
-_SLACK = 1e-6
+# Share of a period by which rounding may lengthen whole periods.
+_ROUNDING = 1e-6
 _FIRST, _LAST = (Either(name, option_of(name).removeprefix("--")) for name in ("start", "stop"))
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """What the user wants to see; nothing given: the first periods of a long record.
+    """The window that the user requests; without a request, the first periods of a long record.
 
-    Start and stop are in s, on the clock of the file; forcing periods count from the start on, or up to the stop.
+    Start and stop are in s, on the clock of the file; forcing periods count from the start, or back from the stop.
     """
 
     start: float | None = None
@@ -31,7 +31,7 @@ class Window:
     periods: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no window."""
+        """Raise UsageError for an impossible window."""
         for name, value in ((_FIRST, self.start), (_LAST, self.stop), ("periods", self.periods)):
             if value is not None and not math.isfinite(value):
                 raise UsageError(message("figure: ", name, f": expected a number, got {value}."))
@@ -54,18 +54,18 @@ class Window:
 
     @property
     def given(self) -> bool:
-        """Whether the user asked for a part."""
+        """Whether the user requested a part."""
         return (self.start, self.stop, self.periods) != (None, None, None)
 
     @staticmethod
     def whole(time: Floats) -> tuple[float, float]:
-        """Return first and last instant there are, s."""
+        """Return the first and last available instant, s."""
         return (float(time[0]), float(time[-1])) if len(time) else (math.nan, math.nan)
 
     def part(self, time: Floats, period: float | None = None) -> tuple[float, float]:
-        """Return first and last instant to draw (s) of all there are, ascending, at a forcing period (s).
+        """Return the first and last instant to draw (s), from ascending instants and a forcing period (s).
 
-        An empty window, one with a single sample, or periods where there are none raise UsageError.
+        UsageError: the window is empty or holds a single sample, or periods are given without a forcing.
         """
         first, last = self.whole(time)
         if self.periods is not None and period is None:
@@ -87,19 +87,19 @@ class Window:
     def _ends(self, first: float, last: float, period: float | None) -> tuple[float, float]:
         length = (self.periods or SHOWN_PERIODS) * period if period is not None else math.inf
         if not self.given:
-            return first, first + (length if last - first > (1.0 + _SLACK) * length else last - first)
+            return first, first + (length if last - first > (1.0 + _ROUNDING) * length else last - first)
         start = first if self.start is None else self.start
         if self.periods is None:
             return start, last if self.stop is None else self.stop
         return (start, start + length) if self.stop is None else (self.stop - length, self.stop)
 
 
-#: Nothing was asked for.
+#: The window without a request.
 ANY = Window()
 
 
 class View(NamedTuple):
-    """What is drawn: a run by its `run_index`, a recording of a replay, a window of time; over what, and how."""
+    """The contents of a figure: a run by its `run_index`, a recording of a replay, a window of time, and options."""
 
     run: int | None
     recording: str | None

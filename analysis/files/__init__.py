@@ -1,1 +1,1 @@
-"""Files that are whole or not there, and files that are not trusted: written, locked, sealed, looked at first."""
+"""Files that are whole or absent, and files that are not trusted: written, locked, sealed, checked first."""

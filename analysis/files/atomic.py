@@ -1,4 +1,4 @@
-"""Write a file so that it is whole or not there at all, whatever happens in between."""
+"""Write a file so that it is whole or absent, whatever happens in between."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 
 
 def refuse_special(path: str | os.PathLike[str]) -> None:
-    """Refuse a path at which something is that is no file: renaming a file there would put it in its place.
+    """Raise OSError if a path leads to something other than a file, which renaming a file there would replace.
 
-    Who may do anything would so replace `/dev/null` for all of the machine.
+    A privileged user could otherwise replace `/dev/null` for the whole machine.
 
     Raises
     ------
@@ -27,10 +27,10 @@ def refuse_special(path: str | os.PathLike[str]) -> None:
 
 
 def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview) -> None:
-    """Write the whole content of a file, or leave what was there before.
+    """Write the whole content of a file, or leave the older file in place.
 
-    The content goes to a temporary name in the same folder (hidden, ending in `.tmp`), is forced to the disk
-    and renamed; then the folder is forced to the disk. On any failure the temporary file is removed.
+    The content goes to a temporary name in the same folder (hidden, ending in `.tmp`), is flushed to the disk, and is
+    renamed. The folder is flushed to the disk afterwards. On any failure the temporary file is removed.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview)
         with suppress(OSError):
             temporary.unlink()
         if isinstance(problem, OSError):
-            # A failing write does not know its file, and a person knows the target, not the temporary name.
+            # The error of a write has no file name, and a person knows the target, not the temporary name.
             problem.filename, problem.filename2 = os.fspath(target), None
         raise
     _sync_folder(target.parent)
 
 
 def _sync_folder(folder: Path) -> None:
-    """Force the new name of a file to the disk; a system that cannot open folders keeps its names itself."""
+    """Flush the new name of a file to the disk; a system that cannot open folders does so itself."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)

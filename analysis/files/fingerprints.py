@@ -1,10 +1,10 @@
-"""The SHA-256 that every dataset file ends with, looked at before any library opens the file.
+"""The SHA-256 at the end of every dataset file, checked before any library opens the file.
 
-A dataset is its NetCDF-4 content, then one line of text with the SHA-256 of that content. Both are written by one
-rename, so neither is ever there without the other; a copy keeps them together. HDF5 reads its own content and
-ignores what follows. By hand: `head -c -86 dataset.nc | sha256sum` and `tail -c 86 dataset.nc` agree.
+A dataset is its NetCDF-4 content, then one line of text with the SHA-256 of that content. One rename writes both, so
+both are always together; a copy keeps them together. HDF5 reads its own content and ignores the line after it.
+By hand: `head -c -86 dataset.nc | sha256sum` and `tail -c 86 dataset.nc` agree.
 
-Files of version 0.1 end with their content.
+Files of version 0.1 have no such line.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LINE_LENGTH = len(_BEGIN) + _DIGITS + len(_END)
 
 _BLOCK = 1 << 20
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Where the superblock of an HDF5 file has its version, and in each version the address of the end. HDF5 2 writes
+# Place of the version in the superblock of an HDF5 file, and, by version, the place of the end address. HDF5 2 writes
 # version 2, HDF5 1.14 version 0.
 _SUPERBLOCK_VERSION = 8
 _END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}
@@ -40,16 +40,16 @@ def closing_line(content: bytes | memoryview) -> bytes:
 
 
 def sealed(image: bytes | memoryview) -> tuple[memoryview, bytes]:
-    """Return what a file is written of: the bytes of a NetCDF-4 file made in memory, and the line that follows.
+    """Return the two parts of a file: the bytes of a NetCDF-4 file made in memory, and the closing line.
 
-    The library rounds the memory up; that is cut off, so that the content ends where the file itself says.
+    The library rounds the memory up; the excess is cut off, so that the content ends where its header says.
     """
     content = memoryview(image)[: content_length(image)]
     return content, closing_line(content)
 
 
 def content_length(head: bytes | memoryview) -> int | None:
-    """Return where the content of an HDF5 file ends, as its first bytes say; None for another kind of file."""
+    """Return the end of the content of an HDF5 file according to its first bytes; None for another kind of file."""
     if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in _END_OF_FILE:
         return None
     (end,) = struct.unpack_from("<Q", head, _END_OF_FILE[head[_SUPERBLOCK_VERSION]])
@@ -57,7 +57,7 @@ def content_length(head: bytes | memoryview) -> int | None:
 
 
 def has_recorded_hash(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file ends with a hash, right or wrong: `matches_recorded_hash` tells.
+    """Return whether a file ends with a hash, right or wrong; `matches_recorded_hash` checks the hash.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def has_recorded_hash(path: str | os.PathLike[str]) -> bool:
 
 
 def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file has a recorded SHA-256, which its content then matches.
+    """Return whether a file has a recorded SHA-256 that matches its content.
 
     Only bytes are read; no library sees the file.
 
@@ -85,7 +85,7 @@ def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
     Raises
     ------
     DatasetError
-        When the content is not the one whose hash is recorded.
+        When the content does not match the recorded hash.
     OSError
         When the file cannot be read.
     """
@@ -111,19 +111,19 @@ def _recorded(file: BinaryIO) -> tuple[int, bytes] | None:
         file.seek(expected)
         line = file.read(LINE_LENGTH + 1)
         if line[: len(_BEGIN)] == _BEGIN[: len(line)]:
-            # also one that is cut short, or that something follows
+            # also a line that is cut short, or followed by more bytes
             return expected, line
     length = size - LINE_LENGTH
     if length < 0:
         return None
     file.seek(length)
     line = file.read()
-    # Two signs of a hash, the length of the file and the line: damage at one place leaves the other.
+    # A hash shows in two ways, by the length of the file and by the line: damage at one place leaves the other.
     return (length, line) if expected == length or line.startswith(_BEGIN) else None
 
 
 def _hash_of(file: BinaryIO, length: int) -> bytes:
-    """Return the SHA-256 of so many bytes from here on, in hexadecimal."""
+    """Return the SHA-256 of the next `length` bytes, in hexadecimal."""
     digest, left = hashlib.sha256(), length
     while left and (block := file.read(min(left, _BLOCK))):
         digest.update(block)

@@ -35,7 +35,7 @@ def locked_folder(folder: Path, holder: str = "campaign") -> Iterator[None]:
     ----------
     folder : Path
     holder : str
-        What holds it, in words.
+        The kind of program that holds the folder, in words.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """A NetCDF file that xarray reads lazily, from any thread.
 
-xarray reads values under its lock; it opens files, reads attributes and closes what was dropped without it. Here all of
-this is done under the lock, and a file is open once (`open_files`).
+xarray reads values under its lock, but opens files, reads attributes and closes dropped files without it. This module
+does all of this under the lock, and opens a file only once (`open_files`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vibroimpact.analysis.files.open_files import drop, give_back, netcdf_lock, 
 
 
 class LazyStore(NetCDF4DataStore):
-    """An open file; it is given back with the dataset that is made of it, or when that is dropped.
+    """An open file; it is released with the dataset made from it, or when that is dropped.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class LazyStore(NetCDF4DataStore):
         with netcdf_lock():
             self._file = take(path)
             try:
-                # these two of xarray carry no types
+                # these two methods of xarray have no types
                 super().__init__(self._file.root)  # type: ignore[no-untyped-call]  # of xarray
                 self._loaded, self._encoding = super().load(), super().get_encoding()  # type: ignore[no-untyped-call]  # of xarray
             except BaseException:
@@ -40,11 +40,11 @@ class LazyStore(NetCDF4DataStore):
         return self._loaded
 
     def get_encoding(self) -> Any:
-        """Return what xarray keeps of how the file is stored."""
+        """Return xarray's record of the storage of the file."""
         return self._encoding
 
     def close(self, **_: Any) -> None:
-        """Give the file back; once more is nothing."""
+        """Release the file; a second call does nothing."""
         if self._at_end.detach():
             with netcdf_lock():
                 give_back(self._file)

@@ -1,4 +1,4 @@
-"""Reads a NetCDF file whole, for nothing but to see that it can be read: in the process that `probing` asks."""
+"""Reads a NetCDF file whole, only to see whether it can be read; runs in the separate process of `probing`."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import os
 import zlib
 from typing import Any
 
-#: Values that are read at a time.
+#: Number of values read at a time.
 BLOCK = 1 << 20
 
 
 def read(path: str, options: dict[str, Any]) -> tuple[None, tuple[()]]:
-    """Read every attribute and every value of a NetCDF file; `most_bytes` is what it may promise.
+    """Read every attribute and every value of a NetCDF file; `most_bytes` limits the announced size of its values.
 
-    HDF5 can take values from other files. Where no other file can be opened, such values do not read, or are others.
+    HDF5 can take values from other files. If no other file can be opened, such values fail to read, or differ.
     """
     values = _netcdf_values(path, options["most_bytes"])
-    _let_open_one_more()
+    _limit_open_files()
     if _netcdf_values(path, options["most_bytes"]) != values:
         raise ValueError("it takes values from another file")
     return None, ()
@@ -42,13 +42,13 @@ def _netcdf_values(path: str, most: int) -> int:
         return found
 
 
-def _let_open_one_more() -> None:
-    """Let this process open one file more at a time than it has open now, where the system can see to that."""
+def _limit_open_files() -> None:
+    """Limit this process to one more open file than it has now, where the system supports the limit."""
     if not hasattr(os, "fork"):
-        return  # this process goes on to read other files
+        return  # this process continues to read other files
     import resource
 
-    free = os.dup(0)  # the lowest number that no open file has
+    free = os.dup(0)  # the lowest free file number
     os.close(free)
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (free + 1, most))
@@ -61,15 +61,15 @@ def _size(variable: Any) -> int:
 def _read_values(variable: Any, found: int = 0) -> int:
     """Read all values, block by block; return the checksum `found` with them."""
     if not variable.shape or 0 in variable.shape:
-        return _with(found, variable[...])
+        return _checksum(found, variable[...])
     rows = max(1, BLOCK // math.prod(variable.shape[1:]))
     for first in range(0, variable.shape[0], rows):
-        found = _with(found, variable[first : first + rows])
+        found = _checksum(found, variable[first : first + rows])
     return found
 
 
-def _with(found: int, values: Any) -> int:
-    """Return a checksum continued by values; objects (texts) lie in the file itself, and do not count."""
+def _checksum(found: int, values: Any) -> int:
+    """Return a checksum continued by values; objects (texts) lie in the file itself, and are skipped."""
     block = getattr(values, "data", values)
     kind = getattr(getattr(values, "dtype", None), "kind", "O")
     return found if kind == "O" else zlib.crc32(bytes(block), found)

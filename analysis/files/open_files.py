@@ -1,7 +1,7 @@
-"""The NetCDF files that are open: each once, and touched by one thread at a time.
+"""The open NetCDF files: each is open once, and used by one thread at a time.
 
-The NetCDF library is not made for threads, and HDF5 confuses the texts of a file that is open twice when one of the two
-is closed. So a file is opened once, however many ask for it, and all work with the library is done under one lock, that
+The NetCDF library is not safe with threads. If a file is open twice, HDF5 confuses its texts when one of the two is
+closed. So each file is opened once for all its users. All work with the library is done under one lock: the lock
 under which xarray reads values.
 """
 
@@ -21,8 +21,8 @@ from vibroimpact.fmus.file_state import FileState, file_state
 
 @cache
 def netcdf_lock() -> Any:
-    """Return the lock that is held while the NetCDF library works."""
-    # xarray takes a while to load, and much of the package does without
+    """Return the lock that every use of the NetCDF library holds."""
+    # xarray loads slowly, and much of the package works without it
     from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
     return NETCDF4_PYTHON_LOCK
@@ -30,7 +30,7 @@ def netcdf_lock() -> Any:
 
 @dataclass(slots=True)
 class OpenFile:
-    """An open file, and how many use it."""
+    """An open file, and the number of its users."""
 
     root: netCDF4.Dataset
     key: tuple[str, FileState]
@@ -39,11 +39,11 @@ class OpenFile:
 
 _open: dict[tuple[str, FileState], OpenFile] = {}
 _dropped: list[OpenFile] = []
-"""Files that somebody uses no more, and that could not be given back at once."""
+"""Files that one of their users has dropped while the lock was taken; they are released at the next opening."""
 
 
 def take(path: str) -> OpenFile:
-    """Open a file, or share it where it is open; the caller holds the lock, and gives it back once."""
+    """Open a file, or share it if it is open; the caller holds the lock, and releases the file once."""
     while _dropped:
         give_back(_dropped.pop())
     key = (path, file_state(os.stat(path)))
@@ -56,7 +56,7 @@ def take(path: str) -> OpenFile:
 
 
 def give_back(file: OpenFile) -> None:
-    """Close a file where nobody uses it any more; the caller holds the lock."""
+    """Release a file, and close it if it has no users left; the caller holds the lock."""
     file.users -= 1
     if not file.users:
         del _open[file.key]
@@ -64,7 +64,7 @@ def give_back(file: OpenFile) -> None:
 
 
 def drop(file: OpenFile) -> None:
-    """Give a file back as soon as the lock is free: the thread that collects garbage may hold it."""
+    """Release a file as soon as the lock is free: the thread that collects garbage may hold it."""
     if netcdf_lock().locked():
         _dropped.append(file)
         return
@@ -74,7 +74,7 @@ def drop(file: OpenFile) -> None:
 
 @contextmanager
 def reading(path: str) -> Iterator[netCDF4.Dataset]:
-    """Open a file under the lock; values come as they are stored."""
+    """Open a file under the lock; values keep their stored form."""
     with netcdf_lock():
         file = take(path)
         try:

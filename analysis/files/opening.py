@@ -1,4 +1,4 @@
-"""The one door through which this package reads NetCDF files: checked first, and every damage is one DatasetError."""
+"""The only module that reads NetCDF files: each is checked first, and every damage is one DatasetError."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ DAMAGE = (
     ),
     UnsoundFileError,
 )
-"""What damaged bytes lead the libraries to; a text that is not UTF-8 is a ValueError."""
+"""Exceptions of the libraries on damaged bytes; a text that is not UTF-8 is a ValueError."""
 
 
 @contextmanager
 def one_error(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Make one DatasetError, which names the file, of whatever reading damaged contents leads to."""
+    """Turn every exception from reading damaged contents into one DatasetError that names the file."""
     try:
         yield
     except DAMAGE as problem:
@@ -40,12 +40,12 @@ def one_error(path: str | os.PathLike[str]) -> Iterator[None]:
 
 @contextmanager
 def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
-    """Open a file with the NetCDF library, once it is known to be sound; values come as they are stored.
+    """Open a file with the NetCDF library, once it is known to be sound; values keep their stored form.
 
     Raises
     ------
     DatasetError
-        The file is missing or damaged, also where that shows only while it is read.
+        The file is missing or damaged, even if the damage shows only during reading.
     """
     with one_error(path):
         state = check_sound(path)
@@ -58,17 +58,17 @@ def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError
     """Return the error for a file that is missing or damaged."""
     if isinstance(problem, FileNotFoundError):
         return DatasetError(f"{os.fspath(path)}: expected a dataset file, got no such file.")
-    said = str(problem)
+    words = str(problem)
     if not isinstance(problem, OSError | RuntimeError | UnsoundFileError):
-        said = f"contents that do not fit together ({type(problem).__name__}: {said[:200]})"
+        words = f"contents that do not fit together ({type(problem).__name__}: {words[:200]})"
     return DatasetError(
-        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {said}. "
+        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {words}. "
         "The file is damaged or of another kind; write it again."
     )
 
 
 def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
+    """Return the global attributes of a NetCDF file; empty if it cannot be read."""
     try:
         with opened_netcdf(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}

@@ -1,12 +1,12 @@
-"""No compiled library is let at a file before its content is known to be sound.
+"""The check of a file's content before any compiled library opens it.
 
-The library that reads NetCDF files crashes on some damaged ones and never returns from others, where no signal of
-Python is heard. What matches the SHA-256 that it ends with (`fingerprints`) is opened directly. Anything else, a file
-of version 0.1 or of another program, is read once by a process of its own (`fmus.reader_process`, which runs
-`netcdf_values`); the SHA-256 of what was sound is kept in the user's cache, so that the same content is not read twice.
+The library that reads NetCDF files crashes on some damaged files. On others it never returns, and does not react to
+Python's signals. A file that matches its SHA-256 (`fingerprints`) is opened directly. Any other file, of version
+0.1 or of another program, is first read once by a separate process (`fmus.reader_process`, which runs
+`netcdf_values`). The SHA-256 of sound content is kept in the user's cache, so the same content is not read twice.
 
-A file that changes between the look and the opening is refused. One that is changed in place while it is open is not
-protected; this package replaces files, and never changes one.
+A file that changes between check and opening is refused. There is no protection against a change in place while the
+file is open; this package replaces files, and never changes one.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from vibroimpact.fmus.file_state import FileState, file_state, is_settled
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
 from vibroimpact.fmus.reader_process import Order, read_apart
 
-#: Limit of the processor time to read a file: a constant, s, and its size over a rate, bytes/s.
+#: Limit of the processor time to read a file: a constant, s, plus its size over a rate, bytes/s.
 PROBE_SECONDS = 10.0
 PROBE_RATE = 20e6
-#: Address space of the process that reads, bytes: what a file of some bytes promises may be any number.
+#: Address space of the reading process, bytes: a small file may announce values of any size.
 MEMORY = 4 << 30
 LONGEST_REASON = 300
-#: A file may promise values of so many times its size, which is more than deflate can pack; or of so many bytes
-#: whatever its size, since what a program never wrote takes no space.
+#: Largest size of a file's values: its own size times this factor, which is more than deflate can pack. Values that
+#: were never written take no space: this many bytes are allowed for any file.
 MOST_EXPANSION = 1100
 SPARSE_BYTES = 400_000_000
-#: Version of the check; contents that an older one found sound are checked again.
-LOOK = 2
-#: Contents that are remembered as sound, at most.
+#: Version of the check; contents found sound by an older version are checked again.
+CHECK_VERSION = 2
+#: Largest number of contents remembered as sound.
 MOST_REMEMBERED = 4096
 READER = "vibroimpact.analysis.files.netcdf_values:read"
 
 
 class UnsoundFileError(Exception):
-    """A file does not read; `str` says what it is, to follow `got`.
+    """A file does not read; `str` names its fault, to follow `got`.
 
     Attributes
     ----------
     raised : str
-        Name of the exception that the library raised; empty where it crashed or did not end.
+        Name of the library's exception; empty where the library crashed or did not end.
     """
 
     def __init__(self, why: str, raised: str = "") -> None:
@@ -55,13 +55,13 @@ class UnsoundFileError(Exception):
         self.raised = raised
 
 
-#: What this process found out: of files that have not changed since, and of contents.
+#: Verdicts of this process: by state of unchanged files, and by hash of contents.
 _of_files: dict[FileState, UnsoundFileError | None] = {}
 _of_contents: dict[str, UnsoundFileError | None] = {}
 
 
 def check_sound(path: str | os.PathLike[str]) -> FileState:
-    """Refuse a NetCDF file that does not read.
+    """Raise UnsoundFileError if a NetCDF file does not read.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def check_sound(path: str | os.PathLike[str]) -> FileState:
     Returns
     -------
     tuple of int
-        State of the file that was looked at; `refuse_changed` compares.
+        State of the checked file, for `refuse_changed`.
 
     Raises
     ------
     UnsoundFileError
         It is damaged, of another kind, no regular file, or changed meanwhile.
     DatasetError
-        Its content is not the one whose hash it ends with.
+        Its content does not match the hash at its end.
     UsageError
         Its name is no text.
     OSError
@@ -102,7 +102,7 @@ def check_sound(path: str | os.PathLike[str]) -> FileState:
 
 
 def refuse_changed(path: str | os.PathLike[str], state: FileState) -> None:
-    """Raise UnsoundFileError where a file is no longer the one that was looked at."""
+    """Raise UnsoundFileError if a file has changed since it was checked."""
     if file_state(os.stat(path)) != state:
         raise UnsoundFileError("one that changed while it was being opened")
 
@@ -111,7 +111,7 @@ def _verdict(path: str, size: int) -> UnsoundFileError | None:
     if matches_recorded_hash(path):
         return None
     with open(path, "rb") as file:
-        content = f"NetCDF-{LOOK} {hashlib.file_digest(file, 'sha256').hexdigest()}"
+        content = f"NetCDF-{CHECK_VERSION} {hashlib.file_digest(file, 'sha256').hexdigest()}"
     if content not in _of_contents:
         _of_contents[content] = None if content in _remembered() else _probed(path, size)
         if _of_contents[content] is None:
@@ -120,7 +120,7 @@ def _verdict(path: str, size: int) -> UnsoundFileError | None:
 
 
 def _probed(path: str, size: int) -> UnsoundFileError | None:
-    """Let a process of its own read a file."""
+    """Let a separate process read a file; return the fault, if any."""
     seconds = PROBE_SECONDS + size / PROBE_RATE
     options = {"most_bytes": max(SPARSE_BYTES, MOST_EXPANSION * size)}
     answer = read_apart(Order(READER, path, options, seconds, MEMORY, libraries=("netCDF4",)))
@@ -134,19 +134,19 @@ def _memory() -> Path:
 
 
 def _remembered() -> set[str]:
-    """Return the contents that were sound; none where the cache is not the user's alone, or not there."""
+    """Return the contents known to be sound; empty if the cache is missing or not the user's alone."""
     with suppress(OSError, UnsafeFolderError):
         return set(_memory().read_text(encoding="ascii", errors="replace").splitlines())
     return set()
 
 
 def _remember(content: str) -> None:
-    """Remember a content as sound; one forgotten is only read again, so that losing one does no harm."""
+    """Remember a content as sound; a lost entry is harmless, since the content is only read again."""
     with suppress(OSError, UnsafeFolderError):
         memory = _memory()
         if content in _remembered():
             return
-        # One short line at the end of a file is written whole, whoever else writes.
+        # One short line appended to a file is written whole, even if other processes write, too.
         with memory.open("a", encoding="ascii") as file:
             file.write(content + "\n")
         lines = memory.read_text(encoding="ascii", errors="replace").splitlines()

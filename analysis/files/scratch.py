@@ -1,7 +1,7 @@
-"""Folders for temporary files that are swept by the next process where their own was killed.
+"""Folders for temporary files; the next process removes the folders of a process that was killed.
 
-The owner of a folder holds a lock on a file in it, which the system releases when the process dies, however it
-dies. A folder whose lock is free has no owner and goes; one without a lock file, or of another user, is left alone.
+The owner of a folder holds a lock on a file in it; the system releases the lock when the process dies in any way. A
+folder whose lock is free has no owner and is removed. A folder without a lock file, or of another user, stays.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _MOST_TRIES = 100
 
 
 class ScratchFolder:
-    """A folder for temporary files of this process, in the system's folder for such.
+    """A folder for temporary files of this process, inside the system's folder for temporary files.
 
     Parameters
     ----------
     kind : str
-        What it is for; part of its name.
+        Purpose of the folder; part of its name.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class ScratchFolder:
         self._remove = weakref.finalize(self, _remove, self.name, handle)
 
     def cleanup(self) -> None:
-        """Remove the folder and all that is in it; done at the end of the process at the latest."""
+        """Remove the folder with its contents, at the end of the process at the latest."""
         self._remove()
 
     def __enter__(self) -> Self:
@@ -84,7 +84,7 @@ def _own_folders() -> Iterator[Path]:
 
 
 def _locked_folder(kind: str) -> tuple[str, int]:
-    """Make a folder and lock it; again where a sweep took it between the two."""
+    """Make a folder and lock it; repeat if a sweep removed it between the two steps."""
     for _ in range(_MOST_TRIES):
         folder = tempfile.mkdtemp(prefix=f"{_PREFIX}{kind}-")
         lock = Path(folder, _LOCK)
@@ -95,7 +95,7 @@ def _locked_folder(kind: str) -> tuple[str, int]:
             os.close(handle)
             continue
         except OSError as error:
-            # Where files cannot be locked no sweep takes the folder either.
+            # On a system without file locks no sweep removes the folder either.
             if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
                 raise
         if lock.exists():
@@ -108,7 +108,7 @@ def _locked_folder(kind: str) -> tuple[str, int]:
 
 def _remove(folder: str, handle: int) -> None:
     if os.name == "nt":
-        # Windows removes no open file.
+        # Windows does not remove an open file.
         os.close(handle)
         shutil.rmtree(folder, ignore_errors=True)
         return

@@ -1,6 +1,6 @@
-"""Interspike intervals: how regular they are, what motion they show, what is missing, and their dimension.
+"""Interspike intervals: their regularity, the motion they show, missing spikes, and their dimension.
 
-Start at `interval_report`; it calls one module for each question.
+Start at `interval_report`, which calls one module for each question.
 
 Examples
 --------

@@ -1,8 +1,8 @@
 """Correlation sums of delay vectors, and their slope against the radius (thesis 5.4.2).
 
-C(eps) is the part of all pairs of delay vectors (x_i, ..., x_{i+m-1}) nearer than eps in the max norm; its slope in
-logarithms is the correlation dimension where it is the same over a range of radii and stops growing with m. Pairs are
-counted exactly, by the C function behind `fmus.core`.
+C(eps) is the share of pairs of delay vectors (x_i, ..., x_{i+m-1}) nearer than eps in the max norm. Its logarithmic
+slope is the correlation dimension if it is constant over a range of radii and stops growing with m. The C function
+behind `fmus.core` counts the pairs exactly.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from vibroimpact.analysis.intervals.trains import Floats, Span
 from vibroimpact.fmus.core import MOST_RADII, RADII_PER_OCTAVE, near_pairs, radius_ladder
 from vibroimpact.fmus.errors import EstimationError
 
-# C between which a slope is fitted, and the fewest pairs and radii that make one.
+# Range of C in which a slope is fitted; smallest number of pairs at a radius, and of radii, for a slope.
 WINDOW: Span = (1e-3, 1e-1)
 FEWEST_PAIRS, FEWEST_RADII = 30, 3
-# Radii on either side that make a local slope: a quarter of an octave each way.
+# Number of radii on either side in a local slope: a quarter of an octave each way.
 REACH = 2
 _OCTAVES = (MOST_RADII - 6) // RADII_PER_OCTAVE
 
@@ -33,9 +33,9 @@ class CorrelationSums:
     radii : ndarray of float, shape (radius,)
         In the unit of the values, ascending.
     near : ndarray of int, shape (embedding, radius)
-        Pairs nearer than the radius, for m = 1, 2, ...
+        Number of pairs nearer than the radius, for m = 1, 2, ...
     pairs : ndarray of int, shape (embedding,)
-        Pairs there are.
+        Number of all pairs.
     """
 
     radii: Floats
@@ -51,7 +51,7 @@ class CorrelationSums:
     def local_slopes(self) -> Floats:
         """d ln C / d ln eps over half an octave about each radius, shape (embedding, radius).
 
-        NaN where there is no pair, or the ladder ends.
+        NaN where there is no pair, or where the ladder of radii ends.
         """
         slopes = np.full(self.near.shape, np.nan)
         wide, narrow = self.near[:, 2 * REACH :], self.near[:, : -2 * REACH]
@@ -69,19 +69,19 @@ def correlation_sums(
     Parameters
     ----------
     values : ndarray of float, shape (n,)
-        x; no vector reaches over a NaN.
+        x; no vector crosses a NaN.
     embedding : int
         Largest m, 1 to 16.
     theiler : int
-        Pairs i < j with j - i <= `theiler` do not count; 0: all do, but none with itself. At least 1 for maps; a few
-        correlation times for samples of a flow.
+        Pairs i < j with j - i <= `theiler` do not count; 0: all pairs of different vectors count. Use at least 1 for
+        maps, and a few correlation times for samples of a flow.
     radii : ndarray of float, optional
         From `fmus.core.radius_ladder`; by default 15 octaves down from the range of the values.
 
     Raises
     ------
     EstimationError
-        The values are all the same, or too few to make a pair.
+        The values are all equal, or too few for a pair.
 
     Examples
     --------
@@ -102,10 +102,10 @@ def correlation_sums(
 def fitted_slopes(sums: CorrelationSums, *, above: float = 0.0, window: Span = WINDOW) -> Floats:
     """Return the slope of ln C against ln eps where C is in a window, for every embedding.
 
-    Least squares over the radii whose C lies in the window, at which at least 30 pairs were counted; those below
-    `above`, such as the grid of the values, do not count. The slope is 0 where C is the same over the lowest octave and
-    not below the window, as for a finite number of points; NaN where fewer than three radii lie in the window, those
-    between the same steps of a grid being one.
+    The fit is by least squares over the radii whose C lies in the window, with at least 30 pairs each. Radii below
+    `above`, for example below the grid of the values, do not count. The slope is 0 if C is constant over the lowest
+    octave and not below the window, as for a finite number of points. It is NaN if fewer than three radii lie in the
+    window; radii between the same steps of a grid count once.
     """
     return np.array([_fitted_slope(sums, place, above, window) for place in range(len(sums.pairs))])
 
@@ -113,12 +113,12 @@ def fitted_slopes(sums: CorrelationSums, *, above: float = 0.0, window: Span = W
 def _fitted_slope(sums: CorrelationSums, place: int, above: float, window: Span) -> float:
     near, share = sums.near[place], sums.sums[place]
     usable = sums.radii >= above
-    # a finite number of points: C stays at the share of pairs that are the same, however small the radius
+    # a finite number of points: C stays at the share of equal pairs, however small the radius
     lowest = near[usable][: RADII_PER_OCTAVE + 1]
     if share[usable][0] >= window[0] and np.all(lowest == lowest[0]):
         return 0.0
     chosen = usable & (share >= window[0]) & (share <= window[1]) & (near >= FEWEST_PAIRS)
-    # between two steps of a grid C stands still, and many radii are worth one
+    # between two steps of a grid C is constant, and many radii count as one
     enough = len(np.unique(near[chosen])) if above > 0.0 else np.count_nonzero(chosen)
     if enough < FEWEST_RADII:
         return float("nan")
@@ -136,7 +136,7 @@ def _usual_radii(values: Floats) -> Floats:
 
 
 def count_pairs(known: NDArray[np.bool_], embedding: int, theiler: int) -> int:
-    """Return how many pairs of whole delay vectors are more than `theiler` places apart."""
+    """Return the number of pairs of whole delay vectors more than `theiler` places apart."""
     if len(known) < embedding:
         return 0
     whole: NDArray[np.bool_] = np.all(np.lib.stride_tricks.sliding_window_view(known, embedding), axis=1)

@@ -1,7 +1,7 @@
-"""Which periodic motion P(p,q) the intervals show: p impacts in q periods of the forcing (thesis 5.4.4).
+"""The periodic motion P(p,q) behind the intervals: p impacts in q periods of the forcing (thesis 5.4.4).
 
-Read from the order of the intervals, and from their density: a P(p,q) motion has at most p distinct intervals, and
-a cycle of them lasts q periods. Intervals alone do not tell everything, and the verdict says what they leave open.
+It is read from the order of the intervals, and from their density. A P(p,q) motion has at most p distinct intervals,
+and a cycle of them lasts q periods. Intervals alone leave some questions open; the verdict names these.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from vibroimpact.analysis.intervals.density import FINEST, spread_within, typica
 from vibroimpact.analysis.intervals.lattice import Lattice
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 
-# Longest cycle looked for, and the fewest repeats of it that count as one.
+# Longest cycle searched, and smallest number of repeats for a cycle.
 LONGEST_CYCLE, FEWEST_REPEATS = 16, 4
-# Difference of intervals one cycle apart, in standard deviations of their cluster and relative to the median interval,
-# below which they are the same; share of all intervals that must be.
-SAME, AT_MOST, MOSTLY = 4.5, 0.1, 0.8
-# Forcing periods by which a cycle may miss a whole number of them.
-WHOLE = 0.1
+# Largest difference of equal intervals one cycle apart, in standard deviations of their cluster, and at most relative
+# to the median interval. The last number is the smallest share of equal intervals.
+LARGEST_DEVIATION, LARGEST_DIFFERENCE, LEAST_EQUAL = 4.5, 0.1, 0.8
+# Largest deviation of a cycle from a whole number of forcing periods.
+PERIOD_DEVIATION = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """What the intervals say about the motion."""
+    """The motion behind the intervals."""
 
     impacts: int
-    """p, the smallest that the intervals allow; 0: they do not repeat."""
+    """p, the smallest number that the intervals allow; 0: they do not repeat."""
     duration: float
-    """Duration of one cycle, s: median sum of p successive intervals; NaN without one."""
+    """Duration of one cycle, s: median sum of p successive intervals; NaN without a cycle."""
     periods: int
-    """q; 0: not known."""
+    """q; 0: unknown."""
     words: str
-    """The verdict, and what it leaves open."""
+    """The verdict, with the open questions."""
 
 
 def read_cycle(train: IntervalTrain, forcing_period: float | None) -> Cycle:
@@ -72,7 +72,7 @@ def _verdict(impacts: int, duration: float, forcing_period: float | None, how: s
         return Cycle(impacts, duration, 0, f"P({impacts},q), q needs the forcing period; {same}")
     ratio = duration / forcing_period
     periods = round(ratio)
-    if periods < 1 or abs(ratio - periods) > WHOLE:
+    if periods < 1 or abs(ratio - periods) > PERIOD_DEVIATION:
         words = (
             f"{same}; a cycle of {impacts} lasts {ratio:.3f} forcing periods, not a whole number of them: the "
             "response is not locked to that forcing, or spikes are missed"
@@ -83,22 +83,22 @@ def _verdict(impacts: int, duration: float, forcing_period: float | None, how: s
 
 
 def _tolerance(train: IntervalTrain) -> float:
-    """Return the difference up to which two intervals are the same, s."""
+    """Return the difference up to which two intervals are equal, s."""
     intervals = train.intervals
     typical = typical_interval(intervals)
-    scatter = min(SAME * spread_within(intervals), AT_MOST * typical)
+    scatter = min(LARGEST_DEVIATION * spread_within(intervals), LARGEST_DIFFERENCE * typical)
     return max(scatter, FINEST * typical, 2.1 * train.resolution)
 
 
 def _repeats_after(intervals: Floats, tolerance: float) -> int:
-    """Return the smallest p for which most intervals are the same p later; 0: none.
+    """Return the smallest p for which most intervals are equal p places later; 0: none.
 
-    Most, not all: some spikes may be missed. A cycle of p must be known as a whole: masked intervals may leave none.
+    Not all need to be equal: some spikes may be missed. One whole cycle must be known; masked intervals may leave none.
     """
     for count in range(1, min(LONGEST_CYCLE, len(intervals) // FEWEST_REPEATS) + 1):
         change = np.abs(intervals[count:] - intervals[:-count])
         known = change[np.isfinite(change)]
         whole = np.isfinite(np.lib.stride_tricks.sliding_window_view(intervals, count).sum(axis=1))
-        if len(known) and np.any(whole) and np.mean(known < tolerance) >= MOSTLY:
+        if len(known) and np.any(whole) and np.mean(known < tolerance) >= LEAST_EQUAL:
             return count
     return 0

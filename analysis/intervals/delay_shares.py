@@ -1,10 +1,13 @@
-"""Where the points of the delay plot of a period-1 motion lie when spikes are missed and spurious ones are added.
+"""Shares of the points in the delay plot of a period-1 motion with missed and spurious spikes.
 
-Per place of the lattice there are 1 - p + s events, so as many delay points; each kind of point asks certain places to
-have their spike (1 - p) or not (p), and certain intervals a spurious one (s) or none (1 - s). Without spurious spikes
-the point (iI, jI) has the share p^(i+j-2) (1-p)^2; without missed ones the main point has (1-s)^2/(1+s), the line
-x + y = I s/(1+s), each of the lines x = I and y = I s(1-s)/(1+s), the inside of the square s^2/(1+s) (thesis 5.4.2;
-there p missed spikes give (I, pI), but one missed spike makes an interval 2I, so it is (p+1)I).
+Each place of the lattice has 1 - p + s events on average, and as many delay points. Each kind of point needs
+certain places with their spike (1 - p) or without it (p). It also needs certain intervals with a spurious spike (s)
+or without one (1 - s).
+
+Without spurious spikes the point (iI, jI) has the share p^(i+j-2) (1-p)^2. Without missed spikes the shares are
+(1-s)^2/(1+s) for the main point and s/(1+s) for the line x + y = I. The lines x = I and y = I have s(1-s)/(1+s) each,
+the inside of the square s^2/(1+s) (thesis 5.4.2). The thesis says that p missed spikes give (I, pI); one missed spike
+makes an interval 2I, so it is (p+1)I.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ def lattice_share(missed: float, spurious: float, i: int, j: int) -> float:
     >>> [round(lattice_share(0.1, 0.0, 1, j), 6) for j in (1, 2, 3)]
     [0.81, 0.081, 0.0081]
     """
-    # three spikes there, i + j - 2 missed between them, no spurious one in i + j intervals
+    # three spikes are there, i + j - 2 are missed between them, and i + j intervals have no spurious spike
     events = 1.0 - missed + spurious
     return (1.0 - missed) ** 3 * missed ** (i + j - 2) * (1.0 - spurious) ** (i + j) / events
 
@@ -31,14 +34,14 @@ def lattice_share(missed: float, spurious: float, i: int, j: int) -> float:
 def expected_shares(missed: float, spurious: float) -> Floats:
     """Return the shares of the delay points in the order of `CELLS`.
 
-    The last three are those of single true intervals; with both missed and spurious spikes some points lie elsewhere.
+    The last three are shares of single true intervals; with both missed and spurious spikes some points lie elsewhere.
 
     >>> expected_shares(0.0, 0.04).round(6).tolist()
     [0.886154, 0.0, 0.038462, 0.073846, 0.001538]
     """
     events = 1.0 - missed + spurious
     diagonal = (1.0 - missed) ** 2 * spurious / events
-    # a true interval without a spurious spike, then one with it; and the other way round
+    # a true interval without a spurious spike, then one with it, or the reverse
     edges = 2.0 * (1.0 - missed) ** 2 * spurious * (1.0 - spurious) / events
     inside = (1.0 - missed) * spurious**2 / events
     double = lattice_share(missed, spurious, 1, 2) + lattice_share(missed, spurious, 2, 1)
@@ -46,7 +49,7 @@ def expected_shares(missed: float, spurious: float) -> Floats:
 
 
 def observed_shares(train: IntervalTrain, lattice: Lattice) -> Floats:
-    """Return the shares of the delay points counted, in the order of `CELLS`; the train must have that lattice."""
+    """Return the observed shares of the delay points, in the order of `CELLS`; the train must have that lattice."""
     whole = train.kept[:-1] & train.kept[1:]
     on = lattice.on_lattice
     first, middle, last = on[:-2], on[1:-1], on[2:]

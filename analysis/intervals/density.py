@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.trains import Floats
 
-# Points of the kernel estimate; most bins of the histogram.
+# Smallest and largest number of points of the kernel estimate; largest number of bins of the histogram.
 FEWEST_POINTS, MOST_POINTS, MOST_BINS = 64, 30_000, 400
-# Smallest bandwidth, relative to the median interval: two intervals nearer than that are one.
+# Smallest bandwidth, relative to the median interval, below which two intervals count as equal.
 FINEST = 0.005
-# Least prominence of a peak, relative to its height and in standard errors of the estimate there; least height of one,
-# relative to the highest.
+# Smallest prominence of a peak, relative to its height and in standard errors of the estimate there; smallest height,
+# relative to the highest peak.
 PROMINENCE, SIGNIFICANT, LOWEST_PEAK = 0.3, 2.5, 0.02
 # Integral of the squared Gaussian kernel of bandwidth 1: variance of the estimate over density / (number * bandwidth).
 ROUGHNESS = 0.2821
@@ -32,28 +32,28 @@ class Density:
     at: Floats
     """Intervals (s), shape (point,)."""
     kernel: Floats
-    """The Gaussian kernel estimate there, shape (point,)."""
+    """The Gaussian kernel estimate at these intervals, shape (point,)."""
     bandwidth: float
     """Standard deviation of the kernel, s."""
     edges: Floats
-    """s, shape (bin + 1,)."""
+    """Edges of the bins, s, shape (bin + 1,)."""
     histogram: Floats
-    """Shape (bin,)."""
+    """Density in each bin, shape (bin,)."""
     peaks: Floats
     """Intervals at which the kernel estimate has a distinct maximum, s, ascending."""
 
     @property
     def bin_width(self) -> float:
-        """Of the histogram, s."""
+        """Width of a bin of the histogram, s."""
         return float(self.edges[1] - self.edges[0])
 
 
 def interval_density(intervals: Floats, *, resolution: float = 0.0) -> Density:
     """Return the density of intervals.
 
-    The bandwidth is Silverman's rule for the spread of the intervals within their densest cluster, so that narrow bands
-    far apart are not smeared into one; bins are as wide as one bandwidth, and whole multiples of the grid of the
-    instants. Intervals and grid (`resolution`) are in s; no width is smaller than the grid.
+    The bandwidth is Silverman's rule for the spread of the intervals within their densest cluster: narrow bands that
+    are far apart stay apart. Bins are one bandwidth wide, in whole multiples of the grid of the instants. Intervals
+    and grid (`resolution`) are in s; no width is smaller than the grid.
 
     >>> density = interval_density(np.tile([0.2, 0.8], 50))
     >>> [round(float(peak), 2) for peak in density.peaks]
@@ -81,8 +81,8 @@ def typical_interval(intervals: Floats) -> float:
 def spread_within(intervals: Floats) -> float:
     """Return the standard deviation within the densest cluster of the intervals, s.
 
-    From the shortest window that holds a quarter of all intervals, as if their density there were normal: narrow for
-    bands, and for a single hump its own.
+    It follows from the shortest window that holds a quarter of all intervals, as if their density there were normal. It
+    is narrow for bands, and equals the spread of a single hump.
     """
     ordered = np.sort(intervals)
     quarter = max(len(ordered) // 4, 1)

@@ -1,7 +1,7 @@
-"""The correlation dimension of intervals: slopes for every embedding, beside those of shuffled surrogates.
+"""The correlation dimension of intervals: slopes for every embedding, next to those of shuffled surrogates.
 
-A shuffled surrogate has the same intervals in no order. What it shows comes from their distribution; only what the
-intervals show and it does not is dynamics. A slope that keeps growing with the embedding is no dimension.
+A shuffled surrogate has the same intervals in random order. Its slopes come from their distribution; only further
+structure of the intervals is dynamics. A slope that keeps growing with the embedding is no dimension.
 """
 
 from __future__ import annotations
@@ -29,23 +29,24 @@ SCALES: tuple[Scale, ...] = ("raw", "log")
 
 EMBEDDING, SURROGATES, THEILER = 6, 8, 1
 MOST_INTERVALS, FEWEST_INTERVALS, FEWEST_DISTINCT = 10_000, 200, 50
-# Share of distinct intervals below which ties are warned of.
+# Share of distinct intervals below which a warning about ties is given.
 MOSTLY_DISTINCT = 0.9
-# Difference of instants, relative to the latest one, up to which they differ by rounding alone.
+# Difference of instants, relative to the latest one, up to which it is rounding alone.
 ROUNDING = 2.0**-44
-# Share of the pairs equal in one interval that are equal in all, above which the motion repeats.
+# Share of pairs equal in one interval that stay equal in all, above which the motion repeats.
 REPEATS = 0.5
-# Growth of the slope per embedding below which it stands still; its last value over the surrogate's above which it
-# keeps up, and above which it runs ahead; the surrogate's over that of noise below which the surrogate flattens.
-STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
+# Growth of the slope per embedding below which it is constant. Ratio of its last value to the surrogate's above which
+# it keeps up, and above which it is steeper. Ratio of the surrogate's last value to that of noise below which the
+# surrogate flattens.
+CONSTANT, SIMILAR, STEEPER, FLATTER = 0.15, 0.85, 1.3, 0.75
 # Distance from its last value within which a slope has saturated.
-REACHED = 0.2
-# Fewest successive embeddings with a slope that make a verdict.
+SATURATION = 0.2
+# Smallest number of successive embeddings with a slope for a verdict.
 FEWEST_SLOPES = 3
-# Slope in the lower half of the window over that in the upper half above which noise is in the intervals: up to .09 for
-# Henon's and the logistic map and a torus without noise, .3, .5, 1.4 and 1.7 for Henon's with 1, 2, 5 and 10 %.
-STEEPER = 0.25
-# Slope up to which a stretch is a plateau, and the least share of all pairs beyond it.
+# Slope in the lower half of the window minus that in the upper half above which the intervals contain noise. Measured:
+# up to .09 without noise (Henon's and the logistic map, a torus); .3, .5, 1.4, 1.7 for Henon's with 1, 2, 5, 10 %.
+NOISE_SLOPE = 0.25
+# Slope up to which a stretch is a plateau, and smallest share of all pairs beyond it.
 FLAT, LEFT_OUT = 0.1, 0.1
 
 
@@ -54,9 +55,9 @@ def interval_dimension(
 ) -> tuple[Rows, dict[str, Any]]:
     """Return the correlation sums of a train's intervals, their slopes, those of shuffled surrogates, and a verdict.
 
-    Heavy-tailed intervals flatten the raw slopes falsely: take their logarithms. At most the first 10,000 are used;
-    `embedding` is the largest m, and pairs at most `theiler` places apart do not count. Where the intervals cannot
-    tell, the variables have no radii, and the attributes have the reason in words.
+    Heavy-tailed intervals flatten the raw slopes falsely: use their logarithms. At most the first 10,000 are used;
+    `embedding` is the largest m, and pairs at most `theiler` places apart do not count. If the intervals do not
+    suffice, the variables have no radii, and the attributes have the reason in words.
     """
     values = _values(train, scale)
     reason = _refusal(train, values, embedding)
@@ -68,7 +69,7 @@ def interval_dimension(
         return rows, _attributes(scale, reason)
     values = values[:MOST_INTERVALS]
     sums = correlation_sums(values, embedding, theiler=theiler)
-    # between two points of a grid a radius tells nothing
+    # radii between two points of a grid carry no information
     above = 2.0 * train.resolution / (float(np.median(train.intervals)) if scale == "log" else 1.0)
     slopes = fitted_slopes(sums, above=above)
     rng = np.random.default_rng(seed)
@@ -118,10 +119,10 @@ def _attributes(scale: Scale, words: str, warnings: Iterable[str] = ()) -> dict[
 
 
 def verdict(slopes: Floats, surrogate: Floats) -> str:
-    """Return in words what slopes in m = 1, 2, ... say, beside those of a shuffled surrogate.
+    """Return the verdict on slopes for m = 1, 2, ... and those of a shuffled surrogate, in words.
 
-    Embeddings without a slope on either side are left out and named: on a coarse grid C of m = 1 may be above the
-    window at every radius, and in a short train C of the largest m below it.
+    Embeddings without a slope on either side are left out and named. On a coarse grid C of m = 1 may be above the
+    window at every radius. In a short train C of the largest m may be below it.
 
     >>> verdict(np.array([0.9, 1.2, 1.2, 1.2]), np.array([0.9, 1.8, 2.7, 3.6]))
     'saturation at 1.20 from m = 2 on, where the surrogate goes on to 3.60: low-dimensional'
@@ -129,15 +130,15 @@ def verdict(slopes: Floats, surrogate: Floats) -> str:
     first, stop = _longest_run(np.isfinite(slopes) & np.isfinite(surrogate))
     if stop - first < FEWEST_SLOPES:
         return "not decided: too few radii with C in the window"
-    said = _verdict(slopes[first:stop], surrogate[first:stop], first + 1)
+    found = _verdict(slopes[first:stop], surrogate[first:stop], first + 1)
     missing = [str(place + 1) for place in range(len(slopes)) if not first <= place < stop]
-    return said + (
+    return found + (
         f"; without m = {', '.join(missing)}: too few radii with C in the window" if missing else ""
     )
 
 
 def _longest_run(known: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return where the longest run of True begins and where it is over; the first of those as long."""
+    """Return the start and the end of the longest run of True; of equally long runs the first."""
     edges = np.flatnonzero(np.diff(known, prepend=False, append=False)).tolist()
     runs = zip(edges[::2], edges[1::2], strict=True)
     return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
@@ -150,14 +151,14 @@ def _verdict(slopes: Floats, surrogate: Floats, lowest: int) -> str:
     top, against, highest = slopes[-1], surrogate[-1], lowest + len(slopes) - 1
     numbers = f"{top:.2f} at m = {highest}, shuffled {against:.2f}"
     growth, expected = np.diff(slopes)[-2:].mean(), np.diff(surrogate)[-2:].mean()
-    if top > AHEAD * against:
+    if top > STEEPER * against:
         return f"no saturation: noise at these radii, about an ordered motion ({numbers})"
-    if against < FLATTENS * highest * min(surrogate[0] / lowest, 1.0) and top > KEEPS_UP * against:
+    if against < FLATTER * highest * min(surrogate[0] / lowest, 1.0) and top > SIMILAR * against:
         return f"flattens as its shuffled surrogate does ({numbers}): the distribution, not dynamics; no dimension"
-    if top > KEEPS_UP * against and growth > STILL:
+    if top > SIMILAR * against and growth > CONSTANT:
         return f"no saturation: noise-like, as its shuffled surrogate ({numbers})"
-    if growth < STILL * max(expected, 1.0):
-        first = int(np.argmax(slopes > top - max(REACHED, 0.1 * top))) + lowest
+    if growth < CONSTANT * max(expected, 1.0):
+        first = int(np.argmax(slopes > top - max(SATURATION, 0.1 * top))) + lowest
         return (
             f"saturation at {top:.2f} from m = {first} on, where the surrogate goes on to {against:.2f}: "
             "low-dimensional"
@@ -168,14 +169,14 @@ def _verdict(slopes: Floats, surrogate: Floats, lowest: int) -> str:
 def _noise(sums: CorrelationSums, above: float) -> str:
     """Return in words whether the slope is steeper at small radii, where noise fills the embedding.
 
-    A motion has its dimension at all radii; noise of a size adds its own below that size.
+    A motion has its dimension at all radii; noise adds its own dimension below its size.
     """
     (low, high), middle = WINDOW, float(np.sqrt(WINDOW[0] * WINDOW[1]))
     small = fitted_slopes(sums, above=above, window=(low, middle))[1:]
     large = fitted_slopes(sums, above=above, window=(middle, high))[1:]
     steeper = np.nan_to_num(small - large, nan=0.0)
     place = int(np.argmax(steeper))
-    if steeper[place] < STEEPER:
+    if steeper[place] < NOISE_SLOPE:
         return ""
     return (
         f", but with noise in it: at m = {place + 2} the slope is {small[place]:.2f} for C up to {middle:g} and "
@@ -184,7 +185,7 @@ def _noise(sums: CorrelationSums, above: float) -> str:
 
 
 def _plateau(sums: CorrelationSums) -> str:
-    """Return in words over which radii C stands still for an octave or more, at the largest m."""
+    """Return the range of radii over which C is constant for an octave or more, at the largest m, in words."""
     near, share = sums.near[-1], sums.sums[-1]
     start = near[:-RADII_PER_OCTAVE]
     flat = (start >= FEWEST_PAIRS) & (near[RADII_PER_OCTAVE:] <= start * 2.0**FLAT)
@@ -200,10 +201,10 @@ def _plateau(sums: CorrelationSums) -> str:
 
 
 def _rounded(train: IntervalTrain) -> Floats:
-    """Return the intervals, those that differ by rounding alone being one, s; NaN where masked."""
+    """Return the intervals, s, made equal if they differ only by rounding; NaN where masked."""
     quantum = max(float(np.max(np.abs(train.times))) * ROUNDING, float(np.finfo(np.float64).tiny))
     steps: Floats = np.rint(train.separated / quantum)
-    # two roundings may part what is the same: join steps that are neighbours
+    # rounding may separate equal intervals: join neighbouring steps
     known = np.isfinite(steps)
     order, place = np.unique(steps[known], return_inverse=True)
     group = np.cumsum(np.diff(order, prepend=order[:1]) > 2.0)
@@ -215,7 +216,7 @@ def _values(train: IntervalTrain, scale: Scale) -> Floats:
     values = _rounded(train)
     if scale == "raw":
         return values
-    # events that coincide have no logarithm: vectors do not reach over them
+    # coincident events have no logarithm: vectors do not cross them
     return np.asarray(np.log(np.where(values > 0.0, values, np.nan)))
 
 
@@ -239,7 +240,7 @@ def _refusal(train: IntervalTrain, values: Floats, embedding: int) -> str:
 
 
 def _repeats(values: Floats, embedding: int) -> bool:
-    """Return whether intervals that are the same go on being the same, as in a periodic motion."""
+    """Return whether equal intervals stay equal, as in a periodic motion."""
     known = np.unique(values[np.isfinite(values)])
     spacing = float(np.min(np.diff(known)))
     sums = correlation_sums(
@@ -250,7 +251,7 @@ def _repeats(values: Floats, embedding: int) -> bool:
 
 
 def _shuffled(values: Floats, rng: np.random.Generator) -> Floats:
-    """Return the values in another order; what is not known stays where it is."""
+    """Return the values in random order; unknown values keep their places."""
     shuffled = values.copy()
     known = np.isfinite(values)
     shuffled[known] = rng.permutation(values[known])
@@ -273,6 +274,6 @@ def _warnings(train: IntervalTrain, values: Floats) -> list[str]:
 
 
 def _counted(values: Floats) -> tuple[int, int]:
-    """Return how many values are known, and how many of them are distinct."""
+    """Return the number of known values, and of distinct known values."""
     known = values[np.isfinite(values)]
     return len(known), len(np.unique(known))

@@ -1,7 +1,7 @@
 """Missed beats of a nearly periodic train: intervals that are too long for their neighbourhood.
 
-The yardstick is the median of the intervals around each one, so a rate that drifts is no gap, and neither is a
-neighbouring gap.
+Each interval is compared with the median of the intervals around it. So a drifting rate is no gap, and a neighbouring
+gap does not matter.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 from vibroimpact.analysis.robust import robust_sigma
 
-# Intervals on either side of one that make its median.
+# Number of intervals on either side for the median around an interval.
 NEIGHBOURS = 10
 # Length, in local medians, above which an interval is a gap: between one beat and two.
 LONGEST_BEAT = 1.5
-# Robust coefficient of variation about the local median up to which one beat and two can be told apart.
+# Robust coefficient of variation about the local median up to which one beat and two are distinguishable.
 NEARLY_PERIODIC = 0.2
 FEWEST_INTERVALS = 10
 
@@ -34,16 +34,16 @@ class MissedBeats:
     place: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     """Index of the interval among all intervals of the train, shape (gap,)."""
     missing: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """Beats that each would have had, shape (gap,): its length in local medians, rounded, less one."""
+    """Number of beats missing in each gap, shape (gap,): its length in local medians, rounded, minus one."""
     reason: str = ""
-    """Why none were looked for; empty when they were."""
+    """Reason why gaps were not searched; empty if they were."""
 
 
 def find_gaps(train: IntervalTrain) -> MissedBeats:
     """Return the gaps of a nearly periodic train.
 
-    Valid where intervals scatter by less than about a fifth about their local median; otherwise one beat and two
-    overlap, and none are looked for.
+    Valid if intervals scatter by less than about a fifth about their local median. Otherwise one beat and two overlap,
+    and gaps are not searched.
 
     >>> from vibroimpact.analysis.intervals import interval_train
     >>> beats = np.delete(np.arange(40.0), [7, 20, 21])
@@ -73,7 +73,7 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
 
 
 def local_median(values: Floats) -> Floats:
-    """Return the median of the neighbours of each value, without it; at an end, that of the nearest whole window."""
+    """Return the median of each value's neighbours, without the value; ends use the nearest whole window."""
     reach = min(NEIGHBOURS, (len(values) - 1) // 2)
     windows = np.lib.stride_tricks.sliding_window_view(values, 2 * reach + 1)
     others = np.delete(windows, reach, axis=1)

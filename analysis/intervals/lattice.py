@@ -1,9 +1,9 @@
-"""Missed and spurious spikes of a motion with one spike per period, from the lattice that its intervals make.
+"""Missed and spurious spikes of a motion with one spike per period, from the lattice of its intervals.
 
-True spikes of a period-1 motion lie one interval I apart. One missed makes an interval 2I, so the points of the delay
-plot lie on the lattice (iI, jI); one too many cuts an interval in two, whose points lie on the lines x = I, y = I and
-x + y = I (thesis 5.4.2 and figure 5.13). The estimate goes back to the events: those at the phase of the lattice are
-true, the others spurious, and places of the lattice without an event were missed.
+True spikes of a period-1 motion lie one interval I apart. A missed spike makes an interval 2I, so the points of the
+delay plot lie on the lattice (iI, jI). A spurious spike cuts an interval in two. Their points lie on the lines x = I,
+y = I and x + y = I (thesis 5.4.2 and figure 5.13). The estimate goes back to the events. Events at the phase of the
+lattice are true, others are spurious, and places of the lattice without an event were missed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 from vibroimpact.analysis.robust import robust_sigma
 
 FEWEST_EVENTS = 30
-# Events whose phases are averaged for the place of the lattice: it may drift, slowly.
+# Number of events whose phases are averaged for the place of the lattice, which may drift slowly.
 WINDOW = 41
-# Distance from its place within which an event is on the lattice, in standard deviations of the true events; the
-# least and the most that it may be, relative to the interval: a lattice that needs more is blurred.
+# Largest distance of a lattice event from its place, in standard deviations of the true events; its lower and upper
+# limit, relative to the interval. A lattice beyond the upper limit is blurred.
 SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
-# Least share of all events on the lattice.
-MOSTLY = 0.7
+# Smallest share of all events on the lattice.
+LEAST_ON_LATTICE = 0.7
 ROUNDS = 4
 # Longest span that sharpens the interval, in events; distance of its end from the lattice, relative to the interval.
-LONGEST_SPAN, HALF_WAY = 64, 0.25
+LONGEST_SPAN, NEAR_LATTICE = 64, 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,34 +41,34 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """What the lattice of a period-1 train says; nothing but a reason where there is none."""
+    """Lattice of a period-1 train; only the reason is set if there is no lattice."""
 
     interval: float = float("nan")
     """I, s."""
     jitter: float = float("nan")
     """Standard deviation of true spikes about their places, s."""
     missed: Share = Share()
-    """p: a true spike is missed."""
+    """p: probability that a true spike is missed."""
     spurious: Share = Share()
-    """s: an interval of the true motion has a spurious spike."""
+    """s: probability that an interval of the true motion has a spurious spike."""
     places: int = 0
-    """Places of the lattice."""
+    """Number of places of the lattice."""
     counted_missed: int = 0
-    """Places without an event."""
+    """Number of places without an event."""
     counted_spurious: int = 0
-    """Events between places."""
+    """Number of events between places."""
     on_lattice: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
-    """Shape (event,)."""
+    """Mask of the events on the lattice, shape (event,)."""
     reason: str = ""
-    """Why there is no lattice; empty when there is."""
+    """Reason why there is no lattice; empty if there is one."""
 
 
 def interval_lattice(train: IntervalTrain) -> Lattice:
     """Return missed and spurious spikes of a motion with one spike per period.
 
-    Valid where misses are independent of each other, spurious spikes come at any phase and at most one in an interval,
-    and true spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes that fall on
-    the lattice cannot be seen; their number is made up for. The most frequent interval is the first guess of I.
+    The estimate holds under three conditions. Misses are independent. Spurious spikes have any phase, at most one in an
+    interval. True spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes on the
+    lattice are invisible; the estimate corrects for their number. The most frequent interval is the first guess of I.
 
     >>> from vibroimpact.analysis.intervals import interval_train
     >>> times = np.delete(np.arange(200.0), [10, 50, 51, 120])
@@ -91,10 +91,10 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
             reason=f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
             f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %"
         )
-    if np.mean(on_lattice) < MOSTLY:
+    if np.mean(on_lattice) < LEAST_ON_LATTICE:
         return Lattice(
             reason=f"no single lattice: {100 * np.mean(on_lattice):.0f} % of the events lie at multiples of the most "
-            f"frequent interval ({interval:.4g} s); expected at least {100 * MOSTLY:.0f} %",
+            f"frequent interval ({interval:.4g} s); expected at least {100 * LEAST_ON_LATTICE:.0f} %",
         )
     return _shares(train, interval, jitter, width, offset, on_lattice)
 
@@ -102,15 +102,15 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
 def _clock(times: Floats, guess: float) -> tuple[float, Floats]:
     """Return the interval of the lattice and each event's offset from its nearest place, in intervals (-.5 to .5).
 
-    The place of the lattice near an event is the mean phase of the events around it, first of all, then of those found
-    on the lattice.
+    The place of the lattice near an event is the mean phase of the events around it. Later rounds use only events
+    found on the lattice.
     """
     interval, weight = _sharpened(times, guess), np.ones(len(times))
     phase = np.exp(2j * np.pi * (times - times[0]) / interval)
     offset = np.zeros(len(times))
     for _ in range(ROUNDS):
         mean = _running_sum(phase * weight)
-        # each round leaves less of a drift
+        # each round reduces the drift
         phase = phase * np.exp(-1j * np.angle(mean))
         offset = np.angle(phase) / (2.0 * np.pi)
         weight = (np.abs(offset) < max(_widths(offset, 0.0)[1], NEAREST)).astype(np.float64)
@@ -118,16 +118,16 @@ def _clock(times: Floats, guess: float) -> tuple[float, Floats]:
 
 
 def _sharpened(times: Floats, guess: float) -> float:
-    """Return the interval of the lattice, from longer and longer spans; each serves to count the next."""
+    """Return the interval of the lattice from longer and longer spans; each result counts the next span."""
     interval, reach = guess, 1
     while reach <= min(LONGEST_SPAN, len(times) // 4):
         spans = times[reach:] - times[:-reach]
         number = np.rint(spans / interval)
-        beside = spans / interval - number
-        near = (np.abs(beside) < HALF_WAY) & (number > 0.0)
+        deviation = spans / interval - number
+        near = (np.abs(deviation) < NEAR_LATTICE) & (number > 0.0)
         if not near.any():
             break
-        interval *= 1.0 + float(np.median(beside[near] / number[near]))
+        interval *= 1.0 + float(np.median(deviation[near] / number[near]))
         reach *= 2
     return interval
 
@@ -142,7 +142,7 @@ def _running_sum(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def _widths(offset: Floats, resolution: float) -> tuple[float, float]:
-    """Return the jitter, and how far from its place an event may be, in intervals."""
+    """Return the jitter, and the largest distance of an event from its place, in intervals."""
     jitter = robust_sigma(offset)
     return jitter, max(SIGMAS * jitter, NEAREST, 1.5 * resolution)
 
@@ -155,12 +155,12 @@ def _shares(
     offset: Floats,
     on_lattice: NDArray[np.bool_],
 ) -> Lattice:
-    """Count places from one true event to the next, wherever nothing masked lies between them."""
+    """Count places from one true event to the next, unless a masked instant lies between them."""
     true = np.flatnonzero(on_lattice)
     steps = np.rint(np.diff(train.times[true]) / interval - np.diff(offset[true])).astype(np.int64)
     masked = np.concatenate([[0], np.cumsum(~train.kept)])
     clear = masked[true[1:]] == masked[true[:-1]]
-    # two events at one place are one true and one spurious
+    # of two events at one place, one is true and one is spurious
     double = clear & (steps == 0)
     between = np.where(clear, np.diff(true) - 1, 0)
     places = int(steps[clear].sum())
@@ -168,7 +168,7 @@ def _shares(
         return Lattice(reason="masked spans leave no two places of it side by side")
     empty = int(np.maximum(steps[clear] - 1, 0).sum())
     extra = int(between.sum())
-    # a spurious event within `width` of a place is taken for a true one, or stands in for a missed one
+    # a spurious event within `width` of a place counts as a true one, or replaces a missed one
     spurious = _share(extra, places, 1.0 - 2.0 * width)
     missed = _share(empty, places, 1.0 - 2.0 * width * spurious.value)
     return Lattice(
@@ -177,7 +177,7 @@ def _shares(
 
 
 def _share(count: int, trials: int, seen: float) -> Share:
-    """Return the probability of what is seen only in a part of all cases."""
+    """Return the probability of an event that is visible only in the share `seen` of all cases."""
     from scipy.stats import beta
 
     value = count / trials

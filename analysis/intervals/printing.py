@@ -1,4 +1,4 @@
-"""What the intervals tell, as tables and sentences."""
+"""The report on intervals as printed tables and sentences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.fmus.terminal import Terminal
 
 
 def print_intervals(console: Terminal, report: xr.Dataset) -> None:
-    """Print the report of `interval_report`: numbers with their doubt, verdicts with their reasons."""
+    """Print the report of `interval_report`: numbers with their errors, verdicts with their reasons."""
     numbers = {str(name): float(value) for name, value in report.data_vars.items() if value.ndim == 0}
     rows = (*_rows(report, numbers), *_lattice_rows(report, numbers))
     console.print(table("Intervals", "<quantity", "<value", "<how", rows=rows))
@@ -23,15 +23,15 @@ def print_intervals(console: Terminal, report: xr.Dataset) -> None:
     _print_dimension(console, report)
 
 
-# Gaps printed one by one.
+# Largest number of gaps printed one by one.
 _MOST_GAPS = 20
 
 
 def _rows(report: xr.Dataset, numbers: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
-    said = report.attrs
-    begin, end = said["window"]
-    window = f"from {begin:.6g} to {end:.6g} s ({said['window_from']}), {said['masked_spans']} masked spans"
-    yield "events", str(said["events"]), window
+    attributes = report.attrs
+    begin, end = attributes["window"]
+    window = f"from {begin:.6g} to {end:.6g} s ({attributes['window_from']}), {attributes['masked_spans']} masked spans"
+    yield "events", str(attributes["events"]), window
     rate = numbers["rate"]
     per_minute = f"{60.0 * rate:.2f} per minute; standard error from 20 long bins"
     yield "rate", with_error(rate, numbers["rate_standard_error"], "Hz"), per_minute

@@ -1,4 +1,4 @@
-"""Everything that a train of events tells, in one dataset."""
+"""The report on a train of events: all its statistics in one dataset."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def interval_report(
     theiler: int = THEILER,
     seed: int = 0,
 ) -> xr.Dataset:
-    """Return what the intervals of a train of events tell.
+    """Return the statistics of the intervals of a train of events.
 
     Parameters
     ----------
@@ -54,18 +54,18 @@ def interval_report(
     count_bin : float, optional
         Bin of the Fano factor, s; by default the mean interval, rounded to one digit.
     embedding, theiler : int
-        Of the correlation sums: most intervals in a delay vector, 2 to 16; pairs of vectors at most so many places
-        apart do not count.
+        Parameters of the correlation sums. The embedding is the largest number of intervals in a delay vector, 2 to
+        16. Pairs of vectors at most `theiler` places apart do not count.
     seed : int
-        Of the shuffled surrogates.
+        Seed of the shuffled surrogates.
 
     Returns
     -------
     xarray.Dataset
-        Intervals, rate, coefficient of variation, Fano factors; densities; gaps; lattice rates; correlation sums of raw
-        intervals and of their logarithms with surrogates. What was read from them in words, and why something was
-        refused, is in the attributes `cycle`, `lattice`, `gaps`, `dimension_raw`, `dimension_log`, and what limits the
-        last two in `dimension_raw_warnings`, `dimension_log_warnings`.
+        Intervals, rate, coefficient of variation, Fano factors; densities; gaps; lattice rates. Also correlation sums
+        of raw intervals and of their logarithms, with surrogates. The attributes `cycle`, `lattice`, `gaps`,
+        `dimension_raw` and `dimension_log` have the verdicts in words, or the reasons for a refusal. Limits of the
+        last two are in `dimension_raw_warnings` and `dimension_log_warnings`.
 
     Raises
     ------
@@ -103,9 +103,9 @@ def interval_report(
     }
     attributes: dict[str, Any] = {"cycle": cycle.words, "gaps": gap_words, "lattice": lattice_words}
     for scale in SCALES:
-        slopes, said = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
+        slopes, verdicts = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
         rows |= slopes
-        attributes |= said
+        attributes |= verdicts
     attributes |= {
         "events": len(train.times),
         "window": [float(edge) for edge in train.window],
@@ -119,10 +119,10 @@ def interval_report(
 
 
 def read_motion(train: IntervalTrain, forcing_period: float | None) -> tuple[Cycle, Lattice]:
-    """Return the motion that the intervals show, and the lattice if it has one spike per cycle.
+    """Return the motion behind the intervals, and the lattice if it has one spike per cycle.
 
-    Intervals that repeat after two or more make no single lattice; with missed spikes a lattice often repeats after
-    nothing, and the motion is read from the lattice.
+    Intervals that repeat after two or more form no single lattice. With missed spikes a lattice often never repeats,
+    and the motion is read from the lattice.
     """
     cycle = read_cycle(train, forcing_period)
     if cycle.impacts > 1:

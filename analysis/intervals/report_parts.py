@@ -18,12 +18,12 @@ from vibroimpact.analysis.intervals.variability import (
     rate,
 )
 
-# Report it when the share of delay points at (I, I) differs by more than this from what independent misses leave.
-UNEXPLAINED = 0.1
+# Difference of the share of delay points at (I, I) from its value for independent misses, above which it is reported.
+LARGEST_EXCESS = 0.1
 
 
 def interval_part(train: IntervalTrain) -> Rows:
-    """Return the intervals in their order; delay vectors are successive ones without a NaN."""
+    """Return the intervals in their order; delay vectors are successive intervals without a NaN."""
     along, begins = "interval_number", train.times[:-1]
     return {
         "interval": (along, train.separated, "s", "interspike interval, NaN where masked"),
@@ -39,7 +39,7 @@ def variability_part(train: IntervalTrain, count_bin: float | None) -> Rows:
     fano = fano_factor(train, count_bin or float(f"{mean:.0e}"))
     curve = fano_curve(train)
     widths, factors = np.array([f.width for f in curve]), np.array([f.value for f in curve])
-    doubt, of_error = fano.standard_error, "standard error of the"
+    fano_error, of_error = fano.standard_error, "standard error of the"
     relative = "standard deviation (ddof 0) over mean of the intervals"
     of_bins = "variance (ddof 1) over mean of the counts, bins from the window's start"
     places = "Fano factor over 20 places of the first bin"
@@ -51,7 +51,7 @@ def variability_part(train: IntervalTrain, count_bin: float | None) -> Rows:
         "median_interval": ((), median, "s", "median interval"),
         "coefficient_of_variation": ((), varies, "1", relative),
         "fano_factor": ((), fano.value, "1", of_bins),
-        "fano_standard_error": ((), doubt, "1", f"{of_error} Fano factor, of independent bins"),
+        "fano_standard_error": ((), fano_error, "1", f"{of_error} Fano factor, of independent bins"),
         "fano_bin": ((), fano.width, "s", "bin of the Fano factor"),
         "fano_lowest": ((), fano.lowest, "1", f"smallest {places}"),
         "fano_highest": ((), fano.highest, "1", f"largest {places}"),
@@ -78,7 +78,7 @@ def density_part(density: Density, cycle: Cycle) -> Rows:
 
 
 def gap_part(train: IntervalTrain, gaps: MissedBeats) -> tuple[Rows, str]:
-    """Return the gaps of a nearly periodic train, and in words how many or why none were looked for."""
+    """Return the gaps of a nearly periodic train, and their number or the reason for a refusal, in words."""
     starts, lengths = train.times[gaps.place], np.diff(train.times)[gaps.place]
     spread = "robust coefficient of variation of the intervals about their local median"
     words = f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
@@ -103,7 +103,7 @@ def lattice_part(train: IntervalTrain, lattice: Lattice) -> tuple[Rows, str]:
             f"{lattice.counted_missed} of {lattice.places} places without a spike, "
             f"{lattice.counted_spurious} spikes between the places"
         )
-        if abs(observed[0] - expected[0]) > UNEXPLAINED:
+        if abs(observed[0] - expected[0]) > LARGEST_EXCESS:
             words += (
                 f"; but {100 * observed[0]:.0f} % of the delay points lie at (I, I), where independent misses leave "
                 f"{100 * expected[0]:.0f} %: they are not independent, or this is another motion"

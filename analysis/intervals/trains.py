@@ -1,4 +1,4 @@
-"""A train of events as intervals: what was observed, what is masked, and what may be compared with what."""
+"""A train of events as intervals: observed window, masked spans, and the intervals that count."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEWEST_EVENTS = 3
 
 @dataclass(frozen=True, slots=True)
 class IntervalTrain:
-    """Events, the window in which they were observed, and the spans of it that do not count.
+    """Events, the window in which they were observed, and its masked spans.
 
     Attributes
     ----------
@@ -27,13 +27,13 @@ class IntervalTrain:
     window : tuple of float
         Start and end of the observation, s.
     stated : bool
-        The window was given; otherwise it is the first and the last event, which both lie in it by choice.
+        Whether the window was given; otherwise it is the first and the last event, which then lie in it by definition.
     masked : tuple of (float, float)
-        Spans of no observation, s, ascending, not overlapping; one of no length is a seam.
+        Spans without observation, s, ascending, not overlapping; a span of no length is a seam.
     kept : ndarray of bool, shape (event - 1,)
-        Which intervals have no masked instant in them.
+        Mask of the intervals without a masked instant.
     resolution : float
-        Grid of the instants, s; 0: none known.
+        Grid of the instants, s; 0: unknown.
     """
 
     times: Floats
@@ -50,7 +50,7 @@ class IntervalTrain:
 
     @property
     def separated(self) -> Floats:
-        """All intervals, s, with NaN for those that do not count: delay vectors must not reach over them."""
+        """All intervals, s, with NaN for masked ones, which delay vectors must not cross."""
         return np.where(self.kept, np.diff(self.times), np.nan)
 
     @property
@@ -67,7 +67,7 @@ def interval_train(
     masked: Sequence[Span] = (),
     resolution: float = 0.0,
 ) -> IntervalTrain:
-    """Return a checked train of events; arguments and errors as of `interval_report`.
+    """Return a checked train of events; arguments and errors as for `interval_report`.
 
     Examples
     --------
@@ -105,11 +105,11 @@ def interval_train(
 
 
 MOST_SEAMS = 10_000
-"""Most seams: recordings are joined from hours or days, and each seam costs an interval."""
+"""Largest number of seams: recordings are joined from hours or days, and each seam costs an interval."""
 
 
 def seams(period: float, window: Span, half_width: float = 0.0) -> tuple[Span, ...]:
-    """Return the spans to mask around the multiples of a period, such as where files were joined.
+    """Return the spans to mask around the multiples of a period, for example where files were joined.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def seams(period: float, window: Span, half_width: float = 0.0) -> tuple[Span, .
     window : tuple of float
         Start and end of the observation, s; only multiples strictly between them count.
     half_width : float
-        s; 0: the interval over the seam is masked and nothing else.
+        s; 0: only the interval across the seam is masked.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def _window(instants: Floats, window: Span | None) -> Span:
 
 
 def _joined(masked: Sequence[Span]) -> tuple[Span, ...]:
-    """Return the spans in order, those that overlap made one."""
+    """Return the spans in order, with overlapping spans joined."""
     joined: list[Span] = []
     for start, end in sorted((float(a), float(b)) for a, b in masked):
         if not end >= start:

@@ -1,7 +1,7 @@
-"""How regular a train is: rate, coefficient of variation, Fano factor.
+"""The regularity of a train: rate, coefficient of variation, Fano factor.
 
-What is estimated says how: the standard error of the rate comes from counts in long bins, which keeps the memory of
-the train; the Fano factor depends on its bins, so their width is stated and their offset varied.
+The standard error of the rate comes from counts in long bins, which keeps the memory of the train. The Fano factor
+depends on its bins, so their width is stated and their offset varied.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 from vibroimpact.fmus.errors import UsageError
 
-# Bins of the standard error of a rate, and places of the first bin tried for a Fano factor.
+# Number of bins for the standard error of a rate, and of offsets of the first bin for a Fano factor.
 RATE_BINS, OFFSETS = 20, 20
-# Widths of the Fano curve, in mean intervals, and the fewest bins that give a variance.
+# Widths of the Fano curve, in mean intervals, and smallest number of bins for a variance.
 CURVE = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 FEWEST_BINS = 10
-# Difference of ends, relative to the bin, up to which they differ by rounding alone.
+# Difference of ends, relative to the bin, up to which it is rounding alone.
 ROUNDING = 1e-9
 
 
@@ -29,20 +29,20 @@ class FanoFactor:
     width: float
     """Width of the bins, s."""
     value: float = float("nan")
-    """With the first bin at the start of the window; NaN, as the others, where there are fewer than 10 bins."""
+    """Value with the first bin at the start of the window; NaN, like the others, for fewer than 10 bins."""
     standard_error: float = float("nan")
-    """sqrt(2 / (bins - 1)) of the value: as if the counts were normal and independent."""
+    """The value times sqrt(2 / (bins - 1)): as if the counts were normal and independent."""
     lowest: float = float("nan")
     highest: float = float("nan")
-    """`lowest` and `highest` over `OFFSETS` places of the first bin."""
+    """`lowest` and `highest` over `OFFSETS` offsets of the first bin."""
 
 
 def rate(train: IntervalTrain) -> tuple[float, float]:
     """Return events per second of observation, and the standard error.
 
-    In a window that was given, events over its duration; otherwise intervals over the span from the first event to
-    the last. The standard error comes from the counts in 20 long bins (as it would from any 20 independent repeats);
-    NaN where there are too few events.
+    In a given window the rate is events over duration; otherwise it is intervals over the span from the first event to
+    the last. The standard error comes from the counts in 20 long bins (as from any 20 independent repeats); NaN for too
+    few events.
     """
     events = len(train.times) - (0 if train.stated else 1)
     value = events / train.duration
@@ -62,7 +62,7 @@ def coefficient_of_variation(train: IntervalTrain) -> float:
 def fano_factor(train: IntervalTrain, width: float) -> FanoFactor:
     """Return the Fano factor of the counts in bins of a width (s).
 
-    The bins start with the window; the part of the window that they do not fill, and bins that touch a masked span,
+    The bins start with the window. The rest of the window after the last whole bin, and bins that touch a masked span,
     do not count.
     """
     counts = bin_counts(train, width)
@@ -82,7 +82,7 @@ def fano_curve(train: IntervalTrain) -> list[FanoFactor]:
 
 
 MOST_BINS = 10**7
-"""Bins above which counts are 0 and 1 in any recording, and only fill memory."""
+"""Number of bins above which counts are 0 or 1 in any recording, and only fill memory."""
 
 
 def bin_counts(train: IntervalTrain, width: float, offset: float = 0.0) -> Floats:
@@ -97,7 +97,7 @@ def bin_counts(train: IntervalTrain, width: float, offset: float = 0.0) -> Float
     if number < 1:
         return np.empty(0)
     edges = start + width * np.arange(number + 1)
-    # an event at an edge belongs to the bin that begins there, whatever the last digit says
+    # an event at an edge belongs to the bin that begins there, despite rounding
     place = np.searchsorted(edges - ROUNDING * width, train.times, "right") - 1
     inside = place[(place >= 0) & (place < number)]
     counts = np.bincount(inside, minlength=number).astype(np.float64)

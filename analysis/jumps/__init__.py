@@ -1,4 +1,4 @@
-"""Where the motion jumps along a sweep: the class of each run, and the intervals between runs of two classes."""
+"""Jumps of the motion along a sweep: the class of each run, and the intervals between runs of two classes."""
 
 from __future__ import annotations
 

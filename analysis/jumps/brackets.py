@@ -1,4 +1,4 @@
-"""The intervals of a swept parameter in which the motion jumps, read off a dataset."""
+"""The intervals of a swept parameter in which the motion jumps, found in a dataset."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from vibroimpact.analysis.jumps.classes import classes_of
 from vibroimpact.fmus.errors import DatasetError
 
 JUMP = 0.05
-"""Change of the recorded range between neighbours, over the largest range, that counts as a jump."""
+"""Change of the recorded range between neighbours, over the largest range, above which the motion jumps."""
 
 
 def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
-    """Return between which neighbouring runs of a sweep of one parameter the motion jumps.
+    """Return the intervals between neighbouring runs of a one-parameter sweep in which the motion jumps.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Along `jump`: `below` and `above`, the values on its two sides; `direction`; `period` and `impacts` of the
-        motion P(p,q) on each of them, along `side` (period 0: aperiodic).
+        Along `jump`: `below` and `above`, the values at both ends of the interval; `direction`. Along `side` as well:
+        `period` and `impacts` of the motion P(p,q) at each end (period 0: aperiodic).
 
     Raises
     ------

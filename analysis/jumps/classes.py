@@ -1,7 +1,7 @@
-"""The class of each run: its outcome, the period of its orbit, and how often that hits the stops.
+"""The class of each run: its outcome, the period of its orbit, and the impacts in one turn of the orbit.
 
-A motion P(p,q) repeats after q forcing periods with p impacts. What repeats within half of what was recorded has such
-a class; all else is told as aperiodic, whether it is chaos, a long period or a transient.
+A motion P(p,q) repeats after q forcing periods with p impacts. A motion has such a class if it repeats within half of
+the recorded time. All other motions are aperiodic: chaos, long periods or transients.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.schema import Outcome
 
 SAME = 1e-3
-"""Difference between two periods, over the largest value of the quantity in the run, up to which they are the same."""
+"""Difference between two periods, over the run's largest value of the quantity, below which they count as equal."""
 APERIODIC = 0
 _TINY = np.finfo(np.float64).tiny
 _UNCOUNTED = -1
@@ -26,13 +26,13 @@ _RAN = (Outcome.ok, Outcome.stuck)
 
 @dataclass(frozen=True, slots=True)
 class RunClasses:
-    """What tells runs apart.
+    """The distinguishing numbers of runs.
 
     Attributes
     ----------
     label : ndarray of int, shape (run, 3)
-        Outcome; forcing periods after which the orbit repeats, 0 where it is aperiodic; impacts (of a scene of
-        components events) in that time, -1 where they are not compared, -2 where they are infinitely many.
+        Outcome; forcing periods until the orbit repeats (0: aperiodic); impacts in that time. Impacts are events in a
+        scene of components; -1 means not compared, -2 infinitely many.
     extent : ndarray of float, shape (run,)
         Displacement range (m); NaN where it is not compared.
     """
@@ -41,13 +41,13 @@ class RunClasses:
     extent: NDArray[np.float64]
 
     def jump(self, one: NDArray[np.intp], other: NDArray[np.intp], step: float) -> NDArray[np.bool_]:
-        """Return between which pairs of runs the motion jumps: another class, or ranges further apart than `step`."""
+        """Return a mask of the pairs of runs between which the motion jumps: by class, or by a range beyond `step`."""
         differ = (self.label[one] != self.label[other]).any(axis=1)
-        # NaN, which is not compared, is no jump
+        # NaN means not compared, and makes no jump
         return np.asarray(differ | (np.abs(self.extent[one] - self.extent[other]) > step))
 
     def joined(self, more: RunClasses) -> RunClasses:
-        """Return the classes of these runs and of more."""
+        """Return the classes of these runs followed by the classes of others."""
         label = np.concatenate([self.label, more.label])
         return RunClasses(label, np.concatenate([self.extent, more.extent]))
 
@@ -58,7 +58,7 @@ def classes_of(runs: xr.Dataset) -> RunClasses:
     Parameters
     ----------
     runs : xarray.Dataset
-        As it is stored, or `ds.vibroimpact.runs`. What was not recorded tells no runs apart.
+        As it is stored, or `ds.vibroimpact.runs`. Quantities that were not recorded are not compared.
     """
     outcome = runs["outcome"].values.astype(np.int64)
     repeats = np.where(np.isin(outcome, _RAN), _periods_of(runs), APERIODIC)
@@ -73,7 +73,7 @@ def classes_of(runs: xr.Dataset) -> RunClasses:
 
 
 def _periods_of(runs: xr.Dataset) -> NDArray[np.int64]:
-    """Return after how many forcing periods each run repeats; 1 of a scene that has none, 0 of an aperiodic run."""
+    """Return the period of each run in forcing periods; 1 in a scene without forcing, 0 for an aperiodic run."""
     columns = [runs[name].values for name in _ORBIT if name in runs.variables and runs[name].shape[1] > 1]
     found = np.zeros(runs.sizes["run"], dtype=np.int64)
     if not columns:
@@ -86,7 +86,7 @@ def _periods_of(runs: xr.Dataset) -> NDArray[np.int64]:
 
 
 def _counted(runs: xr.Dataset, repeats: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the impacts, or events, of each run while its orbit goes round once."""
+    """Return the impacts, or events, of each run during one turn of its orbit."""
     if "impacts_per_period" in runs.variables:
         each = runs["impacts_per_period"].values
         inside = np.arange(each.shape[1]) < np.maximum(repeats, 1)[:, None]

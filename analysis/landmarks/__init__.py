@@ -1,4 +1,4 @@
-"""What is read off sweeps, the exact periodic orbits beside it, and orders of convergence."""
+"""Readings of sweeps, the exact periodic orbits to compare them with, and orders of convergence."""
 
 from __future__ import annotations
 

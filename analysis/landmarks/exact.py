@@ -1,9 +1,9 @@
 """Closed-form landmarks of the impact oscillator: grazing, period doubling and fold of the P(1,1) motion.
 
-One mass with spring and dashpot under a harmonic force, an impulsive stop with constant restitution.
-Symbols, in units of the natural frequency wn = sqrt(k/m) and of one unit of length: w drive frequency, zeta
-damping ratio, F force over stiffness, a stop position (> 0), r restitution, T = 2 pi/w, H = exp(-zeta T),
-V impact velocity, theta forcing phase at impact.
+The system is one mass with spring and dashpot under a harmonic force, with an impulsive stop of constant restitution.
+Units are the natural frequency wn = sqrt(k/m) and one unit of length. The drive has frequency w, the force over
+stiffness is F, and zeta is the damping ratio. The stop is at a > 0 with restitution r. T = 2 pi/w, H = exp(-zeta T),
+V is the impact velocity, theta the forcing phase at impact.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from vibroimpact.fmus.safe_toml import parse_toml
 
 Floats = npt.NDArray[np.float64]
 
-# Points of the scan that separates the roots of a locus, and samples of one flight in the penetration test.
+# Points of the scan that separates the roots of a locus, and samples per flight in the penetration test.
 _SCAN_POINTS = 4001
 _FLIGHT_SAMPLES = 4001
 
 
 _RETURNS = 1e-8
-"""Distance of the forcing period from a multiple of the natural one below which an undamped oscillator returns."""
+"""Value of |sin(pi / w)| below which an undamped oscillator returns to its state after one forcing period."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class ImpactOscillator:
     mass, damping, stiffness : float
         kg, N s/m, N/m.
     amplitude : float
-        Of the force, N.
+        Amplitude of the force, N.
     stop_position : float
         Distance from rest to the stop, > 0, m.
     restitution : float
@@ -74,14 +74,14 @@ class ImpactOscillator:
         Parameters
         ----------
         angular_frequency : float
-            Of the force, rad/s.
+            Angular frequency of the force, rad/s.
 
         Returns
         -------
         tuple of (float, float)
-            Impact velocity (m/s) and forcing phase at impact (rad, from 0 to 2 pi) of each that passes no stop
-            between two impacts; stable or not. None for an undamped oscillator that is back after one period whatever
-            it did: its motions have no closed form, since they are not isolated.
+            Impact velocity (m/s) and forcing phase at impact (rad, from 0 to 2 pi) of each motion, stable or not. A
+            motion that passes the stop between two impacts is left out. Empty for an undamped oscillator that returns
+            to any state after one period: its motions are not isolated, and have no closed form.
 
         Examples
         --------
@@ -101,7 +101,7 @@ class ImpactOscillator:
         for velocity in sorted(float(root.real) for root in roots if root.imag == 0.0 and root.real > 0.0):
             y, v = a - alpha * velocity, slope * velocity
             theta = math.atan2(s * y - c * v, c * y + s * v)
-            if _clears_the_stop(self, w, velocity, theta):
+            if _stays_below(self, w, velocity, theta):
                 found.append((velocity * self.natural_frequency, theta % (2.0 * math.pi)))
         return tuple(found)
 
@@ -157,7 +157,7 @@ def _damping(body: dict[str, Any]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class StabilityLimit:
-    """Where P(1,1) loses stability: angular frequency (rad/s), impact velocity (m/s), impact phase (rad)."""
+    """Stability limit of P(1,1): angular frequency (rad/s), impact velocity (m/s), impact phase (rad)."""
 
     angular_frequency: float
     impact_velocity: float
@@ -167,7 +167,7 @@ class StabilityLimit:
 def grazing_frequencies(oscillator: ImpactOscillator) -> tuple[float, ...]:
     """Return the angular frequencies at which the steady motion just touches the stop, ascending, rad/s.
 
-    Steady amplitude = stop distance (thesis eqs. 2.32, 2.33): two, one (strong force) or none (weak force).
+    Steady amplitude = stop distance (thesis eqs. 2.32, 2.33): two, one (strong force) or no frequency (weak force).
 
     Examples
     --------
@@ -180,13 +180,13 @@ def grazing_frequencies(oscillator: ImpactOscillator) -> tuple[float, ...]:
     if middle**2 < rest:
         return ()
     upper = middle + math.sqrt(middle**2 - rest)
-    # The difference of the quadratic formula cancels as F -> a; the product of the roots does not.
+    # The difference in the quadratic formula cancels as F -> a; the product of the roots does not.
     squares = (rest / upper, upper) if upper > 0 else (rest,)
     return tuple(oscillator.natural_frequency * math.sqrt(square) for square in squares if square > 0)
 
 
 def period_doublings(oscillator: ImpactOscillator, low: float, high: float) -> list[StabilityLimit]:
-    """Return where P(1,1) doubles its period (multiplier -1) between two angular frequencies, ascending.
+    """Return the period doublings of P(1,1) (multiplier -1) between two angular frequencies, ascending.
 
     Parameters
     ----------
@@ -204,12 +204,12 @@ def period_doublings(oscillator: ImpactOscillator, low: float, high: float) -> l
 
 
 def folds(oscillator: ImpactOscillator, low: float, high: float) -> list[StabilityLimit]:
-    """Return where P(1,1) folds (multiplier +1, saddle-node); parameters as for `period_doublings`."""
+    """Return the folds of P(1,1) (multiplier +1, saddle-node); parameters as for `period_doublings`."""
     return _limits(oscillator, low, high, sigma=1.0)
 
 
 def _limits(oscillator: ImpactOscillator, low: float, high: float, sigma: float) -> list[StabilityLimit]:
-    """Find where the locus of a multiplier sigma crosses the force; physical orbits only."""
+    """Return the frequencies where the locus of a multiplier sigma crosses the force; physical orbits only."""
     scale = oscillator.natural_frequency
 
     def excess(w: Any) -> Any:
@@ -219,13 +219,13 @@ def _limits(oscillator: ImpactOscillator, low: float, high: float, sigma: float)
     for w in _roots(excess, np.linspace(low / scale, high / scale, _SCAN_POINTS)):
         velocity, cosine, sine = (float(value) for value in _locus(oscillator, np.float64(w), sigma))
         theta = math.atan2(sine, cosine) % (2 * math.pi)
-        if velocity > 0 and _clears_the_stop(oscillator, w, velocity, theta):
+        if velocity > 0 and _stays_below(oscillator, w, velocity, theta):
             limits.append(StabilityLimit(w * scale, velocity * scale, theta))
     return limits
 
 
 def _roots(function: Callable[[Any], Any], grid: Floats) -> list[float]:
-    """Return the roots of a function between grid points; a change of sign through a pole is none."""
+    """Return the roots of a function between grid points; a change of sign through a pole is not a root."""
     from scipy.optimize import brentq
 
     values = function(grid)
@@ -245,7 +245,7 @@ def _flight(zeta: float, u: Any) -> tuple[Any, Any]:
 
 
 def _homogeneous(oscillator: ImpactOscillator, w: Any) -> tuple[Any, Any]:
-    """Return alpha and the homogeneous velocity after impact, each for unit V, of the P(1,1) motion."""
+    """Return alpha and the homogeneous velocity after impact, both per unit of V, of the P(1,1) motion."""
     zeta, r = oscillator.damping_ratio, oscillator.restitution
     period = 2 * math.pi / w
     phi12, phi11 = _flight(zeta, period)
@@ -255,9 +255,9 @@ def _homogeneous(oscillator: ImpactOscillator, w: Any) -> tuple[Any, Any]:
 
 
 def _locus(oscillator: ImpactOscillator, w: Any, sigma: float) -> tuple[Any, Any, Any]:
-    """Return V, F cos theta and F sin theta of the P(1,1) motion that has a multiplier sigma at w.
+    """Return V, F cos theta and F sin theta of the P(1,1) motion with a multiplier sigma at w.
 
-    Explicit for given w: the condition tr = sigma (1 + det) is linear in V (thesis eqs. 2.67-2.69, 3.2).
+    The solution is explicit for given w: tr = sigma (1 + det) is linear in V (thesis eqs. 2.67-2.69, 3.2).
     """
     zeta, r, a = oscillator.damping_ratio, oscillator.restitution, oscillator.stop_position
     period = 2 * math.pi / w
@@ -273,11 +273,11 @@ def _locus(oscillator: ImpactOscillator, w: Any, sigma: float) -> tuple[Any, Any
     return velocity, in_phase, quadrature
 
 
-def _clears_the_stop(oscillator: ImpactOscillator, w: float, velocity: float, theta: float) -> bool:
-    """Say whether the flight between two impacts stays below the stop, certified by a bound on acceleration.
+def _stays_below(oscillator: ImpactOscillator, w: float, velocity: float, theta: float) -> bool:
+    """Tell whether the flight between two impacts stays below the stop, certified by a bound on acceleration.
 
-    At both ends the flight leaves the stop with a known speed; in between the largest sample plus what the
-    displacement can rise by between samples must stay below the stop.
+    At both ends the flight leaves the stop with a known speed. In between, the largest sample plus the largest
+    possible rise between two samples must stay below the stop.
     """
     zeta, a = oscillator.damping_ratio, oscillator.stop_position
     period = 2 * math.pi / w

@@ -1,4 +1,4 @@
-"""The order at which an error falls with the step."""
+"""The order of an error in the step."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 def observed_order(step: NDArray[np.float64], error: NDArray[np.float64]) -> float:
     """Return the order p of error ~ step^p: the median of the slopes between neighbouring steps.
 
-    The median ignores a few steps that are too large for the order to show, or so small that rounding rules.
+    The median ignores a few steps that are too large for the order, or so small that rounding dominates.
 
     Parameters
     ----------
     step : ndarray of float, shape (n,)
         In any order, any unit.
     error : ndarray of float, shape (n,)
-        Of either sign; what is zero or not finite is left out.
+        Of either sign; zeros and values that are not finite are left out.
 
     Returns
     -------

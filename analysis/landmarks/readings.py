@@ -1,6 +1,6 @@
-"""What a bifurcation campaign of the impact oscillator says about its landmarks, beside the exact values.
+"""Landmarks of the impact oscillator from a bifurcation campaign, next to their exact values.
 
-Only counts, alternation and amplitudes of the recorded runs are used, as one would with measured data.
+Only counts, alternation and amplitudes of the recorded runs are used, as with measured data.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from vibroimpact.fmus.errors import DatasetError
 Floats = npt.NDArray[np.float64]
 
 _FREQUENCY = "angular_frequency"
-# Most non-impacting points from which the amplitude is extrapolated.
+# Largest number of non-impacting points from which the amplitude is extrapolated.
 _EXTRAPOLATED_POINTS = 12
-# Relative difference of impact velocities below which they differ by rounding and do not alternate.
+# Relative difference of impact velocities below which they are equal to rounding, and do not alternate.
 _SAME_VELOCITY = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One landmark read off a dataset.
+    """One landmark found in a dataset.
 
     Attributes
     ----------
     name : str
-        What it is.
+        Name of the landmark.
     value, exact : float
-        Angular frequency as read and in closed form (rad/s; 1 in nondimensional scenes).
+        Angular frequency from the dataset and in closed form (rad/s; 1 in nondimensional scenes).
     grid_step : float
         Distance of neighbouring points of the sweep at the reading, in the same unit.
     how : str
-        How it was read.
+        Method of the reading.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Reading:
 def bifurcation_readings(dataset: xr.Dataset) -> list[Reading]:
     """Read the landmarks of an up-down frequency sweep of the impact oscillator.
 
-    The lower graze is extrapolated from the amplitude of the non-impacting motion, the others lie in the
+    The lower graze is extrapolated from the amplitude of the non-impacting motion. The other landmarks lie in the
     middle between two neighbouring runs of different kind.
 
     Parameters
@@ -80,7 +80,7 @@ def bifurcation_readings(dataset: xr.Dataset) -> list[Reading]:
         If the sweep is of another kind or does not reach a landmark.
     """
     oscillator = ImpactOscillator.from_scene(_scene(dataset))
-    # A run that failed says nothing: its frequency is left out and the grid is coarser there.
+    # A failed run is no evidence: its frequency is left out, and the grid is coarser there.
     is_whole = (dataset["outcome"] == Outcome.ok).all("direction").values
     dataset = dataset.isel({_FREQUENCY: np.flatnonzero(is_whole)})
     w = np.asarray(dataset[_FREQUENCY].values, dtype=np.float64)
@@ -112,12 +112,12 @@ def bifurcation_readings(dataset: xr.Dataset) -> list[Reading]:
 
 
 def _scene(dataset: xr.Dataset) -> str:
-    """Return the scene text of an up-down frequency sweep; refuse anything else."""
+    """Return the scene text of an up-down frequency sweep; another dataset raises DatasetError."""
     needed = ("impact_count", "impact_velocity", "displacement_max", "impacts_per_period")
-    lacking = [name for name in needed if name not in dataset.variables]
-    if lacking:
+    missing = [name for name in needed if name not in dataset.variables]
+    if missing:
         raise DatasetError(
-            f"readings: expected impacts and extrema in the dataset, got no {', '.join(lacking)}. "
+            f"readings: expected impacts and extrema in the dataset, got no {', '.join(missing)}. "
             "Set impacts = true and extrema = true in [record]."
         )
     dims = dataset["impact_count"].dims
@@ -142,12 +142,12 @@ def _bracketed(name: str, bracket: tuple[float, float], exact: float, how: str) 
 
 
 def _impacting(sweep: xr.Dataset) -> npt.NDArray[np.bool_]:
-    """Say which runs of a sweep hit the stop."""
+    """Return a mask of the runs of a sweep that hit the stop."""
     return np.asarray(sweep["impact_count"].values > 0)
 
 
 def _last_impact(sweep: xr.Dataset, w: Floats, expected: str) -> tuple[float, float]:
-    """Return the neighbours of which the lower is the highest frequency with impacts; there must be a higher one."""
+    """Return the highest frequency with impacts and its upper neighbour; there must be such a neighbour."""
     hits = np.flatnonzero(_impacting(sweep))
     if hits.size == 0 or hits[-1] == w.size - 1:
         raise DatasetError(f"readings: {expected}.")
@@ -170,10 +170,10 @@ def _doubling_bracket(down: xr.Dataset, w: Floats) -> tuple[float, float]:
 
 
 def _is_period_one(run: xr.Dataset) -> bool:
-    """Say whether a run is P(1,1): one impact in each period, and no lasting alternation.
+    """Tell whether a run is P(1,1): one impact in each period, and no lasting alternation.
 
-    Near the doubling the multiplier is close to -1 and a transient alternates for thousands of periods. So
-    the difference of successive impact velocities is not compared with a tolerance: it must shrink.
+    Near the doubling the multiplier is close to -1, and a transient alternates for thousands of periods. So no
+    tolerance applies to the difference of successive impact velocities: the difference must shrink.
     """
     if not (run["impacts_per_period"].values == 1).all():
         return False
@@ -189,7 +189,7 @@ def _lower_graze(up: xr.Dataset, w: Floats, exact: float, stop: float) -> Readin
     """Extrapolate the amplitude of the non-impacting motion to the stop.
 
     For a linear oscillator the inverse square of the amplitude is a quadratic in the square of the frequency
-    (thesis eqs. 2.27-2.31); so a parabola through the points before the first impact carries on exactly.
+    (thesis eqs. 2.27-2.31). So a parabola through the points before the first impact is exact beyond them.
     """
     hits = np.flatnonzero(_impacting(up))
     first = int(hits[0]) if hits.size else 0

@@ -10,10 +10,10 @@ from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Op
 
 @study("analysis.orbits.classify:ClassesOfDataset", Door("classify", without=("output",)))
 class Classify(Operation):
-    """Say what each run of a dataset is: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+    """Classify each run of a dataset: P(p,q), chaos, rest, sticking, no impacts, or unknown with the reason.
 
-    From the strobe and the extrema of each recorded period. A slow transient is told from a doubled period by its
-    distances, which shrink by a constant factor; 40 recorded periods tell chaos.
+    The classes come from the strobe and the extrema of each recorded period. A slow transient differs from a doubled
+    period by its distances, which shrink by a constant factor. Chaos needs 40 recorded periods.
 
     Example: vibroimpact classify campaign -o classes.nc --figure classes.png
     """

@@ -8,7 +8,7 @@ from vibroimpact.fmus.operations import Operation, operation
 
 @operation("analysis.commands.describe:describe_file")
 class Describe(Operation):
-    """Say what a file holds: what made it, its dimensions, each variable with its meaning, unit and values.
+    """List the contents of a file: its origin, its dimensions, each variable with its meaning, unit and values.
 
     Example: vibroimpact describe run.nc
     """

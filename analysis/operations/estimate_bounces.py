@@ -12,7 +12,7 @@ from vibroimpact.fmus.operations import DatasetFile, FigureFile, Force, Operatio
 class EstimateBounces(Operation):
     """Estimate the restitution of a body that bounces under its weight, or under another constant force.
 
-    Where it changes with the speed of impact, r(v) is given in its place.
+    Where the restitution changes with the speed of impact, r(v) is given in its place.
 
     Example: vibroimpact estimate bounces ball.nc --channel height -o estimates.nc --figure estimates.png
     """

@@ -12,7 +12,7 @@ from vibroimpact.fmus.operations import DatasetFile, FigureFile, Force, Operatio
 class EstimateImpacts(Operation):
     """Estimate restitution, damping, frequency and forcing from motion against a stop.
 
-    Of a simulated run, forcing and stop are taken from its scene.
+    For a simulated run, forcing and stop are taken from its scene.
 
     Example: vibroimpact estimate impacts run.nc --run 3 -o estimates.nc --figure estimates.png
     """

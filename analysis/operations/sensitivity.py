@@ -16,16 +16,16 @@ from vibroimpact.fmus.operations import (
     study,
 )
 
-#: Of the intervals of Sobol indices.
+#: Confidence of the intervals of Sobol indices, and number of bootstrap resamples.
 LEVEL, RESAMPLES = 0.95, 1000
 
 
 @study("analysis.sensitivity.report:SensitivityOfCampaign", Door("sensitivity"))
 class Sensitivity(Operation):
-    """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
+    """Compute the share of each drawn key of a campaign in the variance of each result (Sobol indices).
 
-    First order: by the key alone; total: with all that it takes part in; each with a bootstrap interval. The sweep of
-    the scene has two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.
+    First order: by the key alone; total: with all its interactions; each with a bootstrap interval. The sweep of the
+    scene needs two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.
 
     Example: vibroimpact sensitivity campaign -o sensitivity.nc --figure sensitivity.png
     """

@@ -16,7 +16,7 @@ from vibroimpact.fmus.operations import (
     operation,
 )
 
-#: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
+#: Embedding and Theiler window of the correlation dimension, as in `intervals.dimension`, which loads slowly.
 EMBEDDING, THEILER = 6, 1
 
 

@@ -1,8 +1,8 @@
-"""Basins of attraction: where the starts of a grid end, and how their borders look.
+"""Basins of attraction: the ends of the starts of a grid, and the borders between them.
 
-Starts are followed from one period of the force to the next until they are near to an attractor that is known. How near
-is near is tried out first: starts at that distance must come back. Attractors are found by long runs of some of the
-starts, then of some of those that come near to none.
+Starts are followed period by period until they are near a known attractor. The limit of near is determined first:
+probe starts at that distance must come back. Long runs of some of the starts find the attractors, later also long
+runs of some starts that are near none.
 """
 
 from __future__ import annotations
@@ -32,49 +32,49 @@ Floats = NDArray[np.float64]
 Labels = NDArray[np.int16]
 
 UNDECIDED, BEYOND_A_STOP = -1, -2
-"""Labels of starts that are near to no attractor yet, and of those that no body can have."""
+"""Labels of starts that are near no attractor yet, and of starts that are impossible for a body."""
 FIRST_SAMPLE, LATER_SAMPLE = 64, 32
-"""Starts of which long runs tell attractors, to begin with and of those that come near to none."""
+"""Number of starts whose long runs find attractors: at first, and of the starts that are near none later."""
 CHAOS_SAMPLE = 256
-"""Of the last starts of all, that must all be chaotic for the others to count as such."""
+"""Number of the last starts that must all be chaotic for the others to count as chaotic."""
 ROUNDS = (24, 32, 48, 96, 200, 400, 800)
-"""Forcing periods between two looks at who is near."""
-LOOKS = (104, 400)
-"""Forcing periods after which attractors are looked for again."""
+"""Forcing periods between two checks of the starts."""
+SEARCH_PERIODS = (104, 400)
+"""Forcing periods after which attractors are searched again."""
 NEAREST, FARTHEST = 1e-7, 1e-2
-"""Distances from an attractor, over the size of the motion, that are tried out as near."""
+"""Smallest and largest distance from an attractor, over the size of the motion, to try as the limit of near."""
 TRANSIENT, TRANSIENT_OF_CHAOS = 1000, 10_000
-"""Forcing periods after which a run is what it is, and after which it is chaotic for good."""
+"""Forcing periods after which a run has its class, and after which its chaos counts as permanent."""
 SETTLING, MOST_SETTLING, SETTLED = 64, 30, 1e-13
-"""Rounds after which an attractor's state is looked at again, how often, and the change that is none."""
+"""Rounds between two checks of an attractor's state, largest number of checks, and change that counts as none."""
 PROBES, PROBE_PERIODS = 24, 400
-"""Starts at that distance, and forcing periods in which they must come back."""
+"""Number of probe starts at that distance, and forcing periods in which they must come back."""
 MISSED = 0.05
-"""Probability with which a sample may show no start of a share that it is said to exclude."""
+"""Probability with which a sample misses all starts of a share that it excludes."""
 SAME = 1e-5
-"""Distance over the size of the motion at which two attractors are one."""
+"""Distance, over the size of the motion, below which two attractors are equal."""
 
 
 class Ends(NamedTuple):
-    """States at forcing phase 0 some periods later, shape (start, variable), and whether each run went well."""
+    """States at forcing phase 0 some periods later, shape (start, variable), and whether each run succeeded."""
 
     states: Floats
     well: NDArray[np.bool_]
 
 
 class Flow(Protocol):
-    """What follows many starts at once."""
+    """Interface to simulate many starts at once."""
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
-        """Return where states, shape (start, variable), are after some forcing periods.
+        """Return the states after some forcing periods, from states of shape (start, variable).
 
-        With `first` they are at time 0, not at forcing phase 0; the periods count from the next phase 0.
+        With `first` they are at time 0, not at forcing phase 0; the periods then count from the next phase 0.
         """
 
     def classes(
         self, states: Floats, transient: int, *, first: bool = False
     ) -> tuple[list[RunClass], Floats]:
-        """Return what a run from each state is after so many forcing periods, and its last states."""
+        """Return the class of a run from each state after a transient of forcing periods, and its last states."""
 
     def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
         """Return the features of the impacts in consecutive blocks of forcing periods, from forcing phase 0 on."""
@@ -82,17 +82,17 @@ class Flow(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """What starts end on."""
+    """An attractor on which starts end."""
 
     kind: RunClass
     states: Floats
-    """At forcing phase 0, shape (period, variable); none of chaos."""
+    """States at forcing phase 0, shape (period, variable); empty for chaos."""
     radius: float
-    """Distance, over the size of the motion, from which starts were seen to come back."""
+    """Distance, over the size of the motion, from which probe starts came back."""
     impacts: Floats
-    """Mean number a forcing period, shape (stop,), but for slow ones of a chatter; NaN if they are without number."""
+    """Mean number in a forcing period, shape (stop,), without the slow impacts of a chatter; NaN if infinite."""
     is_one: bool = True
-    """False of chaotic motion that may lie on several attractors, which were not told apart."""
+    """False for chaotic motion that may lie on several attractors, which could not be separated."""
 
     @property
     def is_chaotic(self) -> bool:
@@ -101,13 +101,13 @@ class Attractor:
 
     @property
     def name(self) -> str:
-        """`P(p,q)`, `no impacts`, `chaos` ...; `chaotic, not told apart` where it may be several."""
+        """`P(p,q)`, `no impacts`, `chaos` ...; `chaotic, not told apart` where there may be several."""
         return self.kind.name if self.is_one else "chaotic, not told apart"
 
 
 @dataclass(eq=False)
 class Basins:
-    """Starts and where they end.
+    """Starts and the attractors on which they end.
 
     Attributes
     ----------
@@ -118,10 +118,10 @@ class Basins:
         Size of the motion.
     attractors : list of Attractor
     told_by_sample : int
-        Starts that count as chaotic because a sample of them was.
+        Number of starts that count as chaotic because a sample of them was.
     undetected_share_below : float
-        Share of the possible starts that may end elsewhere without one of them in that sample: more have a start in it
-        with a probability of 95 %.
+        Share of the possible starts that may end elsewhere although none in that sample does. A larger share would have
+        a start in the sample with a probability of 95 %.
     """
 
     starts: Floats
@@ -133,7 +133,7 @@ class Basins:
 
     @property
     def names(self) -> list[str]:
-        """Of the attractors: those of one kind with letters."""
+        """Names of the attractors; attractors of one kind have letters."""
         plain = [each.name for each in self.attractors]
         return [
             f"{name} {_letter(plain[:place].count(name))}" if plain.count(name) > 1 else name
@@ -142,17 +142,17 @@ class Basins:
 
     @property
     def possible(self) -> int:
-        """Starts that a body can have."""
+        """Number of starts that are possible for a body."""
         return int((self.labels != BEYOND_A_STOP).sum())
 
     @property
     def decided(self) -> float:
-        """Share of the possible starts whose end is known."""
+        """Share of the possible starts with a known end."""
         return float((self.labels >= 0).sum()) / max(self.possible, 1)
 
     @property
     def fractions(self) -> Floats:
-        """Share of the possible starts that each attractor gets."""
+        """Share of the possible starts that end on each attractor."""
         counts = np.bincount(self.labels[self.labels >= 0], minlength=len(self.attractors))
         found: Floats = counts / max(self.possible, 1)
         return found
@@ -172,16 +172,16 @@ def _letter(place: int) -> str:
 
 
 def find_basins(basins: Basins, flow: Flow, *, block: int, seed: int = 1) -> Generator[Basins, None, None]:
-    """Find where the undecided starts end; yield `basins`, which grow, after each block.
+    """Find the ends of the undecided starts; yield `basins`, which grow, after each block.
 
     Parameters
     ----------
     basins : Basins
     flow : Flow
     block : int
-        Starts that are followed by one call.
+        Number of starts in one call.
     seed : int
-        Of the starts of which long runs tell the attractors.
+        Seed of the choice of starts whose long runs find the attractors.
     """
     yield from _Search(basins, flow, block, np.random.default_rng(seed)).blocks()
 
@@ -197,7 +197,7 @@ class _Search:
 
     def blocks(self) -> Generator[Basins, None, None]:
         """Follow block after block."""
-        self._look(self._left(), FIRST_SAMPLE, first=True)
+        self._find_attractors(self._left(), FIRST_SAMPLE, first=True)
         yield self._basins
         passed = 0
         for periods in ROUNDS:
@@ -207,13 +207,13 @@ class _Search:
                 self._follow(places, periods, first=passed == 0)
                 yield self._basins
             passed += periods
-            if passed in LOOKS:
-                self._look(self._left(), LATER_SAMPLE)
+            if passed in SEARCH_PERIODS:
+                self._find_attractors(self._left(), LATER_SAMPLE)
                 self._match(self._left())
-                self._take_for_chaos()
-        self._look(self._left(), CHAOS_SAMPLE)
+                self._label_chaos()
+        self._find_attractors(self._left(), CHAOS_SAMPLE)
         self._match(self._left())
-        self._take_for_chaos()
+        self._label_chaos()
 
     def _left(self) -> NDArray[np.int64]:
         return np.flatnonzero((self._basins.labels == UNDECIDED) & ~self._lost)
@@ -229,7 +229,7 @@ class _Search:
         self._match(places[ends.well])
 
     def _match(self, places: NDArray[np.int64]) -> None:
-        """Label the starts that are near to an attractor now."""
+        """Label the starts that are near an attractor now."""
         for number, attractor in enumerate(self._basins.attractors):
             places = places[self._basins.labels[places] == UNDECIDED]
             near = self._near(self._now[places], attractor.states, attractor.radius)
@@ -243,7 +243,7 @@ class _Search:
 
     # ---- attractors ----
 
-    def _look(self, places: NDArray[np.int64], most: int, *, first: bool = False) -> None:
+    def _find_attractors(self, places: NDArray[np.int64], most: int, *, first: bool = False) -> None:
         """Find the attractors of some of these starts."""
         if not places.size:
             return
@@ -277,7 +277,7 @@ class _Search:
         return np.asarray(self._flow.measure(state[None], periods, 1).features[0, 0, :, Feature.impacts])
 
     def _settled(self, state: Floats, periods: int) -> Floats:
-        """Return the state once it no longer changes from round to round, or after many."""
+        """Return the state once it no longer changes between rounds, or after the largest number of checks."""
         for _ in range(MOST_SETTLING):
             later = self._flow.follow(state[None], SETTLING * periods)
             if not later.well[0]:
@@ -288,28 +288,28 @@ class _Search:
         return state
 
     def _tried(self, states: Floats) -> float:
-        """Return a distance from which all starts that are tried come back; 0 where none is large enough."""
+        """Return a distance from which all probe starts come back; 0 where none is large enough."""
         scale, radius = self._basins.scale, FARTHEST
         others = [each for each in self._basins.attractors if not each.is_chaotic]
         while radius >= NEAREST:
-            way = self._draw.uniform(-1.0, 1.0, (PROBES, states.shape[1]))
-            way *= self._draw.uniform(0.25, 1.0, (PROBES, 1)) / np.abs(way).max(axis=1, keepdims=True)
-            places = np.repeat(states, PROBES, axis=0) + radius * scale * np.tile(way, (len(states), 1))
+            offsets = self._draw.uniform(-1.0, 1.0, (PROBES, states.shape[1]))
+            offsets *= self._draw.uniform(0.25, 1.0, (PROBES, 1)) / np.abs(offsets).max(axis=1, keepdims=True)
+            places = np.repeat(states, PROBES, axis=0) + radius * scale * np.tile(offsets, (len(states), 1))
             ends = self._flow.follow(places, PROBE_PERIODS)
-            # what a body cannot have (beyond a stop) says nothing; of the others all must come nearer
+            # impossible probes (beyond a stop) do not count; all others must come nearer
             back = self._near(ends.states, states, 0.5 * radius) & ends.well
-            apart = not any(
+            separate = not any(
                 self._near(states, each.states, 2.0 * (radius + each.radius)).any() for each in others
             )
-            if ends.well.any() and (back | ~ends.well).all() and apart:
+            if ends.well.any() and (back | ~ends.well).all() and separate:
                 return radius
             radius /= 4.0
         return 0.0
 
     # ---- chaos ----
 
-    def _take_for_chaos(self) -> None:
-        """Take what is left for chaotic, where all of a sample of it is."""
+    def _label_chaos(self) -> None:
+        """Label the undecided starts as chaotic if all of a sample of them are."""
         chaotic = [n for n, each in enumerate(self._basins.attractors) if each.is_chaotic]
         left = self._left()
         if not (chaotic and left.size):
@@ -318,19 +318,19 @@ class _Search:
         kinds, states = self._flow.classes(self._now[chosen], TRANSIENT_OF_CHAOS)
         is_chaos = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
         if is_chaos.all():
-            self._share_out(left, chosen, states, chaotic[0])
+            self._assign(left, chosen, states, chaotic[0])
         elif left.size <= CHAOS_SAMPLE and is_chaos.any():
-            self._share_out(chosen[is_chaos], chosen[is_chaos], states[is_chaos], chaotic[0])
+            self._assign(chosen[is_chaos], chosen[is_chaos], states[is_chaos], chaotic[0])
 
-    def _share_out(
+    def _assign(
         self, places: NDArray[np.int64], chosen: NDArray[np.int64], states: Floats, first: int
     ) -> None:
-        """Give chaotic starts to attractors, told apart by long runs of those chosen, which are at some states."""
+        """Assign chaotic starts to attractors, separated by long runs of the chosen starts from the given states."""
         are_new = len(self._numbers) < 2
         own = self._grouped(self._flow.measure(states, BLOCK, BLOCKS).features, first)
         labels = np.zeros(self._basins.labels.size, np.int64)
         if len(self._numbers) > 1 and places.size > chosen.size:
-            labels[places] = self._told_by_blocks(places)
+            labels[places] = self._groups_by_blocks(places)
             if float((labels[chosen] == own).mean()) < LEAST_AGREEING:
                 if are_new:
                     self._merge(first)
@@ -344,7 +344,7 @@ class _Search:
             self._basins.undetected_share_below += missed * places.size / self._basins.possible
 
     def _grouped(self, features: Floats, first: int) -> NDArray[np.int64]:
-        """Return the group of each of some long runs; a group that is new gets an attractor."""
+        """Return the group of each of some long runs; a new group gets an attractor."""
         if len(self._numbers) > 1:
             return self._groups.of(features.mean(axis=1).reshape(len(features), -1))
         earlier = len(self._features)
@@ -361,7 +361,7 @@ class _Search:
         return self._groups.labels[earlier:]
 
     def _merge(self, first: int) -> None:
-        """Take groups that single blocks do not tell for one."""
+        """Merge groups that single blocks do not separate."""
         self._groups, self._numbers = merged(self._groups), self._numbers[:1]
         chaotic = [each for each in self._basins.attractors if each.is_chaotic]
         self._basins.attractors[:] = [each for each in self._basins.attractors if not each.is_chaotic]
@@ -375,8 +375,8 @@ class _Search:
         means = self._groups.means
         return means.reshape(len(means), -1, len(Feature))[..., Feature.impacts]
 
-    def _told_by_blocks(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the group of each start by its own impacts; -1 of one that fits none for long."""
+    def _groups_by_blocks(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the group of each start by its own impacts; -1 if it fits no group in the allowed blocks."""
         labels = np.full(places.size, -1, np.int64)
         for _ in range(MOST_BLOCKS):
             left = np.flatnonzero((labels < 0) & ~self._lost[places])
@@ -392,19 +392,19 @@ class _Search:
 
 
 class BorderDimension(NamedTuple):
-    """Dimension of the border between basins, of a plane of starts, and its standard error."""
+    """Dimension of the border between basins in a plane of starts, and its standard error."""
 
     value: float
     error: float
 
 
 def border_share(labels: Labels, distance: int = 1) -> float:
-    """Return the share of starts of a grid that end elsewhere than one of those at a distance along an axis.
+    """Return the share of grid starts with another end than a start at this distance along an axis.
 
     Parameters
     ----------
     labels : array, shape (y, x)
-        Those below 0 do not count.
+        Labels below 0 do not count.
     distance : int
         In cells.
 
@@ -429,10 +429,10 @@ def border_share(labels: Labels, distance: int = 1) -> float:
 
 
 def border_dimension(labels: Labels, distances: Sequence[int] = (1, 2, 4, 8, 16)) -> BorderDimension | None:
-    """Return the dimension of the border of basins from the share of uncertain starts over their uncertainty.
+    """Return the dimension of the border of basins, from the share of uncertain starts over their uncertainty.
 
-    A start is uncertain where another one at a distance d ends elsewhere; their share grows as d^(2 - D) (McDonald,
-    Grebogi, Ott and Yorke 1985).
+    A start is uncertain if another start at a distance d has another end. The share of uncertain starts grows as
+    d^(2 - D) (McDonald, Grebogi, Ott and Yorke 1985).
 
     Parameters
     ----------
@@ -443,7 +443,7 @@ def border_dimension(labels: Labels, distances: Sequence[int] = (1, 2, 4, 8, 16)
     Returns
     -------
     BorderDimension or None
-        None where there is no border, or the grid is smaller than 8 of the largest distances.
+        None if there is no border, or the grid is smaller than 8 of the largest distances.
     """
     if min(labels.shape) < 8 * max(distances):
         return None

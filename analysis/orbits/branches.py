@@ -1,4 +1,4 @@
-"""Branches of periodic orbits as a dataset: each orbit is a run, so that sweeps and branches are drawn alike."""
+"""Branches of periodic orbits as a dataset: each orbit is a run, so that sweeps and branches have the same figures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SAMPLES = 256
-"""Of a forcing period, between which an extremum is that of a cubic: to 1e-8 of the displacement."""
+"""Samples of a forcing period; a cubic between two samples gives an extremum to 1e-8 of the displacement."""
 
 
 def dataset_of_branches(
@@ -43,7 +43,7 @@ def dataset_of_branches(
     Returns
     -------
     xarray.Dataset
-        With `schema.ORBIT_COLUMNS`. Impacts are those of one orbit, from phase 0 on; periods are those of the force.
+        With `schema.ORBIT_COLUMNS`. Impacts are those of one orbit, from phase 0 on; periods are forcing periods.
     """
     orbits = [each for branch in branches for each in branch.orbits]
     return _dataset(
@@ -60,9 +60,9 @@ def dataset_of_branches(
 def dataset_of_orbits(
     orbits: Sequence[PeriodicOrbit], *, units: UnitSystem = "SI", attrs: Mapping[str, Any] | None = None
 ) -> xr.Dataset:
-    """Return orbits of one body, one at least, as the runs of a dataset over their forcing frequency.
+    """Return orbits of one body, at least one, as the runs of a dataset over their forcing frequency.
 
-    Each is a branch of its own; `attrs` are attributes of the file.
+    Each orbit is a branch of its own; `attrs` are attributes of the file.
     """
     return _dataset(
         orbits,
@@ -99,7 +99,7 @@ def dataset_of_loci(
     Returns
     -------
     xarray.Dataset
-        As `dataset_of_branches`; `orbit_special` is what happens at each orbit, `orbit_branch` counts the loci.
+        As `dataset_of_branches`; `orbit_special` is the bifurcation at each orbit, `orbit_branch` counts the loci.
     """
     points = [each for locus in loci for each in locus.points]
     kinds = [SpecialOrbit[locus.kind.replace(" ", "_")] for locus in loci for _ in locus.points]
@@ -166,7 +166,7 @@ def extrema(orbit: PeriodicOrbit) -> Floats:
 
 
 def _turns(phases: Floats, x: Floats, slope: Floats) -> tuple[Floats, Floats]:
-    """Return the displacements where the motion turns round between samples, and their phases: of the cubic there."""
+    """Return the extrema of the displacement between samples, and their phases, from cubics between samples."""
     here = np.flatnonzero(slope[:-1] * slope[1:] < 0.0)
     h, x0, x1 = phases[here + 1] - phases[here], x[here], x[here + 1]
     d0, d1 = slope[here] * h, slope[here + 1] * h

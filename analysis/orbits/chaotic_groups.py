@@ -1,8 +1,8 @@
-"""Chaotic attractors told apart by the impacts of long runs.
+"""Chaotic attractors separated by the impacts of long runs.
 
-A chaotic run has no state to come back to, but its impacts have means and extremes. Those of one attractor scatter from
-block to block of a run as they do from run to run. Two runs belong to different attractors where all blocks of one lie
-beyond all blocks of the other. Runs that differ by more than their blocks explain, but overlap, cannot be told apart.
+A chaotic run does not return to a state, but its impacts have means and extremes. These scatter between the blocks of
+one run as they do between runs on one attractor. Two runs belong to different attractors if all blocks of one lie
+beyond all blocks of the other. Runs that overlap, but differ by more than their blocks explain, stay unseparated.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BLOCK, BLOCKS = 32, 64
-"""Forcing periods of a block, and blocks of a run by which attractors are told apart."""
+"""Forcing periods of a block, and blocks of a run, for the separation of attractors."""
 BATCH = 8
 """Blocks of a batch: batches of one run count as independent of each other."""
-APART = 3.0
-"""Distance of the means of two runs, over the sum of their standard deviations, from which they may be apart."""
-UNLIKE = 4.0
-"""Variance of the means of runs, over the variance that their batches explain, from which they are not alike. One
+SEPARATION = 3.0
+"""Distance of the means of two runs, over the sum of their standard deviations, above which they may be apart."""
+DIFFERENT = 4.0
+"""Variance of the means of runs, over the variance that their batches explain, above which runs are not alike. One
 attractor with chatter and rests (damping ratio .01, restitution .8, angular frequency 2.9, stop at 0) has 1.9."""
 SLOW = 0.01
-"""Speed of an impact, over the fastest of its block, up to which it is not counted: a chatter has any number."""
-WITHIN = 5.0
+"""Speed of an impact, over the fastest of its block, below which it does not count: chatter has any number of them."""
+MEMBER = 5.0
 """Standard deviations from the mean of a group within which a block may belong to it."""
 MOST_BLOCKS = 16
-"""Blocks after which a start that fits no group stays undecided."""
+"""Number of blocks after which a start that fits no group stays undecided."""
 LEAST_AGREEING = 0.98
-"""Share of long runs whose first blocks must name their own group; below, single blocks tell nothing."""
+"""Share of long runs whose first blocks must show their own group; below it, single blocks are no evidence."""
 
 
 class Feature(IntEnum):
     """Quantities of the impacts at a stop in a block of forcing periods; their place on the last axis."""
 
     impacts = 0
-    """Impacts per forcing period, but for the slow ones of a chatter."""
+    """Impacts per forcing period, without the slow impacts of a chatter."""
     speed = 1
     """Sum of the impact velocities per forcing period, m/s."""
     cosine = 2
@@ -51,7 +51,7 @@ class Feature(IntEnum):
 
 
 class Blocks(NamedTuple):
-    """Features of consecutive blocks, shape (start, block, stop, feature), and where the runs are after them."""
+    """Features of consecutive blocks, shape (start, block, stop, feature), and the states of the runs after them."""
 
     features: Floats
     states: Floats
@@ -72,7 +72,7 @@ def block_features(
     owner, block : array of int, shape (impact,)
         Run and block of each impact.
     impacts : tuple of array, shape (impact,)
-        Forcing phase (rad), velocity (m/s), and stop, from 0, of each impact.
+        Forcing phase (rad), velocity (m/s), and stop (counted from 0) of each impact.
     shape : tuple of int
         Runs, blocks, stops.
     periods : int
@@ -107,10 +107,10 @@ class Groups:
     spreads: Floats
     """`means` and `spreads`: mean and standard deviation of a block, shape (group, feature)."""
     is_sure: bool = True
-    """False where the runs differ more than their blocks explain, but are not apart."""
+    """False if the runs differ more than their blocks explain, but are not apart."""
 
     def of(self, blocks: Floats) -> NDArray[np.int64]:
-        """Return the group of single blocks, shape (start, feature); -1 where a block fits none."""
+        """Return the group of single blocks, shape (start, feature); -1 if a block fits none."""
         count = len(self.means)
         off = np.abs(blocks[:, None] - self.means) / self.spreads
         fits = np.ones((len(blocks), count), np.bool_)
@@ -119,19 +119,19 @@ class Groups:
                 if one != other:
                     gaps = np.abs(self.means[one] - self.means[other])
                     best = int(np.argmax(gaps / (self.spreads[one] + self.spreads[other])))
-                    fits[:, one] &= (off[:, one, best] < off[:, other, best]) & (off[:, one, best] <= WITHIN)
+                    fits[:, one] &= (off[:, one, best] < off[:, other, best]) & (off[:, one, best] <= MEMBER)
         found = np.where(fits.any(axis=1), fits.argmax(axis=1), -1)
         return np.asarray(found, dtype=np.int64)
 
 
 NO_GROUPS = Groups(np.empty(0, np.int64), np.empty((0, 0)), np.empty((0, 0)))
-"""Groups of no runs."""
+"""Groups without runs."""
 
 
 def grouped(features: Floats) -> Groups:
     """Return the groups of runs that lie on different attractors.
 
-    Features are those of chaotic runs without their transients, shape (run, block, stop, feature).
+    Features belong to chaotic runs without their transients, shape (run, block, stop, feature).
 
     >>> noise = np.random.default_rng(1).normal(0.0, 0.1, (6, BLOCKS, 1, len(Feature)))
     >>> grouped(noise + np.array([0.0, 1, 0, 1, 1, 1])[:, None, None, None]).labels
@@ -144,24 +144,24 @@ def grouped(features: Floats) -> Groups:
     kinds = range(int(labels.max(initial=0)) + 1)
     means = np.array([flat[labels == kind].mean(axis=(0, 1)) for kind in kinds])
     spreads = np.array([flat[labels == kind].std(axis=(0, 1)) for kind in kinds])
-    alike = all(_is_alike(flat[labels == kind], rounding) for kind in kinds)
+    alike = all(_are_equal(flat[labels == kind], rounding) for kind in kinds)
     return Groups(labels, means, spreads + rounding, alike)
 
 
 def merged(groups: Groups) -> Groups:
-    """Return one group of all runs, of which it is not known on how many attractors they lie."""
+    """Return all runs as one group, whose number of attractors is unknown."""
     return Groups(np.zeros_like(groups.labels), groups.means[:1], groups.spreads[:1], is_sure=False)
 
 
 def _linked(flat: Floats, rounding: Floats) -> NDArray[np.bool_]:
-    """Return which runs are not apart from each other, shape (run, run)."""
+    """Return a mask of the pairs of runs that are not apart, shape (run, run)."""
     low, high = flat.min(axis=1), flat.max(axis=1)
     mean, spread = flat.mean(axis=1), flat.std(axis=1) + rounding
     linked = np.ones((len(flat), len(flat)), np.bool_)
     for feature in range(flat.shape[2]):
         below = high[:, None, feature] < low[None, :, feature]
         gap = np.abs(mean[:, None, feature] - mean[None, :, feature])
-        far = gap > APART * (spread[:, None, feature] + spread[None, :, feature])
+        far = gap > SEPARATION * (spread[:, None, feature] + spread[None, :, feature])
         linked &= ~((below | below.T) & far)
     return linked
 
@@ -181,10 +181,10 @@ def _components(linked: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.asarray(np.argsort(order)[labels], dtype=np.int64)
 
 
-def _is_alike(flat: Floats, rounding: Floats) -> bool:
-    """Say whether the means of runs differ by no more than the batches of their blocks explain.
+def _are_equal(flat: Floats, rounding: Floats) -> bool:
+    """Tell whether the means of runs differ by no more than the batches of their blocks explain.
 
-    Numbers of impacts do not count: they come in bursts where a body chatters, and velocities show all that they show.
+    Numbers of impacts do not count: they come in bursts in chatter, and velocities carry the same information.
     """
     runs, blocks, features = flat.shape
     batches = max(blocks // BATCH, 1)
@@ -195,4 +195,4 @@ def _is_alike(flat: Floats, rounding: Floats) -> bool:
     rounding = np.delete(rounding, np.s_[Feature.impacts :: len(Feature)])
     between = means.mean(axis=1).var(axis=0, ddof=1)
     within = means.var(axis=1, ddof=1).mean(axis=0) / batches
-    return bool((between <= UNLIKE * within + (rounding / blocks) ** 2).all())
+    return bool((between <= DIFFERENT * within + (rounding / blocks) ** 2).all())

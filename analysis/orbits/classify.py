@@ -1,8 +1,8 @@
-"""The study `classify`: each run is P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+"""The study `classify`: each run is P(p,q), chaos, rest, sticking, no impacts, or unknown with a reason.
 
-A run shows its state once in each forcing period. A motion repeats after q periods where the distance between states q
-periods apart is 0, or goes to 0: a slow transient of a multiplier near -1 alternates for long, but its distances shrink
-by a constant factor, those of a doubled period do not.
+A run shows its state once in each forcing period. A motion repeats after q periods if the distance between states q
+periods apart is 0, or tends to 0. A slow transient with a multiplier near -1 alternates for long, but its distances
+shrink by a constant factor. The distances of a doubled period do not.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ from vibroimpact.fmus.terminal import wide_terminal
 Floats = NDArray[np.float64]
 
 SAME = 1e-6
-"""Distance of two states, over the size of the motion, at which they are one."""
+"""Distance of two states, over the size of the motion, below which they are equal."""
 NEAR_ZERO = 0.1
-"""Limit of shrinking distances, over the last one, that counts as 0."""
+"""Limit of shrinking distances, over the last distance, below which the limit counts as 0."""
 LEAST_DECAY = 1e-4
-"""By which distances shrink at least in a turn, where that tells a transient."""
+"""Smallest relative decrease of the distances in a turn that reveals a transient."""
 FEWEST, FEWEST_OF_CHAOS = 6, 40
-"""Recorded periods below which nothing is said, and below which nothing is called chaos."""
-GROWTH, AHEAD = 0.05, 6
-"""Rate, 1 / period, at which neighbouring states part in chaos; periods that are looked ahead."""
-FALLS = 5.0
-"""Fall of the distance of two rounds over a run, over what a round changes by, from which they may be one."""
+"""Recorded periods below which the class is unknown, and below which no run is called chaos."""
+GROWTH, PERIODS_AHEAD = 0.05, 6
+"""Rate, 1 / period, above which the separation of neighbouring states is chaos; number of periods ahead."""
+LEAST_FALL = 5.0
+"""Fall of the distance of two rounds over a run, over a round's change, above which the rounds may be equal."""
 _MOST_SHOWN = 6
-"""Classes that are listed in one line."""
+"""Largest number of classes listed in one line."""
 _STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
 
 
@@ -63,9 +63,9 @@ class RunClass:
     ----------
     kind : OrbitClass
     impacts, periods : int
-        p and q of what repeats; 0 else, p is -1 where impacts are without number.
+        p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts.
     reason : str
-        Why it is unknown.
+        Reason why the class is unknown.
     """
 
     kind: OrbitClass
@@ -75,7 +75,7 @@ class RunClass:
 
     @property
     def name(self) -> str:
-        """In words: `P(1,1)`, `P(inf,2)`, `no impacts`, `chaos`, `rest`, `unknown`."""
+        """The class in words: `P(1,1)`, `P(inf,2)`, `no impacts`, `chaos`, `rest`, `unknown`."""
         if self.kind in (OrbitClass.periodic, OrbitClass.sticking):
             return f"P({self.impacts if self.impacts >= 0 else 'inf'},{self.periods})"
         return str(self.kind.name).replace("_", " ")
@@ -88,7 +88,7 @@ class ClassesOfRuns(list[RunClass]):
     ----------
     classes : iterable of RunClass
     runs : xarray.Dataset
-        The dataset that was classified.
+        The classified dataset.
     """
 
     def __init__(self, classes: Iterable[RunClass], runs: xr.Dataset) -> None:
@@ -97,7 +97,7 @@ class ClassesOfRuns(list[RunClass]):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The dataset that was classified, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`."""
+        """The classified dataset, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`."""
         units: UnitSystem = self._runs.attrs.get("units_system", "SI")
         run_id = run_ids(self._runs)
         columns = {}
@@ -109,8 +109,8 @@ class ClassesOfRuns(list[RunClass]):
 
     def __repr__(self) -> str:
         counts = Counter(each.name for each in self).most_common(_MOST_SHOWN + 1)
-        told = [f"{count} {name}" for name, count in counts[:_MOST_SHOWN]]
-        return f"<classes of {len(self)} runs: {', '.join(told + ['...'] * (len(counts) > _MOST_SHOWN))}>"
+        listed = [f"{count} {name}" for name, count in counts[:_MOST_SHOWN]]
+        return f"<classes of {len(self)} runs: {', '.join(listed + ['...'] * (len(counts) > _MOST_SHOWN))}>"
 
     def _repr_html_(self) -> str:
         counts = Counter((each.name, each.reason) for each in self).most_common()
@@ -129,7 +129,7 @@ class ClassesOfDataset(Study[RunClass]):
     figure = "classes"
 
     runs: xr.Dataset
-    """As `open_dataset` gives it."""
+    """Dataset from `open_dataset`."""
     file: Path | None = None
 
     @classmethod
@@ -144,7 +144,7 @@ class ClassesOfDataset(Study[RunClass]):
 
     @classmethod
     def same(cls, options: Classify) -> Mapping[str, Any]:
-        """Return the path of the dataset: that of classes is one of runs."""
+        """Return the path of the dataset: a dataset with classes is a dataset of runs."""
         return cls.marks(options)
 
     @classmethod
@@ -187,7 +187,7 @@ class ClassesOfDataset(Study[RunClass]):
 
     @property
     def classes(self) -> ClassesOfRuns:
-        """The class of each run; those that were not looked at are unknown."""
+        """The class of each run; runs that were not studied are unknown."""
         left = self.runs.vibroimpact.runs.sizes["run"] - len(self.found)
         unknown = RunClass(OrbitClass.unknown, reason=f"not looked at: {self.incomplete}")
         return ClassesOfRuns([*self.found, *[unknown] * left], self.runs)
@@ -198,7 +198,7 @@ class ClassesOfDataset(Study[RunClass]):
         return with_classes(read_flat(self.file), self.classes, self.runs.attrs["units_system"])
 
     def print_results(self) -> None:
-        """Print how many runs there are of each class."""
+        """Print the number of runs of each class."""
         rows = table("Classes of the runs", "<class", ">runs", "<why")
         for (name, reason), count in Counter((each.name, each.reason) for each in self.classes).most_common():
             rows.add_row(name, f"{count}", reason)
@@ -211,14 +211,14 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As `open_dataset` gives it. It needs the strobe or the extrema of each recorded period, and impacts, or their
-        number in each period; without the latter a motion may be periodic, but impacts are not told. Of components
-        that hit each other impacts are enough, but do not tell chaos.
+        A dataset from `open_dataset`, with the strobe or the extrema of each recorded period. Impacts, or their number
+        in each period, are needed too; without them a motion may be periodic, but with an unknown number of impacts.
+        For components that hit each other impacts are enough, but do not show chaos.
 
     Returns
     -------
     list of RunClass
-        With `dataset`: the same runs, in the shape of their sweep, and their classes, as `draw` draws them.
+        The classes. Their `dataset` has the same runs, in the shape of their sweep, for `draw`.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
 
 
 def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) -> RunClass:
-    """Return the class of a run of which impacts alone are known."""
+    """Return the class of a run from its impacts alone."""
     if outcome is not Outcome.ok:
         return class_of(np.empty((0, 1)), None, outcome)
     if not impacts.sizes["impact"]:
@@ -252,7 +252,7 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
     """Return a one-dimensional dataset with the classes of its runs, as it is written to a file.
 
-    The dataset is as `read_flat` gives it, the classes are in the order of its runs.
+    The dataset comes from `read_flat`; the classes are in the order of its runs.
     """
     columns = _columns(classes).items()
     return flat.assign({name: ("run", values, attributes_of(name, units)) for name, values in columns})
@@ -277,12 +277,12 @@ def class_of(
     Parameters
     ----------
     states : array, shape (period, quantity)
-        What is seen of each forcing period; rows of NaN are left out.
+        Observed state of each forcing period; rows with NaN are left out.
     impacts : array, shape (period,), or None
-        In each period; infinite in one with a complete chatter; None: not recorded.
+        Impacts in each period; infinite for a complete chatter; None: not recorded.
     outcome : Outcome
     has_stuck : bool
-        Whether it has rested on a stop.
+        Whether the run has rested on a stop.
 
     Examples
     --------
@@ -338,11 +338,11 @@ def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClas
 
 
 def _repeats(states: Floats, periods: int) -> bool:
-    """Say whether states `periods` apart are one, or come together by a constant factor."""
+    """Tell whether states `periods` apart are equal, or approach each other by a constant factor."""
     distances = np.abs(states[periods:] - states[:-periods]).max(axis=1)
     if distances[-max(periods, 2) :].max() <= SAME:
         return True
-    # two turns later, of the same place in the orbit, since a multiplier near -1 alternates
+    # compared two turns later, at the same place of the orbit, since a multiplier near -1 alternates
     before, after = distances[: -2 * periods], distances[2 * periods :]
     if before.size < max(4, 2 * periods) or not (distances > 0.0).all():
         return False
@@ -350,18 +350,18 @@ def _repeats(states: Floats, periods: int) -> bool:
 
 
 def _closes(states: Floats, half: int) -> bool:
-    """Say whether the two rounds of a doubled period come nearer to each other all the time."""
+    """Tell whether the two rounds of a doubled period approach each other all the time."""
     distances = np.abs(states[half:] - states[:-half]).max(axis=1)
     change = float(np.abs(states[2 * half :] - states[: -2 * half]).max())
-    if change > SAME:  # it has been told by how its distances shrink
+    if change > SAME:  # decided by the decrease of its distances
         return False
     parts = np.array_split(distances, 4)
     falls = all(float(late.mean()) < float(early.mean()) for early, late in itertools.pairwise(parts))
-    return falls and float(distances[0] - distances[-1]) > FALLS * change
+    return falls and float(distances[0] - distances[-1]) > LEAST_FALL * change
 
 
 def _goes_to_zero(before: Floats, after: Floats) -> bool:
-    """Say whether after = ratio before + rest is a straight line that leads to 0: a real multiplier."""
+    """Tell whether after = ratio before + rest is a straight line that leads to 0: a real multiplier."""
     middle = before.mean()
     spread = before - middle
     square = float(spread @ spread)
@@ -376,7 +376,7 @@ def _goes_to_zero(before: Floats, after: Floats) -> bool:
 
 
 def _dies_away(distances: Floats) -> bool:
-    """Say whether distances fall by a lot, and steadily but for a turning multiplier."""
+    """Tell whether distances fall by a lot, and steadily except for a complex multiplier."""
     thirds = [float(part.max()) for part in np.array_split(distances, 3)]
     if not (thirds[1] < 0.5 * thirds[0] and thirds[2] < 0.5 * thirds[1]):
         return False
@@ -387,12 +387,12 @@ def _dies_away(distances: Floats) -> bool:
 
 
 def _growth(states: Floats) -> float:
-    """Return the mean rate at which neighbouring states part over some periods, 1 / period (Rosenstein's estimate)."""
-    count = len(states) - AHEAD
-    apart = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
-    np.fill_diagonal(apart, np.inf)
-    nearest = apart.argmin(axis=1)
-    now = apart[np.arange(count), nearest]
-    later = np.abs(states[AHEAD:] - states[nearest + AHEAD]).max(axis=1)
-    told = (now > 0.0) & (later > 0.0)
-    return float(np.mean(np.log(later[told] / now[told]))) / AHEAD if told.any() else 0.0
+    """Return the mean rate at which neighbouring states separate, 1 / period (Rosenstein's estimate)."""
+    count = len(states) - PERIODS_AHEAD
+    distances = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
+    np.fill_diagonal(distances, np.inf)
+    nearest = distances.argmin(axis=1)
+    now = distances[np.arange(count), nearest]
+    later = np.abs(states[PERIODS_AHEAD:] - states[nearest + PERIODS_AHEAD]).max(axis=1)
+    separate = (now > 0.0) & (later > 0.0)
+    return float(np.mean(np.log(later[separate] / now[separate]))) / PERIODS_AHEAD if separate.any() else 0.0

@@ -1,8 +1,8 @@
-"""Energy of the modes of an orbit: what force, damping and impacts give and take: thesis 6.3, equations.md 5.3 to 5.6.
+"""Energies of the modes on an orbit: gains and losses by force, damping and impacts: thesis 6.3, equations.md 5.3-5.6.
 
-An impact changes the velocity of every mode, so energy goes over from one mode to others, and some is lost. The
-residual energy of a mode is the work of the force on it less what its damping takes, over the orbit; summed over the
-modes it is what the impacts lose (thesis 6.32).
+An impact changes the velocity of every mode, so energy passes between modes, and some is lost. The residual energy of
+a mode is the work of the force on it minus its damping loss, over the orbit. The sum over the modes is the loss at the
+impacts (thesis 6.32).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vibroimpact.fmus.errors import UsageError
 
 
 def velocity_transfer(contact: Contact) -> Floats:
-    """Return the matrix that an impact multiplies the modal velocities with: [R^] of thesis (6.25), (6.40).
+    """Return the matrix by which an impact multiplies the modal velocities: [R^] of thesis (6.25), (6.40).
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def velocity_transfer(contact: Contact) -> Floats:
     Returns
     -------
     array, shape (modes, modes)
-        I - (1 + r) phi phi' / (phi . phi), of determinant -r, for mass-normalised modes.
+        I - (1 + r) phi phi' / (phi . phi), with determinant -r, for mass-normalised modes.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def velocity_transfer(contact: Contact) -> Floats:
 
 
 def energy_transfer(contact: Contact) -> Floats:
-    """Return the matrix of the kinetic energy after an impact, half of q'. R* q' before it: thesis (6.27), (6.39).
+    """Return the matrix R* of the kinetic energy after an impact, half of q'. R* q' before it: thesis (6.27), (6.39).
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def energy_transfer(contact: Contact) -> Floats:
     Returns
     -------
     array, shape (modes, modes)
-        I - (1 - r^2) phi phi' / (phi . phi): symmetric, of eigenvalues 1 and, once, r^2. It is a form of the energy of
+        I - (1 - r^2) phi phi' / (phi . phi): symmetric, with eigenvalues 1 and, once, r^2. It describes the energy of
         all modes together: an entry on its diagonal is not the share that a mode keeps.
 
     Examples
     --------
-    Of the printed matrix (6.39) the first entry has the wrong sign, and the last is psi_22^2 (1 + r^2):
+    In the printed matrix (6.39) the first entry has the wrong sign, and the last is psi_22^2 (1 + r^2):
 
     >>> angle = np.arctan((1.0 + np.sqrt(5.0)) / 2.0)
     >>> tip = Contact(np.array([np.sin(angle), np.cos(angle)]), 1.0, 0.1, 0.7)
@@ -76,16 +76,16 @@ def _removed(contact: Contact, factor: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class ResidualRestitution:
-    """Coefficient of restitution that energies say: thesis (6.38), (6.41).
+    """Coefficient of restitution from energies: thesis (6.38), (6.41).
 
     Attributes
     ----------
     value : float
         sqrt(1 - residual / kinetic); NaN where the energies contradict each other.
     slope : float
-        Its derivative over the residual energy, 1/J: -1 / (2 r kinetic), without bound as r goes to 0.
+        Derivative of the value by the residual energy, 1/J: -1 / (2 r kinetic), unbounded as r goes to 0.
     problem : str
-        Why there is none: 0 <= residual <= kinetic does not hold. Empty where it does.
+        Reason why there is no value: 0 <= residual <= kinetic does not hold. Empty if it does.
     """
 
     value: float
@@ -99,10 +99,10 @@ def residual_restitution(residual: float, kinetic: float) -> ResidualRestitution
     Parameters
     ----------
     residual : float
-        Work of the force less loss to damping, over the orbit, all modes together, J.
+        Work of the force minus loss to damping, over the orbit, all modes together, J.
     kinetic : float
         Half of contact mass times squared velocity before the impact, summed over the impacts of the orbit, J. With
-        several impacts the restitution is the mean that is weighted with this energy.
+        several impacts the restitution is a mean, weighted with this energy.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def residual_restitution(residual: float, kinetic: float) -> ResidualRestitution
         raise UsageError(
             f"restitution: expected a residual energy and a kinetic energy > 0, J, got {residual:g} and {kinetic:g}."
         )
-    # rounding of the sums of an elastic impact, or of one that keeps nothing
+    # rounding of the sums for an elastic impact, or for one that keeps nothing
     slack = 1e-12 * kinetic
     if residual > kinetic + slack:
         return ResidualRestitution(
@@ -141,7 +141,7 @@ def residual_restitution(residual: float, kinetic: float) -> ResidualRestitution
 
 @dataclass(frozen=True, eq=False)
 class OrbitEnergies:
-    """Energies of the modes over one orbit, all in J; an impact is followed by the flight of the same number.
+    """Energies of the modes over one orbit, all in J; each impact precedes the flight with its number.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class OrbitEnergies:
         orbit, body = self.orbit, self.orbit.body
         ends = np.append(orbit.phases[1:], orbit.phases[0] + TURN * orbit.periods)
         start = np.empty((*self._after[0].shape, 4))
-        # a constant force moves the rest position; its own work over the orbit is none
+        # a constant force shifts the rest position; its work over the orbit is zero
         start[..., 0] = body.frequencies * self._after[0] - body.held / body.frequencies
         start[..., 1] = self._after[1]
         start[..., 2] = np.cos(orbit.phases)[:, None] * body.force
@@ -207,7 +207,7 @@ class OrbitEnergies:
 
     @property
     def damping(self) -> Floats:
-        """What damping takes from each mode in each flight, DE_j, shape (p, modes)."""
+        """Loss of each mode to damping in each flight, DE_j, shape (p, modes)."""
         body = self.orbit.body
         return np.asarray(2.0 * body.damping_ratios * body.frequencies * self._work.squared)
 
@@ -224,29 +224,29 @@ class OrbitEnergies:
 
     @cached_property
     def kinetic(self) -> Floats:
-        """Energy that each impact meets, half of contact mass times squared velocity, shape (p,)."""
+        """Energy before each impact, half of contact mass times squared velocity, shape (p,)."""
         hit = [self.orbit.body.contacts[number] for number in self.orbit.contacts]
         return np.asarray(0.5 * np.array([each.mass for each in hit]) * self.orbit.velocities**2)
 
     @cached_property
     def lost(self) -> Floats:
-        """What each impact loses, (1 - r^2) of the energy that it meets, shape (p,)."""
+        """Loss at each impact, (1 - r^2) of the energy before it, shape (p,)."""
         hit = [self.orbit.body.contacts[number] for number in self.orbit.contacts]
         return np.asarray(np.array([1.0 - each.restitution**2 for each in hit]) * self.kinetic)
 
     @property
     def restitution(self) -> ResidualRestitution:
-        """What the residual energy says that the restitution is."""
+        """The restitution according to the residual energy."""
         return residual_restitution(float(self.residual.sum()), float(self.kinetic.sum()))
 
     @property
     def identity_error(self) -> float:
-        """Residual energy of all modes less loss at the impacts (thesis 6.32), over the energy that impacts meet."""
+        """Residual energy of all modes minus the loss at the impacts (thesis 6.32), over the energy before impacts."""
         return float(abs(self.residual.sum() - self.lost.sum()) / self.kinetic.sum())
 
     @property
     def modal_error(self) -> float:
-        """Largest sum of residual energy and changes at impacts of one mode, over the energy that impacts meet."""
+        """Largest sum of residual energy and changes at impacts of one mode, over the energy before impacts."""
         return float(np.abs(self.residual + self.change.sum(axis=0)).max() / self.kinetic.sum())
 
 
@@ -261,7 +261,7 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     Raises
     ------
     UsageError
-        An impact of the orbit has no speed: a graze, where nothing is exchanged.
+        An impact of the orbit has no speed: at a graze no energy is exchanged.
 
     Examples
     --------

@@ -14,21 +14,21 @@ from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
 
 FORGOTTEN = 1e-12
-"""Share of a wrong first state that is left where impacts begin to count."""
+"""Share of an error of the first state that is left where impacts begin to count."""
 SETTLING = 50
-"""Impacts in which the directions turn into those that are stretched, before they count."""
+"""Number of impacts in which the directions turn to the stretched ones, before impacts count."""
 BLOCKS = 20
-"""Parts of a run whose scatter gives the standard error."""
+"""Number of parts of a run whose scatter gives the standard error."""
 LEAST = 10 * BLOCKS
-"""Impacts that count, at least."""
+"""Smallest number of impacts that count."""
 _ON_ORBIT = 1e-6
-"""Largest distance of impacts from an orbit that they are taken to follow for ever, see `RecordedOrbit`."""
+"""Largest distance of impacts from an orbit that they are assumed to follow for ever, see `RecordedOrbit`."""
 SUM_RULE = 1e-10
 """Largest difference of the sum of all exponents from its exact value, over the size of their terms."""
 
 
 class ExponentError(VibroimpactError):
-    """A run has no Lyapunov exponents, or they are not known."""
+    """A run has no Lyapunov exponents, or they are unknown."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,13 +38,13 @@ class Exponents:
     Attributes
     ----------
     per_impact, standard_error : array, shape (2 modes,)
-        The largest first; the error is that of the mean over 20 parts of the run.
+        The largest first; the error is the standard error of the mean over 20 parts of the run.
     interval : float
-        Mean time from impact to impact, s: per_impact / interval are those per second.
+        Mean time between impacts, s: per_impact / interval are exponents per second.
     impacts : int
-        That counted.
+        Number of impacts that counted.
     sum_error : float
-        Their sum less 2 ln r - 2 interval sum z w, which it is exactly, over the size of the terms.
+        Sum of the exponents minus its exact value 2 ln r - 2 interval sum z w, over the size of the terms.
     """
 
     per_impact: Floats
@@ -66,20 +66,20 @@ class Exponents:
 def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     """Return the Lyapunov exponents of a motion from its impacts.
 
-    The state follows from the impacts before, by the exact flow: what is not known of the first one decays with the
-    modes, and impacts count from where it is forgotten. The sum rule is checked. Of a periodic motion with too few
-    impacts for that, the multipliers of its orbit are taken, which have no error.
+    The state follows from the impacts before, by the exact flow. The error of the first state decays with the modes,
+    and impacts count once it is forgotten. The sum rule is checked. A periodic motion with too few impacts takes the
+    multipliers of its orbit, which have no error.
 
     Parameters
     ----------
     body : ImpactingBody
     impacts : Impacts
-        All of them, in their order: none may be left out.
+        All impacts, in their order: none may be missing.
 
     Raises
     ------
     ExponentError
-        There are too few impacts, a mode never forgets, an impact has no speed, or the sum rule does not hold.
+        There are too few impacts, a mode is undamped, an impact has no speed, or the sum rule does not hold.
     """
     count = impacts.times.size
     if count < 2 or not (impacts.velocities > 0.0).all():
@@ -112,8 +112,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     per_impact = sums.sum(axis=0) / counted
     means = sums / np.diff(edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
-    lost = [body.contacts[each].restitution for each in impacts.contacts[first:]]
-    exact = 2.0 * float(np.mean(np.log(lost))) - 2.0 * interval * float(
+    restitutions = [body.contacts[each].restitution for each in impacts.contacts[first:]]
+    exact = 2.0 * float(np.mean(np.log(restitutions))) - 2.0 * interval * float(
         (body.damping_ratios * body.frequencies).sum()
     )
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
@@ -126,7 +126,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
 
 
 def _of_orbit(recorded: RecordedOrbit) -> Exponents:
-    """Return the exponents of a periodic orbit: the logarithms of its multipliers, over its impacts."""
+    """Return the exponents of a periodic orbit: the logarithms of its multipliers, over its number of impacts."""
     if recorded.distance > _ON_ORBIT:
         raise OrbitError("chaos passes unstable orbits, near which it stays a while")
     orbit = recorded.orbit
@@ -159,7 +159,7 @@ def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
 
 
 def _first_state(body: ImpactingBody, impacts: Impacts) -> Floats:
-    """Return a state after the first impact: exact of one mode, else the contact as it is and the rest at rest."""
+    """Return a state after the first impact: exact for one mode, otherwise the contact's own, with the rest at rest."""
     contact = body.contacts[impacts.contacts[0]]
     away = -contact.direction * contact.restitution * impacts.velocities[0]
     along = contact.shape * contact.mass

@@ -1,4 +1,4 @@
-"""Feedback that keeps an orbit of one impact by the forcing amplitude: equations.md 4.1, 4.12."""
+"""Feedback through the forcing amplitude that keeps an orbit with one impact: equations.md 4.1, 4.12."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class ImpactMap:
     """The map of impacts, linear about an orbit P(1,q): (t, V) at an impact leads to (t, V) at the next."""
 
     jacobian: Floats
-    """Over (t, V): s, m/s; shape (2, 2)."""
+    """Derivative by (t, V): s, m/s; shape (2, 2)."""
     response: Floats
-    """Over the forcing amplitude: s/N, (m/s)/N; shape (2,)."""
+    """Derivative by the forcing amplitude: s/N, (m/s)/N; shape (2,)."""
 
     @property
     def multipliers(self) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-        """Of the orbit, the largest first."""
+        """Multipliers of the orbit, the largest first."""
         found = np.linalg.eigvals(self.jacobian).astype(np.complex128)
         return found[np.argsort(-np.abs(found), kind="stable")]
 
@@ -38,12 +38,12 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
     ----------
     orbit : PeriodicOrbit
     amplitude : float
-        Forcing amplitude that the force of its body stands for, N.
+        Forcing amplitude of the body's force, N.
 
     Raises
     ------
     OrbitError
-        It has several impacts, or modes.
+        The orbit has several impacts, or the body several modes.
     """
     from scipy.linalg import expm
 
@@ -54,7 +54,7 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
         )
     contact = body.contacts[int(orbit.contacts[0])]
     natural, decay = float(body.frequencies[0]), float(body.damping_ratios[0] * body.frequencies[0])
-    # seen along the direction of the stop, as a displacement of the contact
+    # in the direction of the stop, as a displacement of the contact
     toward = contact.direction * float(contact.shape[0])
     force, held = toward * float(body.force[0]), toward * float(body.held[0])
     stop, phase, w = contact.direction * contact.position, float(orbit.phases[0]), body.angular_frequency
@@ -77,12 +77,12 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
             ],
         ]
     )
-    pushed = _pushed(natural, decay, force / amplitude, w, phase, length)
+    pushed = _forced(natural, decay, force / amplitude, w, phase, length)
     response = np.array([-pushed[0] / speed, pushed[1] - before * pushed[0] / speed])
     return ImpactMap(jacobian, response)
 
 
-def _pushed(natural: float, decay: float, force: float, w: float, phase: float, length: float) -> Floats:
+def _forced(natural: float, decay: float, force: float, w: float, phase: float, length: float) -> Floats:
     """Return displacement and velocity after `length` s from rest, under force cos(w t + phase)."""
     from scipy.linalg import expm
 
@@ -104,8 +104,8 @@ def gains(law: Law, about: ImpactMap) -> Floats:
     Parameters
     ----------
     law : {"ogy", "deadbeat", "newton"}
-        `ogy`, `newton`: the next impact is on the direction that comes back faster; nothing where both come back
-        turning. `deadbeat`: two impacts later the orbit is reached.
+        `ogy`, `newton`: the next impact lies on the direction of faster return; no correction for a stable complex
+        pair. `deadbeat`: two impacts later the orbit is reached.
     about : ImpactMap
 
     Returns
@@ -116,7 +116,7 @@ def gains(law: Law, about: ImpactMap) -> Floats:
     Raises
     ------
     OrbitError
-        The amplitude does not act on what it must change.
+        The amplitude has no effect on the component that it must change.
     """
     largest = about.multipliers[0]
     if law == "deadbeat" or (largest.imag != 0.0 and abs(largest) >= 1.0):

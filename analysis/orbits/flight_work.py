@@ -1,9 +1,9 @@
-"""Integrals of a flight of a forced mode that are exact, at any damping, at resonance too: equations.md 5.5.
+"""Exact integrals over a flight of a forced mode, at any damping, also at resonance: equations.md 5.5.
 
-Both integrands are quadratic in (w q, q', f cos, f sin), which moves by a constant matrix. So an integral over a
-flight is a quadratic form of its start. Over a step that is short against every rate it is a power series; over two
-equal steps it is P + E' P E, with the flow E of the first. No sample of the motion is taken, and nothing is divided by
-a difference of rates.
+Both integrands are quadratic in (w q, q', f cos, f sin), which evolves by a constant matrix. So an integral over a
+flight is a quadratic form of its start. Over a step that is short against every rate it is a power series P. Over two
+equal steps it is P + E' P E, with the flow E of the first step. The motion is not sampled, and no division by a
+difference of rates occurs.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SHORT = 0.25
-"""Bound of rate times length, up to which a step is a power series."""
+"""Largest rate times length for which a step is a power series."""
 TERMS = 20
-"""Of the power series: the last is (2 SHORT)^20 / 20!, far below rounding."""
+"""Terms of the power series; the last is (2 SHORT)^20 / 20!, far below rounding."""
 _SPEED, _COSINE = 1, 2
 
 
 class FlightWork(NamedTuple):
-    """What a mode goes through in a flight."""
+    """State and integrals of a mode over a flight."""
 
     end: Floats
     """w q and q' at its end, m/s kg^(1/2), shape (..., 2)."""
     forcing: Floats
     """Integral of f cos(phase) q', J, shape (...)."""
     squared: Floats
-    """Integral of q'^2, J s, shape (...): times 2 z w what damping takes."""
+    """Integral of q'^2, J s, shape (...); times 2 z w it is the damping loss."""
 
 
 def flight_work(
@@ -39,10 +39,10 @@ def flight_work(
     """Return the end of flights of modes, and the integrals over them, of shape (flights, modes).
 
     Natural angular frequencies (rad/s) and damping ratios have shape (modes,), lengths (s) shape (flights,). The
-    angular frequency, rad/s, is that of the force. The start has w q, q', f cos(phase), f sin(phase) of each mode,
+    angular frequency of the force is in rad/s. The start has w q, q', f cos(phase), f sin(phase) of each mode,
     shape (flights, modes, 4); f is the modal amplitude of the force.
 
-    A free undamped mode has the mean of q'^2 of a cosine, over whole periods:
+    A free undamped mode has the mean q'^2 of a cosine over whole periods:
 
     >>> start = np.array([[[1.0, 0.0, 0.0, 0.0]]])
     >>> done = flight_work(np.array([1.0]), np.array([0.0]), 1.0, np.array([2.0 * np.pi]), start)
@@ -53,7 +53,7 @@ def flight_work(
     u = np.broadcast_to(lengths[:, None], shape).ravel()
     w, z = (np.broadcast_to(each, shape).ravel() for each in (natural, damping_ratio))
     rate = np.maximum(w * (1.0 + 2.0 * z), angular_frequency)
-    # lengths of zero, of two contacts at one instant, need no step
+    # a length of zero, between two contacts at one instant, needs no step
     halvings = np.ceil(np.log2(np.maximum(rate * u / SHORT, 1.0))).astype(np.int64)
     matrix = _matrix(w, z, angular_frequency) * np.ldexp(u, -halvings)[:, None, None]
     moved, forms = _series(matrix, np.ldexp(u, -halvings))
@@ -61,7 +61,7 @@ def flight_work(
         on = halvings > step
         change = moved[on]
         flow = np.eye(4) + change
-        # the change of the state is kept, not the state: next to 1 its digits would be lost
+        # the change of the state is kept instead of the state: next to 1 its digits would be lost
         moved[on] = 2.0 * change + change @ change
         forms[:, on] += np.swapaxes(flow, -1, -2) @ forms[:, on] @ flow
     state = start.reshape(-1, 4)

@@ -1,8 +1,8 @@
 """Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.7.
 
-The unknowns are the phases of the impacts and the parameter; a step goes along the branch (pseudo-arclength), so that
-a fold is a point as any other. What may happen is a function along the branch that changes its sign, and the sign
-change is narrowed down to rounding by steps of part lengths.
+The unknowns are the phases of the impacts and the parameter. A step goes along the branch (pseudo-arclength), so that
+a fold is an ordinary point. Each event is the sign change of a function along the branch; steps of partial length
+narrow it down to rounding.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 MOST_NEWTON = 12
 EASY_NEWTON = 3
-"""Newton steps up to which the next step along the branch is longer."""
+"""Number of Newton steps up to which the next step along the branch is made longer."""
 MOST_TURN = 0.1
-"""Change of the branch's direction from point to point, rad, above which a step is tried again, shorter."""
+"""Change of the branch's direction between points, rad, above which a step is repeated with half its length."""
 SHORTEST = 1e-9
-"""Step along the branch, over the longest, below which it is given up."""
+"""Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
-"""Kind of a point where the stability changes for none of the reasons that are looked for, such as a branch point."""
+"""Kind of a point where the stability changes for none of the known reasons, for example at a branch point."""
 MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2}
-"""Multipliers that pass the unit circle at a point of each kind."""
+"""Number of multipliers that pass the unit circle at a point of each kind."""
 CLOSED = "closed"
-"""End of a branch that comes back to its first orbit."""
+"""End of a branch that returns to its first orbit."""
 LOCATED = 1e-13
-"""Width of a bracket, over the step along the branch, at which a point counts as found."""
+"""Width of a bracket, over the step along the branch, below which a point counts as found."""
 
 BodyAt = Callable[[float], ImpactingBody]
 
 
 @dataclass(frozen=True, slots=True)
 class FollowSettings:
-    """How a branch is followed.
+    """Settings for following a branch.
 
     Attributes
     ----------
     lowest, highest : float
         Range of the parameter.
     longest : float
-        Largest step along the branch; the range of the parameter counts 1, a radian of all phases 1.
+        Largest step along the branch; the range of the parameter counts as 1, a radian of all phases as 1.
     most_orbits : int
-        After which a branch ends.
+        Number of orbits after which a branch ends.
     """
 
     lowest: float
@@ -76,9 +76,9 @@ class BranchOrbit:
     Attributes
     ----------
     value : float
-        Of the parameter.
+        Value of the parameter.
     orbit : PeriodicOrbit
-        Its phases are not those of a first period: they go on from orbit to orbit.
+        Its phases need not lie in the first period: they continue from orbit to orbit.
     tangent : array, shape (p + 1,)
         Direction of the branch: phases, then the parameter over its range.
     """
@@ -89,7 +89,7 @@ class BranchOrbit:
 
     @cached_property
     def tests(self) -> dict[str, float]:
-        """Functions whose sign changes where something happens."""
+        """Functions whose sign changes at a special point, by kind."""
         orbit = self.orbit
         size = orbit.monodromy.shape[0]
         fast = float(np.prod(np.minimum(orbit.velocities, 1.0)))
@@ -112,11 +112,11 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        `fold`, `period doubling`, `torus`, `graze` (an impact of no speed), `graze between impacts`, beyond which
-        the orbit would pass through a stop, or `stability change`, of which no cause was found.
+        `fold`, `period doubling`, `torus`, `graze` (an impact without speed), `graze between impacts` (the orbit would
+        pass through a stop beyond it), or `stability change` without a known cause.
     at : BranchOrbit
     place : int
-        Orbit of the branch that comes next.
+        Index of the next orbit of the branch.
     """
 
     kind: str
@@ -126,17 +126,17 @@ class SpecialPoint:
 
 @dataclass(slots=True)
 class Branch:
-    """Orbits that go over into each other, in the order of the branch.
+    """Orbits that are continuously connected, in the order of the branch.
 
     Attributes
     ----------
     orbits : list of BranchOrbit
     points : list of SpecialPoint
-        In their order.
+        Special points in their order.
     ends : list of str
-        Why it ends, at its first and at its last orbit.
+        Reasons of both ends, at its first and at its last orbit.
     origin : str
-        What it was begun from.
+        Description of its starting point.
     """
 
     origin: str
@@ -151,7 +151,7 @@ class Branch:
 
     @property
     def full_name(self) -> str:
-        """P(p,q), and where its impacts are if the body has several stops."""
+        """P(p,q), with the stops of its impacts if the body has several."""
         return self.orbits[0].orbit.full_name
 
     @property
@@ -180,7 +180,7 @@ class Follower:
         self.settings = settings
 
     def branch(self, orbit: PeriodicOrbit, value: float, origin: str = "") -> Branch:
-        """Follow the branch of an orbit both ways, as far as it is physical and within the range.
+        """Follow the branch of an orbit both ways, within its physical part and within the range.
 
         Raises
         ------
@@ -195,17 +195,17 @@ class Follower:
     def both_ways(
         self, backward: Branch, forward: Branch, orbit: PeriodicOrbit, value: float
     ) -> Iterator[tuple[Branch, BranchOrbit]]:
-        """Follow an orbit to lower values, then to higher ones; a closed branch is passed through once."""
-        for way, sign in ((backward, -1.0), (forward, 1.0)):
+        """Follow an orbit to lower values, then to higher values; a closed branch is passed once."""
+        for branch, sign in ((backward, -1.0), (forward, 1.0)):
             if backward.is_closed:
                 return
-            for each in self.walk(way, orbit, value, sign):
-                yield way, each
+            for each in self.walk(branch, orbit, value, sign):
+                yield branch, each
 
     def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
-        """Follow one way, towards higher (+1) or lower (-1) values at first; the branch grows with each orbit."""
+        """Follow one way, at first towards higher (+1) or lower (-1) values; the branch grows with each orbit."""
         start = self._first(orbit, value, sign)
-        yield from self._walked(branch, start)
+        yield from self._orbits(branch, start)
 
     def leave(self, branch: Branch, doubling: SpecialPoint) -> Iterator[BranchOrbit]:
         """Follow the orbits of twice the period that begin at a period doubling; the branch grows with each."""
@@ -216,11 +216,11 @@ class Follower:
         )
         slopes = evaluated(once.body, twice.contacts, phases, twice.periods).distance_slopes
         away = np.linalg.svd(slopes)[2][-1]
-        # one half of the train comes early, the other late
+        # one half of the train comes earlier, the other later
         half = 0.5 * (away[: once.phases.size] - away[once.phases.size :])
         tangent = np.append(np.concatenate([half, -half]), 0.0)
         start = BranchOrbit(doubling.at.value, twice, tangent / np.linalg.norm(tangent))
-        yield from self._walked(branch, start, born=True)
+        yield from self._orbits(branch, start, born=True)
 
     def _first(self, orbit: PeriodicOrbit, value: float, sign: float) -> BranchOrbit:
         tangent = self._tangent(orbit, value, None)
@@ -228,7 +228,7 @@ class Follower:
             tangent = -tangent
         return BranchOrbit(value, orbit, tangent)
 
-    def _walked(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
+    def _orbits(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
         now, step, longest = start, 0.1 * self.settings.longest, self.settings.longest
         if not born:
             branch.orbits.append(now)
@@ -242,19 +242,19 @@ class Follower:
                     return
                 continue
             taken, newton = found
-            if born:  # an orbit next to the doubling shows nothing of its own yet
+            if born:  # an orbit next to the doubling has no special points of its own yet
                 born, now = False, taken
                 branch.orbits.append(taken)
                 yield taken
                 continue
-            home = self._home(branch.orbits[0], now, taken)
-            if home is not None:
-                step, taken = home
+            closing = self._closing_step(branch.orbits[0], now, taken)
+            if closing is not None:
+                step, taken = closing
             if (yield from self._passed(branch, now, taken, step)):
                 return
             branch.orbits.append(taken)
             yield taken
-            if home is not None:
+            if closing is not None:
                 branch.ends.append(CLOSED)
                 return
             now = taken
@@ -264,7 +264,7 @@ class Follower:
     def _passed(
         self, branch: Branch, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> Generator[BranchOrbit, None, bool]:
-        """Add what happens in a step to the branch; return whether the branch ends there."""
+        """Add the events of a step to the branch; return whether the branch ends there."""
         for _, kind, at in self._events_in_order(now, taken, step):
             if kind not in at.tests and kind != STABILITY_CHANGE:
                 branch.ends.append(kind)
@@ -291,7 +291,7 @@ class Follower:
         return found.distances, found.distance_slopes, made
 
     def _over_value(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
-        """Return the derivative of the distances over the parameter, counted in its range."""
+        """Return the derivative of the distances by the parameter, measured in its range."""
         change = 1e-6 * max(abs(value), 1e-3 * self.settings.span)
         ends = [
             evaluated(self._body_at(value + side * change), orbit.contacts, phases, orbit.periods).distances
@@ -306,14 +306,14 @@ class Follower:
         return -tangent if before is not None and tangent @ before < 0.0 else tangent
 
     def _step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
-        """Return the orbit a step further, and the Newton steps that it took; None where there is none so near."""
+        """Return the orbit a step further, and the number of Newton steps; None without an orbit that near."""
         span = self.settings.span
         phases = now.orbit.phases + step * now.tangent[:-1]
         value = now.value + step * now.tangent[-1] * span
         least = np.inf
         try:
             across = self._over_value(now.orbit, phases, value)
-            for newton in range(MOST_NEWTON):  # noqa: B007  # how many is said
+            for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
                 distances, slopes, orbit = self._residual(now.orbit, phases, value)
                 error = float(np.abs(distances).max())
                 small = error <= CLOSE * orbit.body.scale
@@ -337,39 +337,39 @@ class Follower:
             return None
         return BranchOrbit(float(value), orbit, tangent), newton
 
-    def _home(
+    def _closing_step(
         self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit
     ) -> tuple[float, BranchOrbit] | None:
         """Return the step to the first orbit of the branch, and that orbit; None unless a step passes it."""
         if now is first or taken is first:
             return None
-        before, beyond = (self._apart(first, each) for each in (now, taken))
+        before, beyond = (self._difference(first, each) for each in (now, taken))
         if not first.tangent @ before < 0.0 <= first.tangent @ beyond:
             return None
         farther = max(float(np.linalg.norm(each)) for each in (before, beyond))
         if farther > 2.0 * float(np.linalg.norm(beyond - before)):
             return None  # another part of the branch passes the same plane
-        step = float(now.tangent @ self._apart(now, first))
+        step = float(now.tangent @ self._difference(now, first))
         found = self._step(now, step) if step > 0.0 else None
         return None if found is None else (step, found[0])
 
-    def _apart(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
-        """Return the way between two orbits in the unknowns of the branch, whatever turn each is counted from."""
+    def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
+        """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
         whole = TURN * one.orbit.periods
         turned = [
-            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _alike(one, other)
+            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _shifts(one, other)
         ]
-        apart = [each - one.orbit.phases for each in turned]
-        apart = [each - TURN * np.round(each.mean() / TURN) for each in apart]
-        nearest = min(apart, key=lambda each: float(np.abs(each).max()))
+        differences = [each - one.orbit.phases for each in turned]
+        differences = [each - TURN * np.round(each.mean() / TURN) for each in differences]
+        nearest = min(differences, key=lambda each: float(np.abs(each).max()))
         return np.append(nearest, (other.value - one.value) / self.settings.span)
 
-    # ---- what happens on the way ----
+    # ---- events of a step ----
 
     def _events_in_order(
         self, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> list[tuple[float, str, BranchOrbit]]:
-        """Return what happens in a step; a change of stability that nothing of it explains is an event as well."""
+        """Return the events of a step, in order; a change of stability without a cause among them is an event, too."""
         events = list(self._events(now, taken, step))
         if not is_explained(now.orbit, taken.orbit, [kind for _, kind, _ in events]):
             events.append(self._stability_change(now, taken, step))
@@ -378,7 +378,7 @@ class Follower:
     def _stability_change(
         self, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> tuple[float, str, BranchOrbit]:
-        """Return where along a step the stability changes, as near as orbits are found there."""
+        """Return the place along a step where the stability changes, as closely as orbits are found there."""
         same, changed, at = 0.0, step, taken
         while changed - same > LOCATED * step:
             middle = 0.5 * (same + changed)
@@ -415,15 +415,15 @@ class Follower:
     def _located(
         self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
     ) -> tuple[float, BranchOrbit] | None:
-        """Return where along a step a test is 0, and the orbit there."""
+        """Return the place along a step where a test is 0, and the orbit there."""
         from scipy.optimize import brentq
 
-        lost = []
+        missing = []
 
         def at(part: float) -> float:
             found = (now, 0) if part == 0.0 else self._step(now, part)
             if found is None:
-                lost.append(part)
+                missing.append(part)
                 return float(np.nan)
             return test(found[0])
 
@@ -431,15 +431,15 @@ class Follower:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
         except (ValueError, RuntimeError):
             return None
-        found = self._step(now, part) if part > 0.0 and not lost else None
+        found = self._step(now, part) if part > 0.0 and not missing else None
         return None if found is None else (part, found[0])
 
 
 def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:
-    """Say whether the stability of two orbits is the same, or points of some kinds between them change it.
+    """Tell whether two orbits have the same stability, or points of these kinds between them explain the change.
 
-    Each point moves as many multipliers over the unit circle as its kind says, outwards or inwards. A graze explains
-    any change: multipliers have no bound next to it.
+    Each point moves the number of multipliers of its kind across the unit circle, outwards or inwards. A graze explains
+    any change: multipliers are unbounded next to it.
     """
     if before.is_stable == after.is_stable or "graze" in kinds:
         return True
@@ -461,7 +461,7 @@ def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
 
 
 def joined(backward: Branch, forward: Branch) -> Branch:
-    """Return two ways from one orbit as one branch, from the end of the first to that of the second."""
+    """Return both ways from one orbit as one branch, from the end of the first to the end of the second."""
     count = len(backward.orbits)
     turned = [BranchOrbit(each.value, each.orbit, -each.tangent) for each in reversed(backward.orbits)]
     points = [
@@ -476,7 +476,7 @@ def joined(backward: Branch, forward: Branch) -> Branch:
     return Branch(forward.origin, turned + forward.orbits[1:], points, backward.ends + forward.ends)
 
 
-def _alike(one: BranchOrbit, other: BranchOrbit) -> list[int]:
-    """Return the impacts of an orbit to count from so that its stops are in the order of another orbit."""
+def _shifts(one: BranchOrbit, other: BranchOrbit) -> list[int]:
+    """Return the shifts of an orbit's impacts for which its stops are in the order of another orbit."""
     contacts = other.orbit.contacts
     return [k for k in range(contacts.size) if (np.roll(contacts, -k) == one.orbit.contacts).all()]

@@ -1,4 +1,4 @@
-"""Orbits of a body that were found, as a list that has a dataset and can be drawn."""
+"""Orbits found for a body, as a list with a dataset and a figure."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class FoundOrbits(list[PeriodicOrbit]):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The physical orbits along `run`, each a branch of its own, with their forcing frequency.
+        """The physical orbits along `run`, each as its own branch, with their forcing frequency.
 
         Raises
         ------
         DatasetError
-            There is no physical orbit among them.
+            None of the orbits is physical.
         """
         physical = [orbit for orbit in self if orbit.is_physical]
         if not physical:
@@ -52,10 +52,10 @@ class FoundOrbits(list[PeriodicOrbit]):
 
     def _repr_html_(self) -> str:
         headings = ("orbit", "", "phases, rad", "stops", "impact velocities", "largest multiplier")
-        return html_table("Periodic orbits", headings, [_told(orbit) for orbit in self])
+        return html_table("Periodic orbits", headings, [_row(orbit) for orbit in self])
 
 
-def _told(orbit: PeriodicOrbit) -> tuple[object, ...]:
+def _row(orbit: PeriodicOrbit) -> tuple[object, ...]:
     largest = orbit.multipliers[0]
     return (
         orbit.name,

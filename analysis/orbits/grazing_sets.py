@@ -1,4 +1,4 @@
-"""The sets S and W of the impact map: impacts that lead to a graze next, and those that a graze leads to (2.3.4)."""
+"""The sets S and W of the impact map: impacts that lead to a graze next, and impacts that follow a graze (2.3.4)."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from vibroimpact.analysis.orbits.periodic import TURN
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 STEPS = 256
-"""Looks at a flight in 8 radians of its fastest part: between two the velocity changes its sign once at most."""
+"""Samples in 8 radians of a flight's fastest part: between two of them the velocity changes its sign at most once."""
 LONGEST = 40
-"""Forcing periods of a flight after which it is taken to meet no stop."""
+"""Forcing periods after which a flight counts as one that meets no stop."""
 BISECTIONS = 60
 JUMP = 0.5
-"""Of a flight's length in forcing periods, at which a curve is another one: a graze comes in between."""
+"""Jump of a flight's length, in forcing periods, that ends a curve: a graze comes in between."""
 
 
 @dataclass(frozen=True, eq=False)
 class GrazingSets:
-    """Both sets, along the phase of the graze; NaN where there is no flight, and between two pieces of a curve."""
+    """Both sets, along the phase of the graze; NaN without a flight, and between two pieces of a curve."""
 
     grazes: Floats
-    """Phases at which an impact without speed is one: the body leaves the stop after it, rad."""
+    """Phases at which an impact without speed is possible: the body leaves the stop after it, rad."""
     before_phase: Floats
     before_velocity: Floats
-    """`before_phase` and `before_velocity`: S, impacts whose next one is the graze, rad and m/s."""
+    """`before_phase` and `before_velocity`: S, impacts that lead to the graze next, rad and m/s."""
     after_phase: Floats
     after_velocity: Floats
     """`after_phase` and `after_velocity`: W, the impacts after the graze."""
@@ -35,7 +35,7 @@ class GrazingSets:
 
 @dataclass(frozen=True, eq=False)
 class _Flight:
-    """Free flights from grazes at several phases; times count from the graze, and may be below 0."""
+    """Free flights from grazes at several phases; times count from the graze, and may be negative."""
 
     body: ImpactingBody
     phases: Floats
@@ -70,12 +70,12 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
     ----------
     body : ImpactingBody
     points : int
-        Phases of the graze.
+        Number of phases of the graze.
 
     Raises
     ------
     OrbitError
-        It has several modes or stops.
+        The body has several modes or stops.
     """
     natural, decay, toward = one_mode(body)
     contact, w = body.contacts[0], body.angular_frequency
@@ -85,15 +85,15 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
     grazes = phases[pull < 0.0]
     if not grazes.size:
         return GrazingSets(*(np.empty(0) for _ in range(5)))
-    # in the order of a curve: from where it begins to press no longer
+    # in the order of a curve: it starts where the body no longer presses on the stop
     start = int(np.argmax(np.diff(grazes, append=grazes[0] + TURN))) + 1
     grazes = np.roll(grazes, -start % grazes.size)
     fastest = max(natural, 2.0 * decay, w)
-    # backward a damped body comes from beyond all numbers, with no stop on its way
+    # backward in time a damped body comes from infinity, with no stop on its way
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         after, after_velocity = _first_meeting(_Flight(body, grazes), 1.0, fastest)
         before, before_velocity = _first_meeting(_Flight(body, grazes), -1.0, fastest)
-        # the flight that ends in the graze begins with -r V
+        # the flight that ends in the graze begins with the velocity -r V
         speeds = np.where(before_velocity < 0.0, -before_velocity, np.nan) / contact.restitution
     speeds[~np.isfinite(speeds)] = np.nan
     for length, columns in ((after, (after_velocity,)), (before, (speeds,))):
@@ -110,9 +110,9 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
 
 
 def _first_meeting(flight: _Flight, sense: float, fastest: float) -> tuple[Floats, Floats]:
-    """Return time and velocity of the first meeting with the stop after the graze, or (sense -1) of the last before it.
+    """Return time and velocity of the first meeting with the stop after the graze (sense -1: the last before it).
 
-    Heights are looked at where they are greatest: between two turns of the velocity they rise or fall all the time.
+    Heights are checked at their maxima: between two sign changes of the velocity they are monotonic.
     """
     count = flight.phases.size
     times, velocities = np.full(count, np.nan), np.full(count, np.nan)
@@ -155,7 +155,7 @@ def _last_low(flight: _Flight, top: Floats, step: float) -> Floats:
 
 
 def _root(flight: _Flight, low: Floats, high: Floats, of: object) -> Floats:
-    """Return where a function that is > 0 at `low` and <= 0 at `high` changes its sign."""
+    """Return the sign change of a function that is > 0 at `low` and <= 0 at `high`."""
     assert callable(of)
     low, high = low.copy(), high.copy()
     for _ in range(BISECTIONS):

@@ -1,7 +1,7 @@
-"""Classes of runs of which impacts alone are recorded, as those of components that hit each other.
+"""Classes of runs from impacts alone, for example of components that hit each other.
 
-Where one forcing frequency is known, a period shows its strongest impact: when it is, and how fast. Else a motion has a
-period of its own, and repeats where its last impacts do.
+With one known forcing frequency, the state of a period is its strongest impact: its time and its speed. Otherwise a
+motion has its own period, and repeats if its last impacts do.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FREQUENCY = "angular_frequency"
-"""How the name of a forcing frequency ends."""
-ALIVE = 1e-2
-"""Speed of the last impacts over that of the fastest, below which a motion without forcing dies away."""
+"""Ending of the name of a forcing frequency."""
+LEAST_SPEED = 1e-2
+"""Speed of the last impacts, over the fastest, below which a motion without forcing dies away."""
 
 
 def has_named_contacts(dataset: xr.Dataset) -> bool:
-    """Say whether impacts are those of components that hit each other."""
+    """Tell whether impacts are those of components that hit each other."""
     return "impact_contact" in dataset.variables and "flag_meanings" in dataset["impact_contact"].attrs
 
 
 def impacts_of_runs(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, float | None]]:
     """Yield the impacts of each run, in the order of the file, and its forcing frequency, rad/s.
 
-    The frequency is 0 where the dataset names none, and None where there are several.
+    The frequency is 0 if the dataset names none, and None if there are several.
     """
     runs, table = dataset.vibroimpact.runs, dataset.vibroimpact.impacts_table()
     names = [name for name in map(str, runs.variables) if name.endswith(FREQUENCY)]
@@ -39,10 +39,10 @@ def impacts_of_runs(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, float | N
 
 
 def states_of_periods(impacts: xr.Dataset, frequency: float) -> tuple[Floats, Floats]:
-    """Return what whole forcing periods show, and how many impacts each has; they are cut where no impact is near.
+    """Return the state and the number of impacts of whole forcing periods, which are cut where no impact is near.
 
-    States, shape (period, 2), are the forcing periods from the cut to the strongest impact, and its speed, m/s; 0
-    without one. Counts, shape (period,), are infinite where bodies come to rest on each other.
+    States, shape (period, 2): time from the cut to the strongest impact in forcing periods, and its speed, m/s; 0
+    without an impact. Counts, shape (period,), are infinite if bodies come to rest on each other.
     """
     turns = impacts["impact_time"].values * abs(frequency) / (2.0 * np.pi)
     if not turns.size:
@@ -55,8 +55,8 @@ def states_of_periods(impacts: xr.Dataset, frequency: float) -> tuple[Floats, Fl
         rows = np.flatnonzero(period == each)
         strongest = rows[np.argmax(speed[rows])] if rows.size else None
         states.append((0.0, 0.0) if strongest is None else (turns[strongest] - each, speed[strongest]))
-        rests = (impacts["impact_restitution"].values[rows] == 0.0).any()
-        counts.append(np.inf if rests else float(rows.size))
+        sticks = (impacts["impact_restitution"].values[rows] == 0.0).any()
+        counts.append(np.inf if sticks else float(rows.size))
     return np.array(states, dtype=float).reshape(-1, 2), np.array(counts, dtype=float)
 
 
@@ -69,9 +69,9 @@ def _cut(phases: Floats) -> float:
 
 
 def own_period(impacts: xr.Dataset, same: float) -> tuple[int, str]:
-    """Return after how many impacts a motion without forcing repeats, or 0 and why; `same` is over the largest."""
+    """Return the number of impacts after which a motion without forcing repeats, or 0, and the reason for 0."""
     speed = impacts["impact_velocity"].values
-    if speed[-1] <= ALIVE * speed.max() or (impacts["impact_restitution"].values == 0.0).any():
+    if speed[-1] <= LEAST_SPEED * speed.max() or (impacts["impact_restitution"].values == 0.0).any():
         return 0, "no forcing, and its impacts die away"
     time = impacts["impact_time"].values
     rows = np.column_stack([np.diff(time), speed[1:], impacts["impact_contact"].values[1:]])

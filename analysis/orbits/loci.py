@@ -1,8 +1,8 @@
-"""Bifurcations followed over two parameters: where a fold, a period doubling or a graze is, equations.md 4.5 and 4.6.
+"""Bifurcations followed over two parameters: loci of folds, period doublings and grazes, equations.md 4.5 and 4.6.
 
-The unknowns are the phases of the impacts and both parameters; beside the equations of the orbit there is one more,
-the function whose sign change the bifurcation is. A locus that comes to an impact of no speed has come to a graze too:
-a point of codimension 2. So is a graze between impacts at which another maximum touches a stop as well.
+The unknowns are the phases of the impacts and both parameters. The equations of the orbit are joined by one more: the
+function with the sign change at the bifurcation. Where an impact of a locus loses its speed, the locus meets a graze:
+a point of codimension 2. So is a graze between impacts at which a second maximum touches a stop.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 FOLLOWED_KINDS = ("fold", "period doubling", "graze", "graze between impacts")
 JUMP = 0.5
-"""Change of the phase of the highest maximum, rad, from which on it is another one."""
+"""Change of the phase of the highest maximum, rad, above which it is another maximum."""
 CHANGE = 1e-6
-"""Of an unknown, by which derivatives are found; an error of theirs costs a Newton step, and no digit."""
+"""Change of an unknown for derivatives by differences; their error costs a Newton step, but no digit."""
 SLOW = 1e-5
-"""Speed of an impact, over the fastest, below which a locus of another kind ends for its sake."""
+"""Speed of an impact, over the fastest, below which a locus of another kind ends at a graze."""
 CLOSED = 1e-13
-"""Change of the unknowns at which they are found."""
+"""Change of the unknowns below which they count as found."""
 
 BodyAt2 = Callable[[float, float], ImpactingBody]
 
@@ -43,15 +43,15 @@ class LocusPoint:
     """An orbit at its bifurcation."""
 
     values: tuple[float, float]
-    """Of both parameters."""
+    """Values of both parameters."""
     orbit: PeriodicOrbit
     tangent: Floats
-    """Shape (p + 2,)."""
+    """Direction of the locus, shape (p + 2,)."""
 
 
 @dataclass(slots=True)
 class Locus:
-    """Where a bifurcation is over two parameters.
+    """Locus of a bifurcation over two parameters.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Locus:
         graze between impacts.
     ends : list of str
     origin : str
-        Branch and point that it was begun from.
+        Branch and point from which it starts.
     """
 
     kind: str
@@ -81,7 +81,7 @@ class LocusFollower:
     body_at : callable
         Body for values of both parameters.
     first, second : FollowSettings
-        Their ranges; steps are those of the first.
+        Settings for both parameters; steps are those of the first.
     """
 
     def __init__(self, body_at: BodyAt2, first: FollowSettings, second: FollowSettings) -> None:
@@ -95,20 +95,20 @@ class LocusFollower:
         Raises
         ------
         OrbitError
-            It is none that is followed.
+            The bifurcation is of a kind that cannot be followed.
         """
-        ways = []
+        sides = []
         for sign in (-1.0, 1.0):
-            way = Locus(point.kind)
-            for _ in self.walk(way, point.at, values, sign):
+            side = Locus(point.kind)
+            for _ in self.walk(side, point.at, values, sign):
                 pass
-            ways.append(way)
-        return joined_loci(*ways)
+            sides.append(side)
+        return joined_loci(*sides)
 
     def walk(
         self, locus: Locus, at: BranchOrbit, values: tuple[float, float], sign: float
     ) -> Iterator[LocusPoint]:
-        """Follow one way, towards higher (+1) or lower (-1) values of the second parameter at first."""
+        """Follow one way, at first towards higher (+1) or lower (-1) values of the second parameter."""
         if locus.kind not in FOLLOWED_KINDS:
             raise OrbitError(f"loci: expected a {', a '.join(FOLLOWED_KINDS)}, got a {locus.kind}.")
         unknowns = np.concatenate([at.orbit.phases, np.array(values) / self._spans])
@@ -125,7 +125,7 @@ class LocusFollower:
             if found is None:
                 step *= 0.5
                 if step < SHORTEST * longest:
-                    locus.ends.append(self._why_no_further(locus, now, 1e-3 * longest))
+                    locus.ends.append(self._reason_for_end(locus, now, 1e-3 * longest))
                     return
                 continue
             taken, newton = found
@@ -190,7 +190,7 @@ class LocusFollower:
         unknowns = start + step * now.tangent
         try:
             slopes = self._slopes(kind, now.orbit, unknowns)
-            for newton in range(MOST_NEWTON):  # noqa: B007  # how many is said
+            for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
                 residual = self._equations(kind, now.orbit, unknowns)
                 matrix = np.vstack([slopes, now.tangent])
                 off = step - now.tangent @ (unknowns - start)
@@ -218,7 +218,7 @@ class LocusFollower:
     def _end(
         self, locus: Locus, now: LocusPoint, taken: LocusPoint, step: float
     ) -> tuple[str, LocusPoint | None] | None:
-        """Return why a locus ends between two points, and the last one; None where it goes on."""
+        """Return the reason why a locus ends between two points, and the last point; None if it continues."""
         if locus.kind != "graze" and taken.orbit.velocities.min() <= 0.0 < now.orbit.velocities.min():
             found = self._last(locus.kind, now, step, lambda each: each.orbit.velocities.min() > 0.0)
             locus.special.append(("graze", found))
@@ -242,8 +242,8 @@ class LocusFollower:
             return "graze between impacts", touch
         return None
 
-    def _why_no_further(self, locus: Locus, now: LocusPoint, step: float) -> str:
-        """Return why a locus ends where no step is short enough; with a graze between impacts a point may be known."""
+    def _reason_for_end(self, locus: Locus, now: LocusPoint, step: float) -> str:
+        """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
         if locus.kind != "graze between impacts":
             return "cannot be followed further"
         slow = now.orbit.velocities.min() / now.orbit.velocities.max()
@@ -257,9 +257,9 @@ class LocusFollower:
         return "cannot be followed further"
 
     def _without_speed(self, locus: Locus) -> LocusPoint:
-        """Return where an impact has no speed, along the line through points next to it.
+        """Return the point where an impact has no speed, along the line through points next to it.
 
-        An impact that is slower than derivatives are fine has a maximum beside it, and the locus cannot be followed on.
+        An impact slower than the resolution of derivatives has a maximum next to it, and the locus cannot be followed.
         """
         now = locus.points[-1]
         slowest = now.orbit.velocities.min()
@@ -277,7 +277,7 @@ class LocusFollower:
     def _last(
         self, kind: str, now: LocusPoint, step: float, holds: Callable[[LocusPoint], bool]
     ) -> LocusPoint:
-        """Return the last point of a step for which something holds: beyond it there may be no points."""
+        """Return the last point of a step for which a condition holds: beyond it there may be no points."""
         part, beyond, last = 0.0, step, now
         while beyond - part > LOCATED * step:
             middle = 0.5 * (part + beyond)
@@ -306,7 +306,7 @@ class LocusFollower:
 
 
 def joined_loci(backward: Locus, forward: Locus) -> Locus:
-    """Return two ways from one point as one locus."""
+    """Return both ways from one point as one locus."""
     return Locus(
         forward.kind,
         backward.points[::-1] + forward.points[1:],
@@ -321,12 +321,12 @@ def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
 
 
 def _beyond_stop(point: LocusPoint) -> float:
-    """Return how far the highest maximum is beyond its stop, over the size of the motion; at least -1."""
+    """Return the distance of the highest maximum beyond its stop, over the size of the motion; at least -1."""
     return max(point.orbit.highest[0] / point.orbit.body.scale, -1.0) - TOUCHES
 
 
 def _is_other_maximum(one: LocusPoint, other: LocusPoint) -> bool:
-    """Say whether the highest maximum between impacts of one orbit is not that of the other."""
+    """Tell whether the highest maxima between impacts of two orbits are different maxima."""
     (_, at, contact), (_, at_other, contact_other) = one.orbit.highest, other.orbit.highest
     whole = TURN * one.orbit.periods
     moved = (at_other - other.orbit.phases[0]) - (at - one.orbit.phases[0])

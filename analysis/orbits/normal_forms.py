@@ -1,4 +1,4 @@
-"""Maps that impact oscillators come near to at a graze: Nordmark's and the one-dimensional square-root map."""
+"""Maps that describe impact oscillators near a graze: Nordmark's and the one-dimensional square-root map."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 TRANSIENT, KEPT = 4000, 200
-"""Steps of a map before it is looked at, and those that are kept."""
+"""Number of steps of a map before recording, and number of recorded steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Nordmark:
     restitution : float
         r.
     sign : float
-        Of the displacement that a push at the graze is one period later: +1 or -1.
+        Sign of the displacement one period after a push at the graze: +1 or -1.
     """
 
     alpha: float
@@ -38,16 +38,16 @@ class Nordmark:
 
     @property
     def oscillator(self) -> tuple[float, float] | None:
-        """Damping ratio, and angular frequency of the force over the natural one, of the fastest oscillator so forced.
+        """Damping ratio and frequency ratio (force over natural) of the fastest such oscillator.
 
-        None where no oscillator has this trace and determinant: an underdamped one has alpha = 2 sqrt(gamma) cos, an
-        overdamped one two positive eigenvalues below 1, so that -2 sqrt(gamma) <= alpha < 1 + gamma.
+        None where no oscillator has this trace and determinant. An underdamped one has alpha = 2 sqrt(gamma) cos; an
+        overdamped one has two positive eigenvalues below 1. So -2 sqrt(gamma) <= alpha < 1 + gamma.
         """
         if not (0.0 < self.gamma < 1.0 and -2.0 * math.sqrt(self.gamma) <= self.alpha < 1.0 + self.gamma):
             return None
         decay = -0.5 * math.log(self.gamma)  # times the period
         half = 0.5 * self.alpha / math.sqrt(self.gamma)
-        # what the damped motion turns in a period; squared it is below 0 of an overdamped one
+        # squared angle that the damped motion turns in a period; negative if overdamped
         turned = math.acos(half) ** 2 if half <= 1.0 else -(math.acosh(half) ** 2)
         natural = math.sqrt(turned + decay**2)
         return decay / natural, 2.0 * math.pi / natural
@@ -64,7 +64,7 @@ class Nordmark:
     def diagram(self, rho: Floats, kept: int = KEPT, transient: int = TRANSIENT) -> Floats:
         """Return X after a transient at each rho, shape (rho, kept); NaN where it grows without bound.
 
-        It begins with the motion without impacts, and beyond the graze at the graze.
+        It starts with the motion without impacts; beyond the graze it starts at the graze.
         """
         x = np.where(rho < 0.0, rho / (1.0 - self.alpha + self.gamma), 0.0)
         y = -self.gamma * x
@@ -80,7 +80,7 @@ class Nordmark:
 
 @dataclass(frozen=True, slots=True)
 class GrazingFamily:
-    """How an oscillator comes to its graze by its forcing amplitude.
+    """Approach of an oscillator to its graze by its forcing amplitude.
 
     Attributes
     ----------
@@ -96,11 +96,11 @@ class GrazingFamily:
     slope: float
 
     def rho(self, amplitude: Floats) -> Floats:
-        """Return what a forcing amplitude is in the map."""
+        """Return the parameter of the map for a forcing amplitude (N)."""
         return (amplitude / self.amplitude - 1.0) * self.slope
 
     def amplitude_of(self, rho: Floats) -> Floats:
-        """Return the forcing amplitude (N) of a value in the map."""
+        """Return the forcing amplitude (N) for a parameter of the map."""
         return self.amplitude * (1.0 + rho / self.slope)
 
 
@@ -112,12 +112,12 @@ def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
     body : ImpactingBody
         Its frequency is kept.
     amplitude : float
-        Forcing amplitude that the force of the body stands for, N.
+        Forcing amplitude of the body's force, N.
 
     Raises
     ------
     OrbitError
-        It has several modes or stops, rests on its stop, or its map is void.
+        The body has several modes or stops, rests on its stop, or its map is void.
     """
     from scipy.linalg import expm
 
@@ -140,7 +140,7 @@ def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
 
 
 def one_mode(body: ImpactingBody) -> tuple[float, float, float]:
-    """Return natural frequency, decay rate and the contact's shape along its stop, of one mode and one stop."""
+    """Return natural frequency, decay rate and the contact's shape along its stop, for one mode and one stop."""
     if body.frequencies.size != 1 or len(body.contacts) != 1:
         raise OrbitError(
             f"maps: expected a body of one mode and one stop, got {body.frequencies.size} and {len(body.contacts)}."
@@ -155,7 +155,7 @@ def square_root_diagram(
 ) -> Floats:
     """Return x of the one-dimensional map after a transient at each offset, shape (offset, kept): equations.md 4.10.
 
-    x < d: x -> slope x + root sqrt(d - x); else x -> slope x.
+    x < d: x -> slope x + root sqrt(d - x); otherwise x -> slope x.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def square_root_diagram(
 
 
 def periods_of(samples: Floats, tolerance: float = 1e-9) -> NDArray[np.int64]:
-    """Return after how many steps each row repeats; 0 where it does not within half of its samples.
+    """Return the number of steps after which each row repeats; 0 if it does not within half of its samples.
 
     >>> periods_of(np.array([[1.0, 2.0] * 4])).tolist()
     [2]
@@ -192,6 +192,6 @@ def periods_of(samples: Floats, tolerance: float = 1e-9) -> NDArray[np.int64]:
     found = np.zeros(rows, np.int64)
     scale = np.maximum(np.abs(samples).max(axis=1), 1e-300)
     for period in range(count // 2, 0, -1):
-        apart = np.abs(samples[:, period:] - samples[:, :-period]).max(axis=1)
-        found[apart <= tolerance * scale] = period
+        distance = np.abs(samples[:, period:] - samples[:, :-period]).max(axis=1)
+        found[distance <= tolerance * scale] = period
     return found

@@ -15,17 +15,17 @@ from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
 TURN = 2.0 * np.pi
 MOST_STEPS = 60
-"""Newton steps after which an orbit is not found."""
+"""Number of Newton steps after which the search for an orbit fails."""
 MOST_HALVINGS = 12
-"""Of a Newton step, until it leads nearer to the orbit."""
+"""Largest number of halvings of a Newton step until it leads nearer to the orbit."""
 CLOSE = 32.0 * np.finfo(float).eps
-"""Distance from the stops at the impacts, over the size of the motion, of an orbit that is found."""
+"""Distance from the stops at the impacts, over the size of the motion, below which an orbit is found."""
 SAME = 1e-7
-"""Phases, rad, that are one."""
+"""Difference of phases, rad, below which they are equal."""
 _MOST_SHOWN = 4
-"""Impacts that are listed in one line."""
+"""Largest number of impacts listed in one line."""
 TOUCHES = 1e-12
-"""Distance beyond a stop, over the size of the motion, that counts as a touch."""
+"""Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
 
 
 class OrbitError(VibroimpactError):
@@ -44,7 +44,7 @@ class PeriodicOrbit:
     phases : array, shape (p,)
         Forcing phases of the impacts, rad, ascending, the first in [0, 2 pi).
     contacts : array of int, shape (p,)
-        Which contact hits, from 0.
+        Contact of each impact, from 0.
     velocities : array, shape (p,)
         Speeds towards the stops before the impacts, m/s.
     """
@@ -74,7 +74,7 @@ class PeriodicOrbit:
 
     @property
     def full_name(self) -> str:
-        """P(p,q), and where its impacts are if the body has several stops: `P(1,1) at stop 2`."""
+        """P(p,q), with the stops of its impacts if the body has several: `P(1,1) at stop 2`."""
         if len(self.body.contacts) < 2:
             return self.name
         stops, counts = np.unique(self.contacts + 1, return_counts=True)
@@ -94,12 +94,12 @@ class PeriodicOrbit:
 
     @property
     def monodromy(self) -> Floats:
-        """Derivative of the state after the first impact over that of q periods before: equations.md 4.2."""
+        """Derivative of the state after the first impact by the state q periods before: equations.md 4.2."""
         return self._motion[1]
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers, the largest first, shape (2 modes,); NaN of a graze."""
+        """Floquet multipliers, the largest first, shape (2 modes,); NaN for a graze."""
         if not np.isfinite(self.monodromy).all():
             return np.full(self.monodromy.shape[0], np.nan + 0j)
         found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
@@ -107,7 +107,7 @@ class PeriodicOrbit:
 
     @property
     def determinant(self) -> float:
-        """Of the monodromy matrix; NaN of a graze."""
+        """Determinant of the monodromy matrix; NaN for a graze."""
         if not np.isfinite(self.monodromy).all():
             return float("nan")
         return float(np.linalg.det(self.monodromy))
@@ -116,9 +116,9 @@ class PeriodicOrbit:
     def exact_determinant(self) -> float:
         """Product of restitutions squared and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
-        lost = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
+        squared = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
         decay = float((body.damping_ratios * body.frequencies).sum())
-        return float(lost * np.exp(-2.0 * self.periods * body.period * decay))
+        return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
 
     @property
     def is_stable(self) -> bool:
@@ -129,18 +129,18 @@ class PeriodicOrbit:
     def highest(self) -> tuple[float, float, int]:
         """The highest maximum between impacts: m beyond its stop (negative: clearance), its phase, its contact or -1.
 
-        All maxima at all contacts are found: the search is certified by a bound of the third derivative.
+        All maxima at all contacts are found: a bound of the third derivative certifies the search.
         """
         return self.body.kernel.maximum(self.contacts, self.phases, self.periods, self.states)
 
     @property
     def is_physical(self) -> bool:
-        """Whether it hits its stops from inside, and is nowhere beyond one."""
+        """Whether it hits its stops from inside, and never lies beyond one."""
         return bool((self.velocities > 0.0).all()) and self.highest[0] <= TOUCHES * self.body.scale
 
     @cached_property
     def turns(self) -> int:
-        """How often a shorter orbit is passed in it: 1 of one that is counted once."""
+        """Number of times that the orbit repeats a shorter orbit; 1 if it does not."""
         p, q = self.phases.size, self.periods
         for turns in range(min(p, q), 1, -1):
             if p % turns or q % turns:
@@ -153,7 +153,7 @@ class PeriodicOrbit:
 
     @property
     def once(self) -> PeriodicOrbit:
-        """The same motion, counted once."""
+        """The shortest orbit of the same motion."""
         p, q = self.phases.size // self.turns, self.periods // self.turns
         return PeriodicOrbit(self.body, q, self.phases[:p], self.contacts[:p], self.velocities[:p])
 
@@ -163,18 +163,18 @@ class PeriodicOrbit:
         Parameters
         ----------
         phases : array
-            rad, ascending, from that of the first impact to 2 pi q later.
+            rad, ascending, from the phase of the first impact to 2 pi q later.
 
         Returns
         -------
         tuple of array
-            m, m/s; at an impact those after it.
+            m, m/s; at an impact the values after it.
         """
         return _observed(self, phases)
 
 
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
-    """Return what belongs to phases of impacts; OrbitError where no motion does."""
+    """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them."""
     found = body.kernel.evaluate(contacts, phases, periods)
     if found.end is OrbitEnd.resonant:
         raise OrbitError(
@@ -195,24 +195,24 @@ def find_orbit(
     contacts: Sequence[int] | None = None,
     periods: int = 1,
 ) -> PeriodicOrbit:
-    """Find the orbit near to some phases of impacts, stable or not, by Newton's method: equations.md 4.7.
+    """Find the orbit near given phases of impacts, stable or not, by Newton's method: equations.md 4.7.
 
     Parameters
     ----------
     body : ImpactingBody
     phases : array, shape (p,)
-        Forcing phases near to those of the impacts, rad, ascending, within 2 pi `periods`.
+        Forcing phases near those of the impacts, rad, ascending, within 2 pi `periods`.
     contacts : sequence of int, shape (p,), optional
-        Which contact hits, from 0; the first.
+        Contact of each impact, from 0; by default the first contact.
     periods : int
         q.
 
     Raises
     ------
     UsageError
-        The impacts are none.
+        The phases or contacts are no impacts.
     OrbitError
-        There is no orbit near to them.
+        There is no orbit near the phases.
     """
     at: Floats = np.array(phases, dtype=np.float64)
     hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
@@ -221,11 +221,11 @@ def find_orbit(
     for _ in range(MOST_STEPS):
         error = float(np.abs(found.distances).max())
         step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
-        nearer = _nearer(body, hit, at, shortened(step, at, periods), periods, error)
+        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, error)
         if nearer is None:
             break
         at, found = nearer
-    # next to a fold phases are known to the root of rounding
+    # next to a fold, phases are known only to the square root of rounding
     error = float(np.abs(found.distances).max())
     if error <= 1e3 * CLOSE * body.scale:
         return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
@@ -236,10 +236,10 @@ def find_orbit(
     )
 
 
-def _nearer(
+def _damped_step(
     body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, step: Floats, periods: int, error: float
 ) -> tuple[Floats, Evaluation] | None:
-    """Return phases that are nearer to an orbit, a part of a step away; None where there are none."""
+    """Return phases nearer to an orbit, a part of a step away; None if there are none."""
     for _ in range(MOST_HALVINGS):
         tried = phases - step
         found = evaluated(body, contacts, tried, periods)
@@ -275,12 +275,12 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
 def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
     """Return all orbits P(1,q) of a contact, physical or not, the fastest first: equations.md 4.3, any number of modes.
 
-    The distance from the stop at the impact is a + b cos(phase) + c sin(phase), so that there are two at most.
+    The distance from the stop at the impact is a + b cos(phase) + c sin(phase), so there are at most two orbits.
 
     Raises
     ------
     OrbitError
-        An undamped mode makes them infinitely many.
+        An undamped mode gives infinitely many orbits.
     """
     hit = np.array([contact], dtype=np.int32)
     at = [

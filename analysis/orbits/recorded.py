@@ -1,4 +1,4 @@
-"""The periodic orbit of recorded impacts: how they repeat, and the exact orbit that lies next to them."""
+"""The periodic orbit of recorded impacts: their repetition, and the exact orbit next to them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
 REPEATS = (1e-9, 1e-6, 1e-3)
-"""Differences of phases (rad), and of velocities over the largest, between rounds.
+"""Differences of phases (rad), and of velocities over the largest, between rounds; tried in order.
 
-The closest that is met counts: next to a doubling the two halves of an orbit differ by less than a transient may.
+The smallest that is met counts: next to a doubling, a transient may differ by more than the two halves of an orbit.
 """
 NO_IMPACTS = "no impacts"
 NEAR = 1e-2
-"""Largest difference of the orbit from the recorded impacts, likewise."""
+"""Largest difference of the orbit from the recorded impacts, in the same measure."""
 
 
 class Impacts(NamedTuple):
@@ -29,7 +29,7 @@ class Impacts(NamedTuple):
     times, phases, velocities : array, shape (impact,)
         s; forcing phases, rad; speeds towards the stops, m/s.
     contacts : array of int, shape (impact,)
-        Which contact was hit, from 0.
+        Contact of each impact, from 0.
     """
 
     times: Floats
@@ -43,22 +43,22 @@ class RecordedOrbit(NamedTuple):
 
     orbit: PeriodicOrbit
     distance: float
-    """Largest difference of a velocity from that of the orbit, over the largest: what is left of a transient."""
+    """Largest difference of a velocity from that of the orbit, over the largest velocity: a remaining transient."""
 
 
 def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
-    """Return the orbit P(p,q) that recorded impacts repeat, found by Newton's method from the last round of them.
+    """Return the orbit P(p,q) that recorded impacts repeat, found by Newton's method from their last round.
 
     Parameters
     ----------
     body : ImpactingBody
     impacts : Impacts
-        Two rounds of the orbit at least, without transient.
+        At least two rounds of the orbit, without transient.
 
     Raises
     ------
     OrbitError
-        They do not repeat, or there is no orbit of this body next to them.
+        They do not repeat, or this body has no orbit next to them.
     """
     if not impacts.times.size:
         raise OrbitError(NO_IMPACTS)
@@ -82,7 +82,7 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
 
 
 def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return a shorter orbit that this one passes several times: what a transient that alternates goes to."""
+    """Return the shortest orbit that this orbit repeats: the limit of an alternating transient."""
     if orbit.turns == 1:
         return orbit
     count, periods = orbit.phases.size // orbit.turns, orbit.periods // orbit.turns
@@ -90,22 +90,22 @@ def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
 
 
 def _unwrapped(impacts: Impacts, rate: float) -> Floats:
-    """Return phases that go on over the turns of the force, which the times count."""
+    """Return phases that continue over the turns of the force, which the times count."""
     passed = rate * (impacts.times - impacts.times[0])
     turns = np.round((passed - (impacts.phases - impacts.phases[0])) / TURN)
     return np.asarray(impacts.phases + TURN * turns)
 
 
 def _round(phases: Floats, impacts: Impacts) -> tuple[int, int]:
-    """Return after how many impacts, in how many turns, the impacts repeat."""
+    """Return the numbers of impacts and of turns after which the impacts repeat."""
     speeds = impacts.velocities / impacts.velocities.max()
     off: dict[int, float] = {}
     for count in range(1, min(phases.size // 2, MOST_IMPACTS) + 1):
-        gone = phases[count:] - phases[:-count]
-        periods = round(float(gone[0] / TURN))
+        advance = phases[count:] - phases[:-count]
+        periods = round(float(advance[0] / TURN))
         if periods >= 1 and (impacts.contacts[count:] == impacts.contacts[:-count]).all():
             slower = np.abs(speeds[count:] - speeds[:-count]).max()
-            off[count] = float(max(slower, np.abs(gone - TURN * periods).max()))
+            off[count] = float(max(slower, np.abs(advance - TURN * periods).max()))
             if off[count] <= REPEATS[0]:
                 break
     for close in REPEATS:
@@ -118,6 +118,6 @@ def _round(phases: Floats, impacts: Impacts) -> tuple[int, int]:
 
 
 def _same_order(found: Floats, recorded: Floats, periods: int) -> NDArray[np.intp]:
-    """Return which impact of the orbit is which of the recorded ones: an orbit may begin with another impact."""
+    """Return the places of the recorded impacts in the orbit, which may begin with another impact."""
     off = np.mod(found[None, :] - recorded[:, None] + np.pi * periods, TURN * periods) - np.pi * periods
     return np.asarray(np.argmin(np.abs(off), axis=1))

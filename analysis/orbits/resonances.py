@@ -1,8 +1,8 @@
-"""Resonances of impacting bodies: peaks along a sweep of the forcing frequency, beside the shifted natural frequencies.
+"""Resonances of impacting bodies: peaks along a sweep of the forcing frequency, and shifted natural frequencies.
 
-A mass that turns round at an elastic stop moves on a cut ellipse and takes less than a whole natural period: thesis
-(2.34), (2.35). That is right without force and damping, for one mode and restitution 1; for anything else it is a first
-guess, which is why it stands beside the peaks that a sweep shows.
+A mass that turns back at an elastic stop moves on a cut ellipse, and needs less than a whole natural period: thesis
+(2.34), (2.35). This is exact without force and damping, for one mode and restitution 1. Otherwise it is a first
+guess, for comparison with the peaks of a sweep.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from vibroimpact.fmus.errors import UsageError
 Floats = NDArray[np.float64]
 
 _OVERSHOOT = 1e-9
-"""Rounding by which a ratio of a stop that is just touched may be beyond 1."""
+"""Largest excess over 1 of the ratio of a touched stop that counts as rounding."""
 PROMINENCE = 0.05
-"""Height of a peak above the passes on both of its sides, over the largest value, from which on it counts."""
+"""Height of a peak above the valleys on both of its sides, over the largest value, above which it counts."""
 
 
 def frequency_shift(stop_ratio: Floats | float) -> Floats:
@@ -34,12 +34,12 @@ def frequency_shift(stop_ratio: Floats | float) -> Floats:
     Returns
     -------
     array
-        pi / arccos(-ratio): 1 of a touch, 2 of a stop at the equilibrium. Its slope is without bound at both ends.
+        pi / arccos(-ratio): 1 for a touch, 2 for a stop at the equilibrium. Its slope is unbounded at both ends.
 
     Raises
     ------
     UsageError
-        A ratio has no such motion.
+        No such motion exists for a ratio.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def frequency_shift(stop_ratio: Floats | float) -> Floats:
 
 
 def stop_ratio(shift: Floats | float) -> Floats:
-    """Return the stop ratio that belongs to a shift of the natural frequency, the inverse of `frequency_shift`.
+    """Return the stop ratio for a shift of the natural frequency, the inverse of `frequency_shift`.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def stop_ratio(shift: Floats | float) -> Floats:
     Returns
     -------
     array
-        -cos(pi / shift). Near shift 1 it is known to the square of the error of the shift.
+        -cos(pi / shift). Near shift 1 its error is the square of the error of the shift.
 
     Raises
     ------
@@ -94,11 +94,11 @@ class Peak:
     Attributes
     ----------
     place : int
-        Of the highest point.
+        Index of the highest point.
     frequency, height : float
-        Of the top of the parabola through it and its neighbours, in the units of both.
+        Top of the parabola through this point and its neighbours, in the units of both.
     step : float
-        Distance of the farther neighbour: how far the frequency may be off.
+        Distance of the farther neighbour: the possible error of the frequency.
     """
 
     place: int
@@ -113,9 +113,9 @@ def peaks_of(frequency: Floats, response: Floats, prominence: float = PROMINENCE
     Parameters
     ----------
     frequency, response : array, shape (point,)
-        Ascending; NaN where there is no response, which ends a stretch: nothing is known beyond it.
+        Ascending; NaN without a response, which ends a stretch: nothing is known beyond it.
     prominence : float
-        Height above the higher of both passes to a higher peak, over the largest response, that a peak has at least.
+        Smallest height of a peak above the higher of the two valleys to higher peaks, over the largest response.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def _peak(frequency: Floats, response: Floats, place: int) -> Peak:
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     step = float(np.diff(x).max())
-    # a plateau bends nowhere
+    # a plateau has no bend
     top = float(x[1]) if bend == 0.0 else float(0.5 * (x[0] + x[1]) - 0.5 * left / bend)
     top = float(np.clip(top, x[0], x[2]))
     height = float(y[1] + (top - x[1]) * (left + bend * (top - x[0]))) if bend else float(y[1])

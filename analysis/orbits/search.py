@@ -1,4 +1,4 @@
-"""Orbits of p impacts in q periods, found from many starts: the unstable ones as well."""
+"""Orbits of p impacts in q periods, found from many starts, also the unstable ones."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 
 STARTS = 256
-"""Trains of impacts from which Newton's method begins, of orbits that have no closed form."""
+"""Number of trains of impacts from which Newton's method starts, for orbits without a closed form."""
 MOST_SPEEDS = 1e-6
-"""Speed of an impact, over the fastest, below which it is none: the orbit is one of fewer impacts."""
+"""Speed of an impact, over the fastest, below which it does not count: the orbit has fewer impacts."""
 
 
 def orbits_of(
@@ -35,8 +35,8 @@ def orbits_of(
 ) -> list[PeriodicOrbit]:
     """Return the physical orbits P(p,q) that are found, stable or not, the fastest impact first.
 
-    Those of one impact are all there are (equations.md 4.3); others are what Newton's method reaches from `starts`
-    trains of impacts, the same each time.
+    Orbits of one impact are complete (equations.md 4.3). Other orbits are found by Newton's method from `starts` trains
+    of impacts, the same trains each time.
 
     Parameters
     ----------
@@ -44,21 +44,21 @@ def orbits_of(
     impacts, periods : int
         p and q.
     starts : int
-        How many trains are tried.
+        Number of trains to try.
     penetrating : bool
-        Whether orbits that pass through a stop between impacts are returned as well: formal solutions only.
+        Whether orbits that pass through a stop between impacts are included; they are formal solutions only.
 
     Raises
     ------
     UsageError
-        There are no such orbits.
+        The numbers of impacts or periods are out of range.
     """
     found = each_orbit(body, impacts, periods, starts=starts, penetrating=penetrating)
     return sorted(found, key=fastest_first)
 
 
 def fastest_first(orbit: PeriodicOrbit) -> float:
-    """Return what orbits are sorted by: the negative velocity of the fastest impact."""
+    """Return the key by which orbits are sorted: the negative velocity of the fastest impact."""
     return -float(orbit.velocities.max())
 
 
@@ -83,18 +83,18 @@ def each_orbit(
 
 
 def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
-    """Say whether two orbits are one, begun at another impact or in another period."""
+    """Tell whether two orbits are equal, apart from the impact or period with which they begin."""
     if one.name != other.name or one.phases.size != other.phases.size:
         return False
     p, whole = one.phases.size, TURN * one.periods
     for shift in range(p):
         turned = np.roll(np.arange(p), -shift)
-        apart = other.phases[turned] - one.phases
-        apart = np.mod(apart - apart[0] + 0.5 * whole, whole) - 0.5 * whole
+        difference = other.phases[turned] - one.phases
+        difference = np.mod(difference - difference[0] + 0.5 * whole, whole) - 0.5 * whole
         periods = (other.phases[turned][0] - one.phases[0]) / TURN
         whole_periods = abs(periods - round(periods)) * TURN < SAME
         same_contacts = (other.contacts[turned] == one.contacts).all()
-        if whole_periods and same_contacts and np.abs(apart).max() < SAME:
+        if whole_periods and same_contacts and np.abs(difference).max() < SAME:
             return True
     return False
 

@@ -41,11 +41,11 @@ _MODULES = {
     **dict.fromkeys(("array_of", "channel_of"), "arrays"),
     **dict.fromkeys(("is_recording", "open_recording", "open_signals", "write_recording"), "files"),
 }
-"""Modules of what is not in `channels`."""
+"""Modules of the names that are not in `channels`."""
 
 
 def __getattr__(name: str) -> Any:
-    # The readers of formats come through this door for units alone, and xarray takes half a second to load.
+    # Readers of formats import only units from here, and xarray takes half a second to load.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = importlib.import_module(f"{__name__}.{_MODULES.get(name, 'channels')}")

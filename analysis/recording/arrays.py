@@ -1,4 +1,4 @@
-"""Channels from xarray's arrays, and arrays from channels: analyses take either."""
+"""Channels from xarray's arrays, and arrays from channels: analyses accept both."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def channel_of(signal: Channel | xr.DataArray) -> Channel:
     Parameters
     ----------
     signal : Channel or xarray.DataArray
-        An array has one dimension with its instants as coordinate: numbers in seconds, or in the unit of the
-        coordinate's `units` (`1` in a nondimensional run), or times of NumPy. Its `units` is its unit; without, it is
-        a pure number. Samples that are NaN count as missing.
+        An array has one dimension with its instants as coordinate. Instants are numbers in seconds or in the unit of
+        the coordinate's `units` (`1` in a nondimensional run), or times of NumPy. The attribute `units` of the array is
+        its unit; without it, the array is a pure number. NaN samples count as missing.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def channel_of(signal: Channel | xr.DataArray) -> Channel:
 
 
 def array_of(channel: Channel) -> xr.DataArray:
-    """Return a channel as an array along `time` (s); samples that are no plain measurement are NaN.
+    """Return a channel as an array along `time` (s); samples that are not plain measurements are NaN.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def _numbers(signal: xr.DataArray, name: str) -> Floats:
 
 
 def _instants(signal: xr.DataArray, name: str) -> Floats:
-    """Return the instants of an array, s: its own coordinate, or the one that is called `time`."""
+    """Return the instants of an array, s: its own coordinate, or the coordinate called `time`."""
     (dimension,) = signal.dims
     along = [str(key) for key, each in signal.coords.items() if each.dims == (dimension,)]
     chosen = dimension if dimension in along else "time" if "time" in along else None

@@ -1,4 +1,4 @@
-"""What a simulated channel went through, as its dataset says it: where it is clipped, and when it was sampled."""
+"""The measuring chain of a simulated channel, from its dataset: its clipping limits, and its sampling delay."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from vibroimpact.analysis.recording.channels import Quality
 
 Floats = NDArray[np.float64]
 NUMBERS = ("sensor_range", "sensitivity", "noise_rms", "range", "bits", "clock_error_ppm", "skew")
-"""Attributes of a channel that are numbers, or the name of the coordinate that has one for each run."""
+"""Attributes of a channel that are numbers, or names of the coordinate with one number for each run."""
 _DEVIATIONS = 4.0
-"""Noise that hides the end of a sensor's range, in its standard deviations."""
+"""Standard deviations of the noise by which the end of a sensor's range is lowered: noise hides the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,21 +23,21 @@ class ChannelChain:
     """The measuring chain of a channel."""
 
     skew: float = 0.0
-    """s after the time of the dataset; 0 of what is no channel."""
+    """Delay after the time of the dataset, s; 0 for a variable that is no channel."""
     low: float = -np.inf
     high: float = np.inf
-    """V; a sample that is not between `low` and `high` is at the end of a range."""
+    """Limits, V; a sample outside `low` to `high` is at the end of a range."""
     attrs: Mapping[str, Any] = field(default_factory=dict)
-    """What the dataset says: `channel`, the name in the scene, and numbers."""
+    """Attributes of the dataset: `channel`, the name in the scene, and numbers."""
 
     def quality(self, values: Floats) -> NDArray[np.uint8]:
-        """Return the quality of samples, see `Quality`."""
+        """Return the quality flags of samples, see `Quality`."""
         clipped = (values <= self.low) | (values >= self.high)
         return np.where(clipped, np.uint8(Quality.clipped), np.uint8(0))
 
 
 def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain:
-    """Return the measuring chain of a sampled variable, whose attributes are given, in the run of a row.
+    """Return the measuring chain of a sampled variable with these attributes, in the run of a row.
 
     The runs are one-dimensional, and have the coordinates of swept numbers.
     """
@@ -45,11 +45,11 @@ def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain
         return ChannelChain()
 
     def number(name: str) -> float:
-        told = attributes[name]
-        return float(runs[told].values[row] if isinstance(told, str) else told)
+        entry = attributes[name]
+        return float(runs[entry].values[row] if isinstance(entry, str) else entry)
 
     known = {name: number(name) for name in NUMBERS if name in attributes}
-    if isinstance(attributes.get("skew"), str):  # from one channel to the next
+    if isinstance(attributes.get("skew"), str):  # a swept skew counts from channel to channel
         known["skew"] *= float(attributes["place"])
     low, high = -np.inf, np.inf
     if "range" in known:

@@ -1,10 +1,10 @@
 """Recordings: measured or simulated signals, as importers write them and analyses read them.
 
 A recording holds channels (sampled on one of its time axes), event trains (instants only) and single values. It is one
-NetCDF file (CF-1.11) of its own schema, beside that of runs; `docs/recordings.md` says the same in words.
+NetCDF file (CF-1.11) with its own schema, apart from the schema of runs; `docs/recordings.md` describes it in words.
 
-`open_signals` gives the same object for a recording, for the time series of a simulated run, and for a replay, so
-that one analysis serves all three.
+`open_signals` returns the same type for a recording, for the time series of a simulated run, and for a replay. One
+analysis therefore serves all three.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ RECORDING_SCHEMA = "1"
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
-#: Relative difference of intervals up to which they are even.
+#: Relative difference of intervals below which they count as even.
 _EVEN = 1e-6
 PAUSE = 1.5
-"""Steps, in intervals, above which uneven instants have a pause."""
+"""Step, in median intervals, above which uneven instants have a pause."""
 
 
 class Quality(IntFlag):
-    """What is wrong with a sample; 0 is a good one."""
+    """Faults of a sample; 0 means a good sample."""
 
     clipped = 1
-    """At the limit of the measuring chain: the true value is beyond it."""
+    """At the limit of the measuring chain: the true value lies beyond the limit."""
     missing = 2
     """No sample was taken here, or it is NaN in the file; its value is NaN."""
     overrange = 4
     """The file has a marker of overrange or of an open input; its value is NaN."""
     suspect = 8
-    """Kept as it is, but its time was doubtful: repeated, or out of order."""
+    """The value is kept, but its time was repeated or out of order."""
 
 
 QUALITY_FLAGS = {
@@ -64,12 +64,12 @@ class TimeAxis:
     interval : float or None
         Sampling interval, s; None where the samples are not evenly spaced.
     interval_uncertainty : float
-        Relative uncertainty of the interval, and so of every frequency: 0 where the file is of one mind,
-        half the relative spread or more where it contradicts itself.
+        Relative uncertainty of the interval, and so of every frequency. It is 0 where the file is consistent, and half
+        the relative spread or more where the file contradicts itself.
     source : str
-        Where the instants come from, in words; and what contradicts them.
+        Source of the instants, in words, with any contradictions.
     trigger : str
-        Which trigger began it: axes of different triggers are shifted by an unknown lag.
+        Trigger that started the axis: axes of different triggers are shifted by an unknown lag.
     """
 
     time: Floats
@@ -80,14 +80,14 @@ class TimeAxis:
 
     @classmethod
     def through(cls, time: Floats, source: str = "") -> TimeAxis:
-        """Return the axis of instants (s), which is even where their intervals differ by rounding alone."""
+        """Return the axis of instants (s); it is even if the intervals differ only by rounding."""
         steps = np.diff(time)
         even = len(steps) > 0 and float(np.ptp(steps)) <= _EVEN * float(np.mean(steps))
         return cls(time, float(np.mean(steps)) if even else None, source=source)
 
     @property
     def pace(self) -> float:
-        """Interval of samples, s; the mean one of uneven samples, the pauses between pieces of a record left out."""
+        """Interval of samples, s; for uneven samples the mean, without the pauses between pieces of a record."""
         if self.interval is not None:
             return self.interval
         steps = np.diff(self.time)
@@ -110,16 +110,16 @@ class Channel:
     name : str
         Its name here and in the file of the recording: letters, digits, underscores.
     values : ndarray of float, shape (sample,)
-        In `unit`; NaN where there is none.
+        In `unit`; NaN where there is no value.
     unit : str
         CF unit, see `units.MeasuredUnit.cf`.
     axis : TimeAxis
     quality : ndarray of uint8, shape (sample,)
         Sums of `Quality`.
     label : str
-        What the source calls it.
+        Name in the source.
     attrs : dict
-        What else is known: `role` (measured, simulated, residual), `sensitivity`, `scale`, `offset`, ...
+        Further facts: `role` (measured, simulated, residual), `sensitivity`, `scale`, `offset`, ...
     """
 
     name: str
@@ -137,14 +137,14 @@ class Channel:
 
     @property
     def good(self) -> NDArray[np.bool_]:
-        """Where the sample is a plain measurement: finite, not clipped, nothing missing."""
+        """Mask of the samples that are plain measurements: finite, not clipped, not missing."""
         chosen: NDArray[np.bool_] = np.isfinite(self.values) & (
             (self.quality & ~np.uint8(Quality.suspect)) == 0
         )
         return chosen
 
     def between(self, start: float, stop: float) -> Channel:
-        """Return the samples from start to stop (s), both included; the clock stays as it is."""
+        """Return the samples from start to stop (s), both included; the clock is unchanged."""
         rows = (self.time >= start) & (self.time <= stop)
         axis = replace(self.axis, time=self.time[rows])
         return replace(self, values=self.values[rows], quality=self.quality[rows], axis=axis)
@@ -164,13 +164,13 @@ class EventTrain:
     times : ndarray of float, shape (event,)
         s, ascending; two may coincide.
     window : tuple of float or None
-        Start and end of the observation, s; None: not known, then the first and the last event.
+        Start and end of the observation, s; None: unknown, and the first and the last event take their place.
     resolution : float
-        Grid on which the instants were written, s; 0 where none shows.
+        Grid on which the instants were written, s; 0 where no grid shows.
     label : str
-        What the source calls it.
+        Name in the source.
     attrs : dict
-        What else is known.
+        Further facts.
     """
 
     name: str
@@ -183,7 +183,7 @@ class EventTrain:
 
 @dataclass(frozen=True, slots=True)
 class SingleValue:
-    """A number that a recording carries beside its channels: value and CF unit; NaN where it was beyond the range."""
+    """A number of a recording outside its channels: value and CF unit; NaN where it was beyond the range."""
 
     value: float
     unit: str = "1"
@@ -199,8 +199,8 @@ class Recording:
     ----------
     channels, events, scalars : mapping
     attrs : dict
-        Provenance (`source_file`, `source_sha256`, `source_format`, ...) and `remarks`: one line for each thing
-        that a reader must know (gaps, clipping, conflicting axes).
+        Provenance (`source_file`, `source_sha256`, `source_format`, ...) and `remarks`: one line for each fact that a
+        reader must know (gaps, clipping, conflicting axes).
     """
 
     channels: Mapping[str, Channel]
@@ -210,24 +210,24 @@ class Recording:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader must know, line by line."""
+        """The remarks of the recording, one string for each line."""
         found = self.attrs.get("remarks", "")
         return tuple(line for line in lines_of(found if isinstance(found, str) else str(found)) if line)
 
     @property
     def remarks_counted(self) -> tuple[str, ...]:
-        """How many remarks there are and where, in one line, for reports of what was imported before; none for none."""
+        """The number of import remarks and where to read them, in one line; empty without remarks."""
         if not self.remarks:
             return ()
         name, many = os.path.basename(self.title), len(self.remarks)
-        said = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
+        counted = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
         return (
-            f"{name}: {said} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
+            f"{name}: {counted} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
         )
 
     @property
     def title(self) -> str:
-        """What messages call it: the file it was read from."""
+        """Name of the recording in messages: its file."""
         return str(self.attrs.get("opened_from", "") or self.attrs.get("source_file", "") or "recording")
 
     def channel(self, name: str | None = None) -> Channel:
@@ -236,19 +236,19 @@ class Recording:
         Raises
         ------
         DatasetError
-            There is none of that name, or several and no name; the message has the names.
+            No channel has that name, or there are several and no name is given; the message lists the names.
         """
         return _chosen(self.channels, name, "channel", self.title)
 
     def event_train(self, name: str | None = None) -> EventTrain:
-        """Return an event train by name, or the only one; errors as `channel`."""
+        """Return an event train by name, or the only one; errors as for `channel`."""
         return _chosen(self.events, name, "event train", self.title)
 
 
 def _chosen(found: Mapping[str, T], name: str | None, what: str, title: str) -> T:
     if not found:
-        wanted = "one" if name is None else f'"{name}"'
-        raise DatasetError(f"{title}: {what}: expected {wanted}, got a file without any.")
+        expected = "one" if name is None else f'"{name}"'
+        raise DatasetError(f"{title}: {what}: expected {expected}, got a file without any.")
     names = ", ".join(found)
     if name is None:
         if len(found) == 1:

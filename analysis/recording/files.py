@@ -34,8 +34,8 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.messages import Argument, message
 
 MOST_VALUES = 10**8
-"""Values of 8 bytes above which a recording is refused: some bytes of a damaged file can promise any number."""
-# Attributes that the file itself needs and no channel carries.
+"""Number of values (8 bytes each) above which a recording is refused: damaged bytes can announce any number."""
+# Attributes that the file needs and no channel has.
 _STORED = frozenset(
     {"units", "long_name", "ancillary_variables", "_FillValue", "coordinates", "event_train", "resolution"}
     | {"window_start", "window_end", "flag_masks", "flag_meanings"}
@@ -43,7 +43,7 @@ _STORED = frozenset(
 
 
 def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
-    """Check a recording and write it as one NetCDF-4 file that is whole or not there at all.
+    """Check a recording and write it as one NetCDF-4 file that is whole or absent.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
                 "history": "recorded or imported by vibroimpact",
                 "title": f"recording {recording.attrs.get('source_file', '')}".strip(),
                 **{key: value for key, value in recording.attrs.items() if key != "opened_from"},
-                # the library lists variables by name; people want the columns as they were
+                # the library lists variables by name; people expect the original order of the columns
                 "variable_order": " ".join((*recording.channels, *recording.events, *recording.scalars)),
             }
         )
@@ -108,7 +108,7 @@ def _store_axis(file: netCDF4.Dataset, name: str, axis: TimeAxis) -> None:
         "source": axis.source,
         "trigger": axis.trigger,
     }
-    # there is no date to count from, so these are seconds and no calendar
+    # there is no date to count from, so the axis has seconds and no calendar
     variable.setncatts({key: value for key, value in attributes.items() if value != ""})
     if axis.interval is not None:
         variable.setncattr("sampling_interval", axis.interval)
@@ -144,7 +144,7 @@ def _store_events(file: netCDF4.Dataset, train: EventTrain) -> None:
 
 
 def open_recording(path: str | os.PathLike[str]) -> Recording:
-    """Open a recording, the whole of it in memory.
+    """Open a recording, and load it whole into memory.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
 
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
-    """Tell whether a file is a recording; a file that cannot be read is none."""
+    """Tell whether a file is a recording; an unreadable file is none."""
     try:
         with opened_netcdf(path) as file:
             return "recording_schema" in file.ncattrs()
@@ -185,10 +185,8 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
     channels: dict[str, Channel] = {}
     events: dict[str, EventTrain] = {}
     scalars: dict[str, SingleValue] = {}
-    wanted = str(getattr(file, "variable_order", "")).split()
-    for name in sorted(
-        file.variables, key=lambda name: wanted.index(name) if name in wanted else len(wanted)
-    ):
+    order = str(getattr(file, "variable_order", "")).split()
+    for name in sorted(file.variables, key=lambda name: order.index(name) if name in order else len(order)):
         variable = file.variables[name]
         if name in axes or (
             name.endswith(QUALITY_ENDING) and name.removesuffix(QUALITY_ENDING) in file.variables
@@ -222,7 +220,7 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
 
 @contextmanager
 def _about(path: str | os.PathLike[str], name: str) -> Iterator[None]:
-    """Say in which file and variable is what cannot be read."""
+    """Add the file and the variable to errors of reading."""
     try:
         yield
     except DatasetError as problem:
@@ -260,7 +258,7 @@ def _read_channel(file: netCDF4.Dataset, name: str, axis: TimeAxis) -> Channel:
     stored: Any = file.variables.get(name + QUALITY_ENDING)
     quality = np.zeros(len(values), np.uint8) if stored is None else _quality(np.asarray(stored[...]))
     unit = str(variable.units)
-    # a unit that nothing can be made of is refused here, not in the middle of an analysis
+    # a unit without a meaning is refused here, not in the middle of an analysis
     measured_unit(unit)
     return Channel(name, values, unit, axis, quality, str(variable.long_name), _others(variable))
 
@@ -282,7 +280,7 @@ def _read_events(name: str, variable: Any) -> EventTrain:
 
 
 def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Recording:
-    """Open what an analysis takes: a recording, or one run of a simulated dataset in the same shape.
+    """Open the signals for an analysis: a recording, or one run of a simulated dataset in the same form.
 
     The sampled variables of the run become channels, its impacts the event train `impacts`.
 
@@ -290,7 +288,7 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
     ----------
     path : path
     run : int or None
-        run_index of the run; None for the only one.
+        run_index of the run; None for the only run.
 
     Raises
     ------

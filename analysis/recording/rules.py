@@ -1,4 +1,4 @@
-"""What a recording must be, before it is written and after it is read: names, shapes, clocks, sizes of numbers."""
+"""The rules of a recording, checked before writing and after reading: names, shapes, clocks, sizes of numbers."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from vibroimpact.analysis.dataset.schema import file_name_of
 from vibroimpact.analysis.recording.channels import Channel, EventTrain, Recording, TimeAxis
 
 QUALITY_ENDING, EVENT_ENDING = "_quality", "_event"
-#: Magnitudes beyond which no sensor reads; squares of those within neither overflow nor vanish.
+#: Magnitudes beyond those of any sensor; squares of numbers between them neither overflow nor vanish.
 LARGEST, SMALLEST = 1e100, 1e-100
-#: Relative difference of an interval and its instants, beside the axis's own uncertainty, up to which they agree.
+#: Relative difference of an interval and its instants up to which they agree, plus the axis's own uncertainty.
 AGREEMENT = 0.01
 
 
 def problems_of(recording: Recording) -> Iterable[str]:
-    """Yield what contradicts the schema, a line each, `NAME: what: expected ..., got ....`"""
+    """Yield the contradictions of the schema, a line each, `NAME: what: expected ..., got ....`"""
     yield from _names(recording)
     axes: set[int] = set()
     for name, channel in recording.channels.items():
         yield from (f"{name}: {problem}" for problem in _of_channel(channel))
-        if id(channel.axis) not in axes:  # channels that share one share its problems
+        if id(channel.axis) not in axes:  # channels that share an axis share its problems
             yield from (f"{name}: time: {problem}" for problem in _of_axis(channel.axis))
         axes.add(id(channel.axis))
     for name, train in recording.events.items():
@@ -101,12 +101,12 @@ def _of_train(train: EventTrain) -> Iterator[str]:
 
 
 def masked_spans(train: EventTrain) -> tuple[tuple[float, float], ...]:
-    """Return the spans (s) of a train's window in which nothing could be seen.
+    """Return the spans (s) of a train's window in which no event could be seen.
 
     Raises
     ------
     ValueError
-        They are no numbers, or one of them has no end.
+        The spans are no numbers, or the last start has no end.
     """
     ends = np.atleast_1d(np.asarray(train.attrs.get("masked", ()), dtype=np.float64)).ravel().tolist()
     return tuple(zip(ends[::2], ends[1::2], strict=True))

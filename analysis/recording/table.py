@@ -1,4 +1,4 @@
-"""A recording as a table for people: its channels, its events, what is odd about them."""
+"""A recording as a printed table: its channels, its events and its remarks."""
 
 from __future__ import annotations
 

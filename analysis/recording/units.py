@@ -1,7 +1,6 @@
-"""Units of measured channels: what a file calls them, what CF calls them, and their factor to SI.
+"""Units of measured channels: their labels in files, their CF names, and their factors to SI.
 
-The one place that calls pint. A channel labelled `g` is an acceleration in units of gravity, never grams: that is
-what accelerometers are read in.
+Only this module calls pint. The label `g` of a channel means gravity, the unit of accelerometers, never grams.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from vibroimpact.fmus.units import written_unit
 if TYPE_CHECKING:
     import pint
 
-# What instruments write, in pint's words; `g` and `G` are gravity here.
+# Labels that instruments write, with pint's names; `g` and `G` are gravity here.
 _LABELS = {
     **dict.fromkeys(("", "1", "-", "au", "a.u.", "counts"), "dimensionless"),
     **dict.fromkeys(("g", "G", "gn", "g0"), "standard_gravity"),
@@ -34,10 +33,10 @@ _OFFSET_LABELS = ("degC", "deg C", "°C", "Celsius", "degree_Celsius")
 _SI_NAMES = ("N", "Pa", "V", "J", "W", "N s", "N m", "N m-1", "V s2 m-1", "V N-1", "Hz", "rad", "rad s-1")
 _DEGREES = re.compile(r"°(?![A-Za-z])")
 _DETECTED = re.compile(r"(?P<unit>\S.*?)(?:\s+|(?<=[VAgG²2]))(?:RMS|rms|Rms|pk|pk-pk|p-p|pp|peak)")
-"""A unit, and how the instrument took the value: its size stays that of the unit."""
+"""A unit, and the kind of reading of the instrument (RMS, peak); the size of the unit does not change."""
 _LONGEST_DETECTED = 60
 _LONGEST_LABEL = 200
-"""Characters of a label above which it is no unit: a product is read factor by factor, each as long as the rest."""
+"""Characters above which a label is no unit: a product is read factor by factor, each as long as the rest."""
 _SUPERSCRIPTS = str.maketrans("¹²³⁻", "123-")
 _FACTOR = re.compile(
     r"(?:(?P<number>\d{1,16}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
@@ -50,17 +49,17 @@ class MeasuredUnit:
     """A unit of a channel."""
 
     label: str
-    """As the file or the user wrote it."""
+    """The label in the file, or as the user wrote it."""
     cf: str
-    """As it is stored: an SI unit that CF (UDUNITS) reads, with a factor where it is not SI: `9.80665 m s-2`."""
+    """The stored form: an SI unit that CF (UDUNITS) reads, with a factor if it is not SI: `9.80665 m s-2`."""
     si: str
     """The SI unit, as CF writes it: `m s-2`."""
     factor: float
-    """SI value of one such unit."""
+    """SI value of one of this unit."""
 
 
 def unit_label(cf: str) -> str:
-    """Return a unit as people write it behind a number, see `fmus.units.written_unit`.
+    """Return a unit as people write it after a number, see `fmus.units.written_unit`.
 
     >>> unit_label("9.80665 m s-2"), unit_label("0.001 m"), unit_label("1")
     ('g', 'mm', '1')
@@ -77,7 +76,7 @@ def _registry() -> pint.UnitRegistry[float]:
 
 @lru_cache(maxsize=256)
 def measured_unit(label: str) -> MeasuredUnit:
-    """Return what a unit label means.
+    """Return the unit that a label stands for.
 
     Parameters
     ----------
@@ -87,7 +86,7 @@ def measured_unit(label: str) -> MeasuredUnit:
     Raises
     ------
     DatasetError
-        No such unit is known.
+        The unit is unknown.
 
     Examples
     --------
@@ -126,7 +125,7 @@ def measured_unit(label: str) -> MeasuredUnit:
 
 
 def _refuse_another(base: Any, cf: str) -> None:
-    """Raise ValueError where a unit is not read again as what it is, as powers of ten and above, or of one half."""
+    """Raise ValueError unless the CF unit reads back as the same unit; very large and half powers do not."""
     again = _product(cf).to_base_units()
     if again.units != base.units or not math.isclose(again.magnitude, base.magnitude, rel_tol=1e-12):
         raise ValueError(cf)

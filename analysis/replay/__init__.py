@@ -1,4 +1,4 @@
-"""How a simulated response is compared with a measured one; `docs/replay_scores.md` says it in words.
+"""Comparison of a simulated response with a measured one; `docs/replay_scores.md` explains it in words.
 
 Examples
 --------

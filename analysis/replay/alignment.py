@@ -1,7 +1,7 @@
 """Lag and polarity between a simulated and a measured signal of separate triggers, from the start of the event only.
 
-A lag and a sign that are chosen over a whole record can hide an error of the model's frequency or damping. Here they
-come from the first few periods after the onset; the rest of the record must then agree by itself.
+A choice of lag and sign over a whole record could hide an error of the model's frequency or damping. Here both come
+from the first few periods after the onset; the rest of the record must then agree without further adjustment.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Floats = NDArray[np.float64]
 PERIODS_BEFORE, PERIODS_AFTER = 0.5, 3.0
 """The window of the alignment, in dominant periods of the measured event, from its onset."""
 FEWEST_SAMPLES = 8
-"""Fewest good samples in a window."""
+"""Smallest number of good samples in a window."""
 CLEAR_ODDS = 100.0
-"""Likelihood ratio of the best to a rival lag or polarity below which it is called ambiguous."""
+"""Likelihood ratio of the best to a rival lag or polarity below which the choice is ambiguous."""
 POOR_CORRELATION = 0.7
 """Correlation below which the model explains less than half of the start of the event."""
 CANDIDATES = 3
-"""Highest peaks of the correlation, of each polarity, that are refined."""
+"""Number of highest peaks of the correlation, for each polarity, that are refined."""
 _LAG_TOLERANCE = 1e-6
 
 
@@ -41,30 +41,31 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """How the clock and the sign of a simulated signal become those of the measured one.
+    """The clock and the sign that bring a simulated signal to the measured one.
 
     The aligned signal is polarity * simulated(t - lag), t on the clock of the measured channel.
 
     Attributes
     ----------
     lag : float
-        s, positive where the measured clock shows more.
+        s, positive where the measured clock is ahead.
     polarity : int
         +1, or -1 where the measured channel is inverted.
     lag_error : float
-        s: standard error from what the model leaves in the window, and the difference to the lag of the first half
-        of its energy, as a root of squares. It does not hold an ambiguity. 0 where the lag was given.
+        s: root of the sum of squares of two errors. One is the standard error from the residual in the window. The
+        other is the difference to the lag of the first half of its energy. Ambiguities are not included. 0 for a given
+        lag.
     polarity_margin : float
-        Correlation less the best correlation of the other polarity at any allowed lag; NaN where it was given.
+        Correlation minus the best correlation of the other polarity at any allowed lag; NaN for a given polarity.
     lag_margin : float
-        Correlation less the best of the same polarity at a lag half a period or more away; NaN where none is.
+        Correlation minus the best one of this polarity at a lag half a period or more away; NaN without one.
     correlation : float
-        Of aligned and measured signal in the window (Pearson, good samples only).
+        Pearson correlation of the aligned and the measured signal in the window (good samples only).
     window : Window
     at_bound : bool
-        The best lag is the largest allowed: the true one may be beyond.
+        Whether the best lag is the largest allowed one: the true lag may be beyond.
     remarks : tuple of str
-        What a reader must know: ambiguities, bounds.
+        Remarks for the reader: ambiguities, bounds.
     """
 
     lag: float
@@ -79,7 +80,7 @@ class Alignment:
 
 
 class Interpolated:
-    """A simulated signal between its samples (cubic spline); outside it rests at its first and last value.
+    """A simulated signal between its samples (cubic spline); outside it keeps its first and last value.
 
     Parameters
     ----------
@@ -126,16 +127,16 @@ class _Start:
         return self.values - np.mean(self.values)
 
     def correlation(self, lag: float) -> float:
-        """Pearson correlation at a lag; 0 where the simulated signal is constant there."""
+        """Return the Pearson correlation at a lag; 0 where the simulated signal is constant there."""
         model = self.simulated(self.time - lag)
         model = model - np.mean(model)
         size = float(np.sqrt(np.sum(model**2) * np.sum(self.deviation**2)))
         return float(np.sum(model * self.deviation) / size) if size > 0.0 else 0.0
 
     def scan(self, most_lag: float) -> tuple[Floats, Floats]:
-        """Return lags a sampling interval apart over all that is allowed, and the correlation at each.
+        """Return all allowed lags, a sampling interval apart, and the correlation at each.
 
-        One Fourier transform instead of a sum for each lag; samples that are not good have no weight.
+        One Fourier transform replaces a sum for each lag; samples that are not good have no weight.
         """
         from scipy.signal import correlate
 
@@ -182,7 +183,7 @@ class _Start:
 
 @dataclass(frozen=True, slots=True)
 class _Peak:
-    """A peak of the correlation: lag (s), polarity, and how high in that polarity."""
+    """A peak of the correlation: lag (s), polarity, and height in that polarity."""
 
     lag: float
     polarity: int
@@ -202,27 +203,27 @@ def align(
 ) -> Alignment:
     """Estimate lag and polarity between a simulated and a measured signal from the start of the event.
 
-    The correlation of measured(t) and simulated(t - lag) over the good samples of the window is made largest over
-    the lag; the offsets and the gain of both do not matter. What can hide in it: a model whose frequency is wrong by
-    the share e shifts the lag by about e times the distance from the onset to the centre of the window, 1.5 periods
-    by default; the rest of the record shows the error all the same.
+    The lag maximises the correlation of measured(t) and simulated(t - lag) over the good samples of the window. The
+    offsets and the gain of both do not matter. The lag can hide one error. A relative frequency error e shifts it by
+    about e times the distance from the onset to the centre of the window. By default this distance is 1.5 periods. The
+    rest of the record shows the error all the same.
 
     Parameters
     ----------
     simulated_time, simulated : ndarray of float, shape (simulated sample,)
-        s, ascending, on the clock of the drive; any unit. Before and after, the signal rests.
+        s, ascending, on the clock of the drive; any unit. The signal is constant before and after.
     measured : Channel
     most_lag : float
-        s; lags from -most_lag to +most_lag are tried.
+        s; lags from -most_lag to +most_lag are searched.
     event_window : tuple of float, optional
         s from the onset of the measured event, start and end. Default: from half a dominant period of the event
         before its onset to three after.
     polarity : {"auto", 1, -1}
-        Given, where it is known.
+        1 or -1 where the polarity is known.
     lag : "auto" or float
-        Given (s), where both channels have one trigger, or the lag is known.
+        Lag (s) where it is known, for example 0 for channels with a common trigger.
     event : ChannelEvent, optional
-        As `find_event` gives it, where it was found before.
+        The event from `find_event`, if it was found before.
 
     Returns
     -------
@@ -272,30 +273,30 @@ def align(
         (
             *_rival_remarks(start, best, others, "the other polarity"),
             *_rival_remarks(start, best, shifted, "the same polarity"),
-            *_doubts(best, at_bound),
+            *_warnings(best, at_bound),
         ),
     )
 
 
-def _doubts(best: _Peak, at_bound: bool) -> list[str]:
-    said = []
+def _warnings(best: _Peak, at_bound: bool) -> list[str]:
+    found = []
     if at_bound:
-        said.append(
+        found.append(
             f"the best lag is the largest allowed, {1e3 * best.lag:.4g} ms: the true one may be beyond"
         )
     if best.height < POOR_CORRELATION:
-        said.append(
+        found.append(
             f"at the start of the event the correlation of simulated and measured is {best.height:.2f} only: "
             "do not rely on lag and polarity"
         )
-    return said
+    return found
 
 
 def _start_of_event(
     simulated: Interpolated, measured: Channel, event: ChannelEvent, window: tuple[float, float] | None
 ) -> _Start:
     step = float(np.median(np.diff(measured.time)))
-    # noise has a "period" of two samples, which are too few to correlate
+    # noise has a "period" of two samples, too few for a correlation
     after_onset = max(PERIODS_AFTER * event.period, 2 * FEWEST_SAMPLES * step)
     before, after = window or (-PERIODS_BEFORE * event.period, after_onset)
     rows = (measured.time >= event.onset + before) & (measured.time <= event.onset + after) & measured.good
@@ -316,7 +317,7 @@ def _given_lag(start: _Start, lag: float, polarity: Literal["auto"] | int, windo
 
 
 def _peaks(start: _Start, signs: tuple[int, ...], most_lag: float) -> list[_Peak]:
-    """Return the highest peaks of the correlation, refined, for each polarity allowed."""
+    """Return the highest peaks of the correlation, refined, for each allowed polarity."""
     lags, correlation = start.scan(most_lag)
     found: list[_Peak] = []
     for sign in signs:
@@ -329,7 +330,7 @@ def _peaks(start: _Start, signs: tuple[int, ...], most_lag: float) -> list[_Peak
 
 
 def _independent(residual: Floats) -> float:
-    """Return how many independent samples a correlated residual is worth: n over the sum of its squared correlation."""
+    """Return the number of independent samples of a correlated residual: n over the sum of its squared correlation."""
     from scipy.fft import rfft
 
     count = len(residual)
@@ -345,7 +346,7 @@ def _independent(residual: Floats) -> float:
 
 
 def _residual(start: _Start, peak: _Peak) -> tuple[Floats, Floats]:
-    """Return what the best gain leaves of the measured deviations, and the gain times the slope of the model."""
+    """Return the residual of the measured deviations after the best gain, and the gain times the model's slope."""
     at = start.time - peak.lag
     model = start.simulated(at)
     model = model - np.mean(model)
@@ -353,7 +354,7 @@ def _residual(start: _Start, peak: _Peak) -> tuple[Floats, Floats]:
     gain = float(np.sum(model * start.deviation)) / energy if energy > 0.0 else 0.0
     half = 0.5 * start.step
     slope = (start.simulated(at + half) - start.simulated(at - half)) / start.step
-    # the part of the slope that a gain or an offset could do says nothing on the lag
+    # the part of the slope that a gain or an offset can produce carries no information on the lag
     slope = slope - np.mean(slope)
     slope = slope - model * (float(np.sum(slope * model)) / energy if energy > 0.0 else 0.0)
     return start.deviation - gain * model, gain * slope
@@ -374,9 +375,9 @@ def _lag_error(start: _Start, best: _Peak, period: float) -> float:
 
 
 def _rival_remarks(start: _Start, best: _Peak, rivals: list[_Peak], what: str) -> list[str]:
-    """Say so where another lag or polarity is nearly as likely.
+    """Return a remark if another lag or polarity is nearly as likely.
 
-    The likelihood of a residual energy E of n independent samples goes as E^(-n/2).
+    The likelihood of a residual energy E of n independent samples is proportional to E^(-n/2).
     """
     if not rivals:
         return []

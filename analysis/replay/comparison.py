@@ -1,6 +1,6 @@
-"""A simulated response beside the measured one: aligned, its residual, and every score of it; its yardstick.
+"""Comparison of a simulated response with the measured one: alignment, residual, all scores, and a baseline score.
 
-The measured samples stay as they are (only their offset is removed): the simulated signal, smooth and free of noise,
+The measured samples stay as they are (only their offset is removed). The simulated signal, smooth and free of noise,
 is brought to their instants, their clock and their sign.
 """
 
@@ -33,11 +33,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 RUNNING_WINDOWS = 10
-"""Running windows in which the record after the onset is scored."""
+"""Number of running windows for the record after the onset."""
 RUNNING_PERIODS = 2.0
-"""Fewest dominant periods of the event in a running window."""
+"""Smallest number of dominant periods of the event in a running window."""
 EVENT_TOLERANCE = 0.25
-"""Share of the dominant period within which events are paired."""
+"""Share of the dominant period up to which events are paired."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,30 +47,30 @@ class Comparison:
     Attributes
     ----------
     measured : Channel
-        As it was recorded.
+        The channel as it was recorded.
     simulated_name : str
-        What was compared with it.
+        Name of the simulated signal.
     values : ndarray of float, shape (sample,)
-        Measured, less its offset.
+        Measured values minus the offset.
     simulated : ndarray of float, shape (sample,)
-        At the instants, on the clock and with the sign of the measured channel; NaN where nothing was simulated.
+        At the instants, on the clock and with the sign of the measured channel; NaN without a simulated value.
     scored : ndarray of bool, shape (sample,)
-        Good measured samples where something was simulated.
+        Mask of the good measured samples with a simulated value.
     event : ChannelEvent
-        Of the measured channel: onset, noise, dominant period.
+        Event of the measured channel: onset, noise, dominant period.
     offset : float
-        Removed from the measured values.
+        Offset removed from the measured values.
     alignment : Alignment
     variance : float
         Variance accounted for over all scored samples, percent.
     windows : list of tuple of float
-        Windows asked for, s from the onset.
+        Requested windows, s from the onset.
     running : list of tuple of float
-        Windows side by side from the onset to the end, s from the onset.
+        Consecutive windows from the onset to the end, s from the onset.
     peaks : PeakErrors or None
-        Of the window asked for.
+        Peaks in the requested window.
     events : EventMatch or None
-        Of both, where they were given, on the clock of the channel.
+        Events of both signals, if they were given, on the clock of the channel.
     remarks : tuple of str
     """
 
@@ -91,23 +91,23 @@ class Comparison:
 
     @property
     def residual(self) -> Floats:
-        """Measured less simulated, shape (sample,); NaN where nothing was simulated."""
+        """Measured minus simulated values, shape (sample,); NaN without a simulated value."""
         return self.values - self.simulated
 
     @property
     def noise_ceiling(self) -> float:
-        """What a perfect model would score, given the noise before the event, percent; NaN where it is not known."""
+        """Score of a perfect model under the noise before the event, percent; NaN where the noise is unknown."""
         variance = float(np.var(self.values[self.scored]))
         return 100.0 * (1.0 - self.event.noise**2 / variance) if variance > 0.0 else float("nan")
 
     @property
     def gain(self) -> float:
-        """Factor on the simulated signal that would bring it nearest; 1 where its size is right."""
+        """Factor on the simulated signal that brings it nearest; 1 if its size is right."""
         return best_gain(self.values, self.simulated, self.scored)
 
     @property
     def window_variance(self) -> Floats:
-        """Scores of the windows asked for, percent, shape (window,)."""
+        """Scores of the requested windows, percent, shape (window,)."""
         return self._variance_in(self.windows)
 
     @property
@@ -117,14 +117,14 @@ class Comparison:
 
     @property
     def running_ceiling(self) -> Floats:
-        """What a perfect model would score in the running windows, percent, shape (running window,)."""
+        """Scores of a perfect model in the running windows, percent, shape (running window,)."""
         clock = self.measured.time - self.event.onset
         noise = np.full(len(clock), self.event.noise)
         return windowed_variance(clock, self.values, self.values + noise, self.scored, self.running)
 
     @property
     def held(self) -> Held:
-        """Over which span the simulation stays within the error that is trusted, by the running windows."""
+        """The span over which the simulation stays within the trusted error, from the running windows."""
         since = "the onset" if self.event.quiet is not None else "the start of the record"
         return held_over(self.running, self.running_variance, self.running_ceiling, since=since)
 
@@ -140,7 +140,7 @@ class Comparison:
     @property
     def simulated_frequency(self) -> DominantFrequency:
         """Dominant frequency of the simulated signal over the same stretch, Hz."""
-        # it is driven by a record on the same doubtful clock, so the same uncertainty holds
+        # a record on the same uncertain clock drives it, so the same uncertainty holds
         return self._line(self.simulated)
 
     def _line(self, values: Floats) -> DominantFrequency:
@@ -151,7 +151,7 @@ class Comparison:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many samples were scored, and why others were not."""
+        """Numbers of samples that were scored, and of samples left out, by reason."""
         quality = self.measured.quality
         clipped = (quality & np.uint8(Quality.clipped)) != 0
         bad = ~self.measured.good & ~clipped
@@ -187,26 +187,26 @@ def compare(
         s on the clock of the drive, ascending; values in the SI unit of the channel.
     measured : Channel
     most_lag : float, optional
-        s, largest lag tried where `lag` is "auto"; default: half of the record.
+        s, largest lag searched if `lag` is "auto"; default: half of the record.
     lag, polarity, event_window
-        As in `align`. Give lag=0.0 and polarity=1 for channels of one trigger and known sign.
+        As in `align`. Give lag=0.0 and polarity=1 for channels with one trigger and known sign.
     offset : {"before", "level", "none"} or float
-        Removed from the measured values: their mean before the event; what brings the means of both signals together
-        (for a sensor without a zero whose record does not begin quietly: it hides a constant error of the model);
-        nothing; or a value in the SI unit.
+        Offset to remove from the measured values, as a value in the SI unit or by a rule. "before": their mean before
+        the event. "level": the difference of the means of both signals. It suits a sensor without a zero whose record
+        does not begin quietly, but hides a constant error of the model. "none": no offset.
     windows : sequence of tuple of float
-        To be scored one by one, s from the onset of the event.
+        Windows to score one by one, s from the onset of the event.
     peak_window : tuple of float, optional
-        Where extremes are compared, s from the onset.
+        Window for the comparison of extremes, s from the onset.
     measured_events, simulated_events : ndarray of float, shape (event,), optional
         s, each on its own clock: impacts, or spikes.
     simulated_name : str
-        What the simulated signal is called in tables: `beam.sensor.acceleration`.
+        Name of the simulated signal in tables: `beam.sensor.acceleration`.
 
     Raises
     ------
     EstimationError
-        Too little that is good in the channel, or the simulation does not overlap it.
+        Too few good samples in the channel, or the simulation does not overlap it.
     """
     event = find_event(measured)
     time, values = measured.time, measured.si()
@@ -220,27 +220,27 @@ def compare(
         lag=lag,
         event=event,
     )
-    brought = _brought(simulated_time, simulated, measured, alignment)
-    scored = measured.good & np.isfinite(brought)
-    removed = _offset(offset, event, values[scored], brought[scored])
+    shifted = _shifted(simulated_time, simulated, measured, alignment)
+    scored = measured.good & np.isfinite(shifted)
+    removed = _offset(offset, event, values[scored], shifted[scored])
     values = values - removed
     peaks = None
     if peak_window is not None:
-        # heights count from the rest value: 0 where that was removed, else the mean
+        # heights count from the rest value: 0 if the offset before the event was removed, otherwise the mean
         level = 0.0 if offset == "before" and event.quiet is not None else float(np.mean(values[scored]))
-        peaks = compare_peaks(time - event.onset, values, brought, scored, peak_window, event.period, level)
+        peaks = compare_peaks(time - event.onset, values, shifted, scored, peak_window, event.period, level)
     stretch = float(time[-1]) - event.onset
     length = max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
     return Comparison(
         measured=measured,
         simulated_name=simulated_name,
         values=values,
-        simulated=brought,
+        simulated=shifted,
         scored=scored,
         event=event,
         offset=removed,
         alignment=alignment,
-        variance=variance_accounted_for(values, brought, scored),
+        variance=variance_accounted_for(values, shifted, scored),
         windows=list(windows),
         # the last sample is within the last window
         running=running_windows(0.0, stretch * (1.0 + 1e-9), length),
@@ -250,11 +250,11 @@ def compare(
     )
 
 
-def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, alignment: Alignment) -> Floats:
-    """Return the simulated signal at the measured instants, NaN where nothing was simulated."""
+def _shifted(simulated_time: Floats, simulated: Floats, measured: Channel, alignment: Alignment) -> Floats:
+    """Return the simulated signal at the measured instants, NaN without a simulated value."""
     model = Interpolated(simulated_time, simulated)
     at = measured.time - alignment.lag
-    # a lag of nothing must not lose the first or the last sample to rounding
+    # a lag of zero must not lose the first or the last sample by rounding
     slack = 1e-9 * (model.end - model.start)
     inside = (at >= model.start - slack) & (at <= model.end + slack)
     if np.count_nonzero(inside & measured.good) < 2:
@@ -266,9 +266,9 @@ def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, align
     return np.where(inside, alignment.polarity * model(at), np.nan)
 
 
-def _offset(offset: str | float, event: ChannelEvent, values: Floats, brought: Floats) -> float:
+def _offset(offset: str | float, event: ChannelEvent, values: Floats, shifted: Floats) -> float:
     if offset == "level":
-        return float(np.mean(values) - np.mean(brought))
+        return float(np.mean(values) - np.mean(shifted))
     return {"before": event.offset, "none": 0.0}[offset] if isinstance(offset, str) else float(offset)
 
 
@@ -282,24 +282,24 @@ def _matched(
 
 
 def _remarks(measured: Channel, event: ChannelEvent, offset: str | float, scored: Flags) -> list[str]:
-    """Say what of the record was not scored, and what could not be found out."""
-    said = []
+    """Return remarks on the parts of the record that were not scored, and on unknown quantities."""
+    found = []
     if event.quiet is None and offset == "before":
-        said.append(
+        found.append(
             "the recording does not begin quietly (a continuous signal, or noise only): its offset could not be "
             "estimated and was left, and the start of the record stands for the onset of the event"
         )
     good, done = int(np.count_nonzero(measured.good)), int(np.count_nonzero(scored))
     if done < good:
-        said.append(f"{good - done} good samples lie outside the simulated time and are not scored")
+        found.append(f"{good - done} good samples lie outside the simulated time and are not scored")
     if good < len(scored):
-        said.append(f"{len(scored) - good} samples are clipped, missing or out of range and are not scored")
+        found.append(f"{len(scored) - good} samples are clipped, missing or out of range and are not scored")
     if measured.axis.interval_uncertainty > 0.0:
-        said.append(
+        found.append(
             f"the sampling interval is uncertain by {100 * measured.axis.interval_uncertainty:.2g} %: so is "
             "every frequency"
         )
-    return said
+    return found
 
 
 def naive_variance(
@@ -311,25 +311,25 @@ def naive_variance(
     lag: Literal["auto"] | float = "auto",
     event_window: tuple[float, float] | None = None,
 ) -> float:
-    """Return the variance that the drive itself accounts for, with the gain and offset that suit it best, percent.
+    """Return the variance that the drive itself accounts for, with its best gain and offset, percent.
 
-    A body that follows its base rigidly would reach 100. No response at all scores 0, and so this is never less.
-    Lag and polarity are found as for a replay; gain and offset are the best of the whole record, an advantage that
-    a replay does not have.
+    A body that follows its base rigidly would reach 100. No response at all scores 0, so the result is never less.
+    Lag and polarity are found as for a replay. Gain and offset are the best of the whole record, an advantage that a
+    replay does not have.
 
     Parameters
     ----------
     drive_time, drive : ndarray of float, shape (drive sample,)
-        s, ascending; any unit. Before and after, the drive rests.
+        s, ascending; any unit. The drive is constant before and after.
     measured : Channel
     most_lag, lag, event_window
         As in `align`.
     """
     found = align(drive_time, drive, measured, most_lag=most_lag, lag=lag, event_window=event_window)
     good = measured.good
-    brought = Interpolated(drive_time, drive)(measured.time[good] - found.lag)
-    brought = brought - np.mean(brought)
+    shifted = Interpolated(drive_time, drive)(measured.time[good] - found.lag)
+    shifted = shifted - np.mean(shifted)
     values = measured.si()[good]
     values = values - np.mean(values)
-    size = float(np.sum(brought**2) * np.sum(values**2))
-    return 100.0 * float(np.sum(brought * values)) ** 2 / size if size > 0.0 else 0.0
+    size = float(np.sum(shifted**2) * np.sum(values**2))
+    return 100.0 * float(np.sum(shifted * values)) ** 2 / size if size > 0.0 else 0.0

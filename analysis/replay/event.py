@@ -1,4 +1,4 @@
-"""Where the event of a measured record begins, and what the channel shows before it.
+"""The start of the event in a measured record, and the rest of the channel before it.
 
 Everything here comes from the measured signal alone, so that no parameter of a model can change it.
 """
@@ -17,14 +17,14 @@ from vibroimpact.fmus.errors import EstimationError
 Floats = NDArray[np.float64]
 
 HEAD_SHARE, HEAD_FEWEST = 0.02, 16
-"""Samples at the start from which the noise is taken: this share of the record, and at least so many."""
+"""Samples at the start that give the noise: this share of the record, and at least this number."""
 ONSET_LEVEL = 0.1
-"""Share of the largest deviation at which the event begins, where that is beyond the noise."""
+"""Share of the largest deviation at which the event begins, if that is above the noise."""
 NOISE_FACTOR = 6.0
-"""Standard deviations of the noise beyond which a sample has left it."""
+"""Standard deviations of the noise beyond which a sample does not belong to it."""
 QUIET_PERIODS = 0.5
-"""A start is quiet where it lasts this share of a period of the event: an oscillation stays within a tenth of its
-largest value for arccos(.9)/pi = 14 % of a period only."""
+"""Length of a quiet start, as a share of a period of the event. An oscillation stays within a tenth of its largest
+value only for arccos(.9)/pi = 14 % of a period."""
 ENERGY_SHARE = 0.99
 """Share of the energy (sum of squares) that has passed at the end of the event."""
 
@@ -36,14 +36,14 @@ class ChannelEvent:
     Attributes
     ----------
     onset : float
-        s on the clock of the channel: a tenth of the largest deviation, or six times the noise if that is more, is
-        reached. The first sample where the record does not begin quietly.
+        s on the clock of the channel, at a tenth of the largest deviation or at six times the noise, whichever is more.
+        The first sample if the record does not begin quietly.
     end : float
-        s: 99 % of the energy has passed.
+        s: the time at which 99 % of the energy has passed.
     offset : float
-        Value of the channel before the event, in its SI unit; 0 where the record does not begin quietly.
+        Value of the channel before the event, in its SI unit; 0 if the record does not begin quietly.
     noise : float
-        Standard deviation before the event, in the same unit; NaN where the record does not begin quietly.
+        Standard deviation before the event, in the same unit; NaN if the record does not begin quietly.
     quiet : tuple of float or None
         Start and end (s) of the samples that gave offset and noise.
     period : float
@@ -87,7 +87,7 @@ def find_event(measured: Channel) -> ChannelEvent:
 
 
 def _after_rest(time: Floats, values: Floats, rest: float, noise: float, first: int) -> ChannelEvent | None:
-    """Return the event that begins at sample `first`; None where what is before it is too short to be a rest."""
+    """Return the event that begins at sample `first`; None if the part before it is too short for a rest."""
     # a slow precursor between the noise and the onset belongs to neither
     leaves = int(np.argmax(np.abs(values - rest) > NOISE_FACTOR * noise))
     quiet = values[: max(leaves, HEAD_FEWEST)]
@@ -109,7 +109,7 @@ def _end_of_energy(time: Floats, values: Floats) -> float:
 
 
 def _period(time: Floats, values: Floats, start: float, end: float) -> float:
-    """Return the dominant period between two instants; their distance where none shows."""
+    """Return the dominant period between two instants, or their distance without a dominant period."""
     rows = (time >= start) & (time <= end)
     frequency = dominant_frequency(time[rows], values[rows]).frequency
     return 1.0 / frequency if np.isfinite(frequency) else end - start

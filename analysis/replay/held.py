@@ -1,6 +1,6 @@
-"""Over which span of a record a replay holds: where its running error stays within what is trusted.
+"""The span of a record over which a replay holds: where its running error stays within the trusted error.
 
-Most of the energy of a decaying motion is at its beginning, and so a score of the whole record says little of its end.
+Most of the energy of a decaying motion is at its beginning, so a score of the whole record says little about its end.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from vibroimpact.analysis.replay.scoring import Span
 Floats = NDArray[np.float64]
 
 MOST_ERROR = 0.25
-"""Largest error per standard deviation of the measured signal, about VAF 94: the geometric mean between an error in
-which a motion is recognised and no more (.5, VAF 75) and that of a good linear replay of a real structure (.12)."""
+"""Largest error per standard deviation of the measured signal, about VAF 94. It is the geometric mean of two errors.
+At .5 (VAF 75) the motion is just recognised; a good linear replay of a real structure has .12."""
 NOISE_TIMES = 2.0
-"""Energy of a residual, relative to that of the noise, below which it may be noise: the window does not tell."""
+"""Energy of a residual, relative to that of the noise, below which it may be noise: the window is undecided."""
 _MOST_SPANS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Where in a record a replay holds.
+    """The spans of a record in which a replay holds.
 
     Attributes
     ----------
     spans : tuple of tuple of float
-        In which each running window that tells anything holds, s from `since`.
+        Spans in which each decided running window holds, s from `since`.
     broken : tuple of float or None
         Start and stop of the first window that does not hold, s from `since`, and its score, percent.
     end : float
-        Of the record, s from `since`.
+        End of the record, s from `since`.
     since : str
-        `the onset`, or `the start of the record` where it does not begin quietly.
+        `the onset`, or `the start of the record` if it does not begin quietly.
     """
 
     spans: tuple[Span, ...]
@@ -47,18 +47,18 @@ class Held:
 
     @property
     def words(self) -> str:
-        """Where it holds, to follow a comma."""
+        """The spans that hold, as words to follow a comma."""
         if not self.spans:
             return "nowhere"
         if self.spans == ((0.0, self.end),):
             return f"over the whole record ({instant(self.end)})"
-        said = [
+        shown = [
             f"to {instant(stop)}" if start == 0.0 else f"from {instant(start)} to {instant(stop)}"
             for start, stop in self.spans[:_MOST_SPANS]
         ]
         more = f" and in {len(self.spans) - _MOST_SPANS} spans more" if len(self.spans) > _MOST_SPANS else ""
         hidden = self.broken is None and self.spans[-1][1] < self.end
-        return f"{', '.join(said)} after {self.since}{more}{' (noise hides the rest)' if hidden else ''}"
+        return f"{', '.join(shown)} after {self.since}{more}{' (noise hides the rest)' if hidden else ''}"
 
 
 def held_over(
@@ -69,20 +69,20 @@ def held_over(
     most_error: float = MOST_ERROR,
     since: str = "the onset",
 ) -> Held:
-    """Return where the windows of a record hold.
+    """Return the spans in which the windows of a record hold.
 
-    A window holds where its error sqrt(1 - VAF/100) is at most `most_error`. It does not where it leaves more than
-    that beyond `NOISE_TIMES` times the energy of the noise; between the two, and without samples, it does not tell.
+    A window holds if its error sqrt(1 - VAF/100) is at most `most_error`. It does not hold if it leaves more than that
+    plus `NOISE_TIMES` times the energy of the noise. Between the two, and without samples, it is undecided.
 
     Parameters
     ----------
     windows : sequence of tuple of float
-        Side by side from 0, s.
+        Consecutive windows from 0, s.
     variance, ceiling : ndarray of float, shape (window,)
-        Score, and score of a perfect model under the noise, percent; NaN where it is not known.
+        Score, and score of a perfect model under the noise, percent; NaN if unknown.
     most_error : float
     since : str
-        What the times count from.
+        Words for the origin of the times.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def held_over(
 
 
 def _states(variance: Floats, ceiling: Floats, most_error: float) -> Floats:
-    """Return 1 for each window that holds, 0 for one that does not, NaN for one that does not tell."""
+    """Return 1 for each window that holds, 0 for one that does not, NaN for an undecided one."""
     left, most = 100.0 - variance, 100.0 * most_error**2
     noise = np.where(np.isnan(ceiling), 0.0, 100.0 - ceiling)
     return np.where(left <= most, 1.0, np.where(left > most + NOISE_TIMES * noise, 0.0, np.nan))

@@ -13,7 +13,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class EventMatch:
-    """Measured and simulated events that belong together.
+    """Measured and simulated events, paired.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class EventMatch:
 
     @property
     def delay(self) -> Floats:
-        """Simulated less measured instant of each pair, s."""
+        """Simulated minus measured instant of each pair, s."""
         return self.simulated - self.measured
 
 
 def match_events(measured: Floats, simulated: Floats, tolerance: float) -> EventMatch:
-    """Pair events that are each other's nearest and no further apart than a tolerance.
+    """Return pairs of events that are each other's nearest and no further apart than a tolerance.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def match_events(measured: Floats, simulated: Floats, tolerance: float) -> Event
 
 
 def _nearest(events: Floats, others: Floats) -> Rows:
-    """Return for each event the row of the nearest other one."""
+    """Return the row of the nearest other event for each event."""
     after = np.clip(np.searchsorted(others, events), 1, max(1, len(others) - 1))
     before = after - 1
     if len(others) == 1:

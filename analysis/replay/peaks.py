@@ -11,28 +11,28 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PROMINENCE = 0.5
-"""Least prominence of an extreme, relative to the largest value in the window: ripple is none."""
+"""Smallest prominence of an extreme, relative to the largest value in the window; ripple is less prominent."""
 NEIGHBOUR = 0.25
-"""Least distance of two extremes of one sign, and most of two that are paired, in periods."""
+"""Smallest distance of two extremes of one sign, and largest distance of a pair, in periods."""
 REACH = 0.125
-"""Distance within which samples give the height of an extreme, in periods."""
+"""Distance up to which samples contribute to the height of an extreme, in periods."""
 
 
 @dataclass(frozen=True, slots=True)
 class PeakErrors:
-    """Extremes of a measured signal and those of a simulated one, paired by their instants.
+    """Extremes of a measured and of a simulated signal, paired by their instants.
 
     Attributes
     ----------
     time : ndarray of float, shape (peak,)
-        s, of the measured extremes, maxima and minima in order.
+        Instants of the measured extremes, s, maxima and minima in order.
     measured, simulated : ndarray of float, shape (peak,)
-        Heights above the rest value: the vertex of the parabola that is nearest to the samples within an eighth of a
-        period on either side. The highest sample alone would be too high by the ripple on it.
+        Heights above the rest value: the vertex of the best parabola through the samples within an eighth of a period
+        on either side. The highest sample alone would be too high by the ripple on it.
     delay : ndarray of float, shape (peak,)
-        Instant of the simulated less that of the measured extreme, s.
+        Instant of the simulated minus that of the measured extreme, s.
     unpaired : int
-        Measured extremes without a simulated one.
+        Number of measured extremes without a simulated one.
     """
 
     time: Floats
@@ -63,7 +63,7 @@ def compare_peaks(
 ) -> PeakErrors:
     """Compare the extremes within a window.
 
-    A measured extreme at or beside a sample that is not good is left out: a clipped peak has no height.
+    A measured extreme at or next to a sample that is not good is left out: a clipped peak has no height.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ def compare_peaks(
     period : float
         Dominant period, s.
     level : float
-        Rest value of the measured signal: heights are taken from it.
+        Rest value of the measured signal, from which heights are measured.
     """
     measured, simulated = measured - level, simulated - level
     finite = np.isfinite(measured) & np.isfinite(simulated)
-    # one period more on either side, so that an extreme beside the edge is one
+    # one period more on either side, so that an extreme next to the edge is found
     wide = finite & (time >= window[0] - period) & (time <= window[1] + period)
     rows = np.flatnonzero(wide)
     if len(rows) < 3:
@@ -106,7 +106,7 @@ def compare_peaks(
 
 
 def _pairs(points: list[tuple[float, float]], others: list[tuple[float, float]], tolerance: float) -> Floats:
-    """Return rows of instant and value of a point and of the nearest other of its sign, shape (pair, 4)."""
+    """Return rows of instant and value of a point, and of the nearest other of its sign, shape (pair, 4)."""
     pairs = []
     for when, value in points:
         alike = [other for other in others if other[1] * value > 0.0 and abs(other[0] - when) <= tolerance]
@@ -142,7 +142,7 @@ def _vertex(time: Floats, values: Floats, usable: Flags, place: int, period: flo
     age = (time[near] - time[place]) / (reach * interval)
     bend, slope, height = np.polyfit(age, values[near], 2)
     if bend * values[place] >= 0.0 or abs(slope) > 2.0 * abs(bend):
-        # no extreme of the samples' own sign, or one beyond them
+        # no extreme of the samples' own sign, or one outside the samples
         return float(time[place]), float(values[place])
     shift = -0.5 * slope / bend
     return float(time[place] + shift * reach * interval), float(height + 0.5 * slope * shift)

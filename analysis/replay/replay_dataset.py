@@ -1,4 +1,4 @@
-"""Comparisons as a dataset: signals on the clock of the recording, and the scores of each."""
+"""Comparisons as a dataset: signals on the clock of the recording, and the scores of each comparison."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibroimpact.analysis.replay.scoring import Span
 
 Floats = NDArray[np.float64]
 
-# One number for each comparison: name, unit, in words, and where a comparison has it.
+# One number for each comparison: name, unit, words, and its attribute in a comparison.
 _NUMBERS = (
     ("variance_accounted_for", "%", "variance accounted for, all scored samples", "variance"),
     ("noise_ceiling", "%", "variance that a perfect model would account for", "noise_ceiling"),
@@ -50,7 +50,7 @@ _NUMBERS = (
     ),
     ("frequency_uncertainty", "Hz", "from the sampling interval alone", "measured_frequency.uncertainty"),
 )
-# Samples of `Comparison.counts`, in words.
+# Counts of samples in `Comparison.counts`, in words.
 _COUNTS = {
     "scored": "samples that were scored",
     "clipped": "clipped samples, not scored",
@@ -60,7 +60,7 @@ _COUNTS = {
 
 
 def comparison_names(comparisons: Sequence[Comparison]) -> list[str]:
-    """Return a name for each comparison: that of its channel, numbered where it comes again."""
+    """Return a name for each comparison: the name of its channel, numbered if it occurs again."""
     names: list[str] = []
     for comparison in comparisons:
         name, number = comparison.measured.name, 1
@@ -74,10 +74,10 @@ def comparison_names(comparisons: Sequence[Comparison]) -> list[str]:
 def comparison_dataset(comparisons: Sequence[Comparison]) -> xr.Dataset:
     """Return comparisons as one dataset, ready for `write_results(kind="replay")`.
 
-    Signals `NAME_measured`, `NAME_simulated`, `NAME_residual` (SI, less the offset) and `NAME_quality` are on `time`,
-    or `time_2`, ... for channels of further time axes, always the clock of the recording. Scores have the dimension
-    `comparison`; those in windows `window` and `running_window` as well (s from the onset). Extremes and events are
-    `NAME_peak_...`, `NAME_event_...`. What a reader must know is in the attribute `remarks`, line by line.
+    Signals `NAME_measured`, `NAME_simulated`, `NAME_residual` (SI, minus the offset) and `NAME_quality` are on `time`,
+    or on `time_2`, ... for channels with further time axes, always the clock of the recording. Scores have the
+    dimension `comparison`; scores in windows also have `window` or `running_window` (s from the onset). Extremes and
+    events are `NAME_peak_...`, `NAME_event_...`. The attribute `remarks` has the remarks for a reader, line by line.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def comparison_dataset(comparisons: Sequence[Comparison]) -> xr.Dataset:
 
 
 def _scores(comparisons: Sequence[Comparison]) -> Rows:
-    """Return one value for each comparison: its numbers, what was counted, what was compared, where it holds."""
+    """Return one value for each comparison: its numbers, counts, name of the simulated signal, and held span."""
     along = "comparison"
 
     def numbers(path: str) -> Floats:
@@ -179,7 +179,7 @@ def _events(name: str, comparison: Comparison) -> Rows:
 
 
 def _windows(name: str, words: str, scored: Sequence[tuple[list[Span], Floats]]) -> Rows:
-    """Return start, stop and score of windows, NaN where a comparison has fewer than another."""
+    """Return start, stop and score of windows, NaN if a comparison has fewer than another."""
     most = max(len(spans) for spans, _ in scored)
     if not most:
         return {}

@@ -19,27 +19,27 @@ def variance_accounted_for(
 ) -> float:
     """Return the share of the measured variance that the simulation accounts for, percent.
 
-    100 (1 - sum (y - s)^2 / sum (y - reference)^2) over the good samples. The reference is the mean of the good
-    measured samples, so that a constant that both share flatters nobody: predicting the mean alone scores 0. The
-    mean is not taken from the residual: a constant error costs. 100 is perfect; there is no lower limit.
+    The score is 100 (1 - sum (y - s)^2 / sum (y - reference)^2) over the good samples. The reference is the mean of
+    the good measured samples, so that a common constant gives no advantage: predicting the mean alone scores 0. The
+    mean is not removed from the residual: a constant error costs. 100 is perfect; there is no lower limit.
 
-    The root of 1 - VAF/100 is the error of the simulation per standard deviation of the measured signal: 99 % is
-    an error of 10 %, 75 % one of 50 %.
+    The root of 1 - VAF/100 is the error of the simulation per standard deviation of the measured signal. A score of
+    99 % is an error of 10 %, a score of 75 % an error of 50 %.
 
     Parameters
     ----------
     measured, simulated : ndarray of float, shape (sample,)
         In one unit, at the same instants.
     good : ndarray of bool, shape (sample,), optional
-        Samples that are scored; default: where both are finite.
+        Samples to score; default: samples where both are finite.
     reference : float, optional
-        In the same unit; for windows, that of the whole record: the windows' residual and reference energies then
-        sum to those of the whole.
+        In the same unit. For windows it is the reference of the whole record: the windows' residual and reference
+        energies then sum to those of the whole.
 
     Returns
     -------
     float
-        NaN where fewer than two samples are scored, or the measured signal is constant.
+        NaN if fewer than two samples are scored, or the measured signal is constant.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def windowed_variance(
     time, measured, simulated, good : ndarray, shape (sample,)
         As in `variance_accounted_for`; instants in s.
     windows : sequence of tuple of float
-        Start (within) and stop (not within), s on the clock of `time`.
+        Start (included) and stop (excluded), s on the clock of `time`.
     """
     reference = float(np.mean(measured[good])) if np.any(good) else 0.0
     return np.array(
@@ -90,7 +90,7 @@ def windowed_variance(
 
 
 def running_windows(start: float, stop: float, length: float) -> list[Span]:
-    """Return windows of one length side by side from `start`, s; a rest shorter than half of one joins the last.
+    """Return consecutive windows of one length from `start`, s; a rest shorter than half a window joins the last one.
 
     >>> running_windows(0.0, 1.1, 0.25)
     [(0.0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1.1)]
@@ -103,7 +103,7 @@ def running_windows(start: float, stop: float, length: float) -> list[Span]:
 def best_gain(measured: Floats, simulated: Floats, good: Flags) -> float:
     """Return the factor on the simulated signal that brings it nearest to the measured one (least squares).
 
-    A gain far from 1 says that sensitivity or participation is wrong, not the motion.
+    A gain far from 1 means that sensitivity or participation is wrong, not the motion.
     """
     scored = good & np.isfinite(measured) & np.isfinite(simulated)
     energy = float(np.sum(simulated[scored] ** 2))

@@ -1,4 +1,4 @@
-"""The frequency at which a signal is strongest, with what the record can resolve of it."""
+"""The frequency at which a signal is strongest, and the frequency resolution of the record."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FEWEST_SAMPLES = 8
-"""Fewest samples of a spectrum that says anything."""
+"""Smallest number of samples for a spectrum."""
 PADDING = 8
 """Zero padding: points of the spectrum within one resolved frequency."""
 LOWEST_CYCLES = 1.0
-"""Cycles in the record below which a frequency cannot be told from a drift."""
+"""Cycles in the record below which a frequency is indistinguishable from a drift."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +24,10 @@ class DominantFrequency:
     Attributes
     ----------
     frequency : float
-        Hz; NaN where the signal is constant or too short.
+        Hz; NaN if the signal is constant or too short.
     resolution : float
-        Hz, one over the length of the record: lines closer than this are not told apart. The frequency of a single
-        line is known better than this.
+        Hz, one over the length of the record: closer lines are not separable. The frequency of a single line is known
+        better than this.
     uncertainty : float
         Hz, from the uncertainty of the sampling interval alone.
     """
@@ -50,7 +50,7 @@ def dominant_frequency(
     time, values : ndarray of float, shape (sample,)
         s, ascending; and any unit.
     interval_uncertainty : float
-        Relative, of the sampling interval.
+        Relative uncertainty of the sampling interval.
 
     Examples
     --------
@@ -84,7 +84,7 @@ def dominant_frequency(
 
 
 def _vertex(magnitude: Floats, peak: int) -> float:
-    """Return where the parabola through a peak and its neighbours is highest, in steps from the peak."""
+    """Return the place where the parabola through a peak and its neighbours is highest, in steps from the peak."""
     if peak in (0, len(magnitude) - 1) or np.min(magnitude[peak - 1 : peak + 2]) <= 0.0:
         return 0.0
     left, middle, right = np.log(magnitude[peak - 1 : peak + 2])

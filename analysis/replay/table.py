@@ -1,4 +1,4 @@
-"""Comparisons as a table for people."""
+"""Comparisons as a printed table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_WINDOWS = 12
 
 
 def print_comparison(console: Terminal, comparisons: Sequence[Comparison]) -> None:
-    """Print the scores of comparisons, a column for each, and what a reader must know.
+    """Print the scores of comparisons, a column for each, and the remarks for a reader.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def print_comparison(console: Terminal, comparisons: Sequence[Comparison]) -> No
     """
     names = comparison_names(comparisons)
     rows = table("Simulated against measured", "<score", *(f">{name}" for name in names))
-    for heading, said in _ROWS:
-        cells = [said(comparison) for comparison in comparisons]
+    for heading, cell in _ROWS:
+        cells = [cell(comparison) for comparison in comparisons]
         if any(cells):
             rows.add_row(heading, *cells)
     _add_windows(rows, comparisons)
@@ -106,13 +106,13 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
 
 
 def _add_windows(rows: Table, comparisons: Sequence[Comparison]) -> None:
-    """Add a row for each window: those asked for, then the running ones, from the onset in ms."""
-    asked = [dict(zip(c.windows, c.window_variance, strict=True)) for c in comparisons]
+    """Add a row for each window: requested windows first, then running windows, in ms from the onset."""
+    requested = [dict(zip(c.windows, c.window_variance, strict=True)) for c in comparisons]
     running = [dict(zip(c.running, c.running_variance, strict=True)) for c in comparisons]
-    for heading, scored in (("window", asked), ("running", running)):
+    for heading, scored in (("window", requested), ("running", running)):
         spans = sorted({span for scores in scored for span in scores})
         if len(spans) > _MOST_WINDOWS:
-            # those of each channel differ; the dataset and the figure have them
+            # the windows of the channels differ; the dataset and the figure have them
             continue
         for span in spans:
             cells = [_percent(scores[span]) if span in scores else "" for scores in scored]

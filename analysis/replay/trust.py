@@ -1,8 +1,9 @@
-"""Whether a replay is to be trusted: a verdict in words from scores on records it was, and was not, fitted on.
+"""The trust in a replay: a verdict in words from scores on records that were used in its fit, and on others.
 
-The error of a replay per standard deviation of the measured signal is sqrt(1 - VAF/100): 11 % for a VAF of 98.8,
-50 % for one of 75. A model whose parameters are right leaves noise; what it leaves beyond that is motion it does not
-describe (of a linear one contact, friction, frequencies that drift), and no parameter will mend it.
+The error of a replay per standard deviation of the measured signal is sqrt(1 - VAF/100). A VAF of 98.8 is an error of
+11 %, a VAF of 75 an error of 50 %. A model with the right parameters leaves noise. A larger residual is motion that
+the model does not describe (for a linear model contact, friction, drifting frequencies), and no parameter can remove
+it.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from vibroimpact.analysis.replay.held import MOST_ERROR, Held, instant
 LEAST_SKILL = 0.5
 """Residual energy, relative to that of a prediction without dynamics, above which a model has no skill."""
 MOST_LOSS = 2.0
-"""Residual energy on other records per that on its own, above which the fit has learnt its record."""
+"""Residual energy on other records over that on its own, above which the fit is specific to its record."""
 LEAST_LOSS = 1.0
-"""Residual on other records, percent of their variance (an error of 10 %), below which it says nothing of learning."""
+"""Residual on other records, percent of their variance (an error of 10 %), below which the fit counts as general."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a replay is to be trusted.
+    """Verdict on a replay.
 
     Attributes
     ----------
@@ -32,7 +33,7 @@ class Verdict:
         One sentence.
     trusted : bool
     reasons : tuple of str
-        One line for each criterion that failed, the first of which is in `words`, or that should be known.
+        One line for each failed criterion, the first of which is in `words`, and for each further remark.
     """
 
     words: str
@@ -41,7 +42,7 @@ class Verdict:
 
     @property
     def beside(self) -> tuple[str, ...]:
-        """The reasons that `words` does not hold."""
+        """The reasons that `words` does not contain."""
         return self.reasons if self.trusted else self.reasons[1:]
 
 
@@ -54,32 +55,32 @@ def trust(
     linear: bool = True,
     most_error: float = MOST_ERROR,
 ) -> Verdict:
-    """Say whether a replay is to be trusted, and over which span.
+    """Return the verdict whether a replay is to be trusted, and over which span.
 
-    It is, where all of these hold:
+    A replay is trusted if all of these hold:
 
-    1. there is a record that it was not fitted on, and that has an event;
-    2. on each such record, and on its own, the error sqrt(1 - VAF/100) is at most `most_error`;
-    3. on each such record it leaves at most half of the residual energy of the prediction without dynamics
-       (`naive_variance`: no response, or the drive times the gain that suits the record best).
+    1. there is a record with an event that was not used in the fit;
+    2. on each such record, and on those of the fit, the error sqrt(1 - VAF/100) is at most `most_error`;
+    3. on each such record its residual energy is at most half of that of a prediction without dynamics.
 
-    Where the residual energy on other records is more than twice that on its own, and 1 %, this is said too: the fit
-    has learnt its record, and its standard errors do not hold for others. Where nothing was fitted, all records are
-    others, if the numbers of the scene do not come from them: the verdict says this condition.
+    A prediction without dynamics (`naive_variance`) is no response, or the drive times its best gain for the record. A
+    residual energy on other records of more than twice that on those of the fit, and of more than 1 %, is reported too.
+    The fit is then specific to its records, and its standard errors do not hold for others. Without a fit all records
+    are others, provided that the numbers of the scene do not come from them; the verdict states this condition.
 
     Parameters
     ----------
     fitted, others : mapping of str to float
-        Variance accounted for, percent, by record: those that parameters were fitted on, and those not. NaN where a
-        record has nothing to be scored.
+        Variance accounted for, percent, by record: records used in the fit, and other records. NaN for a record
+        without scored samples.
     baseline : mapping of str to float, optional
         Score of the prediction without dynamics on the same records, percent.
     held : mapping of str to Held, optional
-        Where the replay holds on the same records; the verdict says the shortest.
+        Spans in which the replay holds on the same records; the verdict states the shortest.
     linear : bool
-        Whether the model is linear: without stops, and with nothing that follows the amplitude.
+        Whether the model is linear: without stops, and without any dependence on the amplitude.
     most_error : float
-        Error that the user can live with.
+        Largest error that the user accepts.
 
     Examples
     --------
@@ -98,32 +99,32 @@ def trust(
         *_skill(scored or fitted, baseline or {}),
     ]
     if not scored:
-        lacking = "that it was not fitted on: give one to be scored, or fit on a part"
-        reasons.append(f"there is no record with an event {lacking if fitted else 'to be scored'}")
+        missing = "that it was not fitted on: give one to be scored, or fit on a part"
+        reasons.append(f"there is no record with an event {missing if fitted else 'to be scored'}")
     judged = {name: span for name, span in (held or {}).items() if name in scored or name in fitted}
-    beside = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
+    further = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
     replay = "linear replay" if linear else "replay"
     if reasons:
-        return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *beside))
+        return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *further))
     name = min(scored, key=lambda key: scored[key])
     these = "this record" if len(scored) == 1 else "these records"
     words = (
         f"This {replay} is to be trusted for events like these{_span(judged, name)}"
         f"{'' if fitted else f', if its numbers do not come from {these}'}: on {name}{other} it errs by "
-        f"{_said(scored[name])}."
+        f"{_error_text(scored[name])}."
     )
-    return Verdict(words, True, beside)
+    return Verdict(words, True, further)
 
 
 def _span(judged: Mapping[str, Held], name: str) -> str:
-    """Return over which span to trust: that of the record which breaks first; without one, that of the named one."""
+    """Return the trusted span: that of the record which breaks first, or else that of the named record."""
     broken = {key: held for key, held in judged.items() if held.broken is not None}
     shortest = min(broken.values(), key=lambda held: (held.broken or ())[:1], default=judged.get(name))
     return f", {shortest.words}" if shortest is not None and shortest.spans else ""
 
 
 def _breaks(judged: Mapping[str, Held], most_error: float, *, trusted: bool) -> list[str]:
-    """Say of each record where the replay first errs by more than is trusted, or where alone it does not."""
+    """Return a line for each record: where the replay first exceeds the trusted error, or where alone it does not."""
     lines = []
     for name, held in judged.items():
         if held.broken is None:
@@ -133,7 +134,7 @@ def _breaks(judged: Mapping[str, Held], most_error: float, *, trusted: bool) -> 
         until = f" to {instant(stop)} after {held.since}" if again else f" after {held.since} on"
         if trusted:
             lines.append(
-                f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_said(variance)}"
+                f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_error_text(variance)}"
             )
         elif held.spans:
             lines.append(f"on {name} it errs by at most {100 * most_error:.0f} % only {held.words}")
@@ -145,14 +146,14 @@ def _error(variance: float) -> float:
     return float(np.sqrt(np.maximum(0.0, 1.0 - variance / 100.0)))
 
 
-def _said(variance: float) -> str:
+def _error_text(variance: float) -> str:
     return f"{100 * _error(variance):.0f} % (VAF {variance:.1f} %)"
 
 
 def _errors(where: str, scores: Mapping[str, float], clause: str, most_error: float) -> list[str]:
-    # a NaN is no good score either
+    # a NaN is not a good score either
     return [
-        f"{where} {name}{clause} it errs by {_said(value)}"
+        f"{where} {name}{clause} it errs by {_error_text(value)}"
         for name, value in scores.items()
         if not _error(value) <= most_error
     ]

@@ -1,4 +1,4 @@
-"""How much of the variance of a result each drawn key of a campaign accounts for: Sobol indices with intervals."""
+"""Sobol indices: the share of a result's variance for each drawn key of a campaign, with intervals."""
 
 from __future__ import annotations
 

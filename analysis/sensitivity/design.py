@@ -1,4 +1,4 @@
-"""The blocks of a Saltelli design in a dataset, found by its values: what selected or sorted its runs is noticed."""
+"""The blocks of a Saltelli design in a dataset, found by its values: selected or sorted runs are noticed."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Design:
     """A Saltelli design."""
 
     names: tuple[str, ...]
-    """Coordinates of the keys that are drawn, in the order of the design."""
+    """Coordinates of the drawn keys, in the order of the design."""
     blocks: int
 
     def parts(self, values: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return values along the draws, shape (draw, ...), as those of A, B, and of A with each coordinate of B."""
+        """Return values along the draws, shape (draw, ...), split into A, B, and A with each coordinate of B."""
         blocks = values.reshape(self.blocks, len(self.names) + 2, *values.shape[1:])
         return blocks[:, 0], blocks[:, 1], blocks[:, 2:]
 
@@ -33,7 +33,7 @@ class Design:
 def design_of(dataset: xr.Dataset) -> Design:
     """Return the design of an opened dataset.
 
-    DatasetError: its points are drawn in another way or not at all, or blocks of the design are not whole.
+    DatasetError: the points are drawn in another way or not at all, or blocks of the design are incomplete.
     """
     names = [name for name in swept_names(dataset) if dataset[name].attrs.get(SWEPT_ALONG) == DRAW]
     if len(names) < 2:
@@ -57,7 +57,7 @@ def design_of(dataset: xr.Dataset) -> Design:
 
 
 def _other_design(dataset: xr.Dataset) -> str:
-    """Return what the scene of a dataset says of its points, in words; empty of a Saltelli design."""
+    """Return the scene's own words for the points of a dataset; empty for a Saltelli design."""
     sweep = scene_of(dataset.attrs).get("sweep", {})
     sample = sweep.get("sample") if isinstance(sweep, dict) else None
     if not isinstance(sample, dict):

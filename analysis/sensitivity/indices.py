@@ -1,8 +1,8 @@
 """Sobol indices and their bootstrap intervals, from the values of a quantity at the points of a Saltelli design.
 
-A block of the design is a point of A, one of B, and that of A with each coordinate of B in turn. With f the quantity
-less its mean and V its variance over A and B (A. Saltelli et al., Computer Physics Communications 181, 259-270, 2010,
-table 2 b and f):
+A block of the design is a point of A, a point of B, and A's point with each coordinate of B in turn. f is the
+quantity minus its mean; V is its variance over A and B. The estimators are those of A. Saltelli et al., Computer
+Physics Communications 181, 259-270, 2010, table 2 b and f:
 
     first order  S_i = mean(f_B (f_AB,i - f_A)) / V
     total order  T_i = mean((f_A - f_AB,i)^2) / 2 V
@@ -23,9 +23,9 @@ from vibroimpact.fmus.errors import UsageError
 Floats = NDArray[np.float64]
 
 FEWEST_BLOCKS = 8
-"""Blocks below which a variance, and what resampling says of it, mean nothing."""
+"""Number of blocks below which a variance and its bootstrap interval mean nothing."""
 _CONSTANT = 1e-9
-"""Spread, over the largest value, up to which a quantity is constant: rounding, and what is left of transients."""
+"""Spread, over the largest value, below which a quantity is constant: rounding, and remains of transients."""
 _BATCH = 10**6
 """Numbers drawn at a time for the bootstrap."""
 
@@ -37,11 +37,11 @@ class Indices:
     Attributes
     ----------
     first_order, total_order : ndarray of float, shape (quantity, key)
-        NaN of a quantity that is constant, or has too few whole blocks.
+        NaN for a quantity that is constant, or has too few whole blocks.
     first_interval, total_interval : ndarray of float, shape (quantity, key, 2)
-        Ends of the bootstrap intervals; NaN where resamples are constant: the quantity hangs on a few blocks.
+        Ends of the bootstrap intervals; NaN where resamples are constant: the quantity depends on a few blocks.
     blocks : ndarray of int, shape (quantity,)
-        Blocks that they are estimated from: those whose values are all finite.
+        Number of blocks behind the estimates: blocks whose values are all finite.
     """
 
     first_order: Floats
@@ -56,9 +56,9 @@ def sobol_indices(
 ) -> Indices:
     """Estimate first-order and total Sobol indices of quantities at the points of a Saltelli design.
 
-    Blocks with a value that is not finite are left out of their quantity. Blocks are resampled with replacement, the
-    intervals are quantiles of what comes out: for Sobol points, which are more even than random ones, they are wider
-    than the errors.
+    Blocks with a value that is not finite are left out of their quantity. Blocks are resampled with replacement; the
+    intervals are quantiles over the resamples. Sobol points are more even than random points, so the intervals are
+    wider than the errors.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def sobol_indices(
     mixed : ndarray of float, shape (block, key, quantity)
         Values at the points of A with one coordinate of B.
     level : float
-        Of the intervals.
+        Confidence of the intervals.
     resamples : int
-        Of the bootstrap.
+        Number of bootstrap resamples.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def sobol_indices(
 
 
 class SobolEstimation:
-    """Indices whose intervals are known better with each batch of resamples; see `sobol_indices` for the parameters."""
+    """Sobol indices whose intervals improve with each batch of resamples; see `sobol_indices` for the parameters."""
 
     def __init__(
         self, a: Floats, b: Floats, mixed: Floats, *, level: float, resamples: int, seed: int
@@ -110,7 +110,7 @@ class SobolEstimation:
         self._groups: list[_Group] = []
 
     def batches(self) -> Generator[int, None, None]:
-        """Estimate quantities with the same whole blocks together; yield the number of resamples of each batch."""
+        """Estimate quantities with equal whole blocks together; yield the number of resamples of each batch."""
         a, b, mixed = self._points
         patterns, which = np.unique(self._whole, axis=1, return_inverse=True)
         for number, rows in enumerate(patterns.T):
@@ -147,7 +147,7 @@ def _refuse(level: Any, resamples: Any, seed: Any) -> None:
 
 
 class _Group(NamedTuple):
-    """Quantities with the same whole blocks: their places, their indices, and those of each batch of resamples."""
+    """Quantities with the same whole blocks: their places, their indices, and the indices of each batch."""
 
     quantities: NDArray[np.intp]
     indices: Floats
@@ -155,21 +155,21 @@ class _Group(NamedTuple):
 
 
 def _weights(blocks: int, resamples: int, seed: int) -> Iterator[Floats]:
-    """Yield how often each block is in each resample, in batches of shape (resample, block)."""
+    """Yield the number of occurrences of each block in each resample, in batches of shape (resample, block)."""
     source = np.random.default_rng(seed)
     batch = max(1, _BATCH // blocks)
-    for begun in range(0, resamples, batch):
-        drawn = source.integers(blocks, size=(min(batch, resamples - begun), blocks))
+    for start in range(0, resamples, batch):
+        drawn = source.integers(blocks, size=(min(batch, resamples - start), blocks))
         yield np.stack([np.bincount(row, minlength=blocks) for row in drawn]).astype(np.float64)
 
 
 class _Moments:
-    """The products of each block whose means make the indices of quantities."""
+    """The products of each block whose means give the indices of quantities."""
 
     def __init__(self, a: Floats, b: Floats, mixed: Floats) -> None:
         both = np.concatenate([a, b])
         centre, size = both.mean(axis=0), np.abs(both).max(axis=0)
-        # quantities of any size, squared, are numbers still
+        # scaled, so that squares of quantities of any size stay finite
         scale = np.where(size > 0.0, size, 1.0)
         spread = np.ptp(np.concatenate([both, mixed.reshape(-1, a.shape[1])]) / scale, axis=0)
         self._is_constant = spread <= _CONSTANT

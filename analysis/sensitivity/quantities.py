@@ -1,4 +1,4 @@
-"""The numbers of a run whose variance is shared out: what a dataset holds of its runs, one number for each."""
+"""The numbers of a run whose variance is divided among keys: one number per run for each quantity."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _RAN = (Outcome.ok, Outcome.stuck)
 
 
 def quantities_of(dataset: xr.Dataset) -> xr.Dataset:
-    """Return what can be looked at in an opened dataset, on the dimensions of its sweep.
+    """Return the quantities of an opened dataset that can be analysed, on the dimensions of its sweep.
 
-    A run that did not come to its end has none: NaN. What was recorded counts: `displacement_range`;
-    `impacts_per_period`, their mean; `impact_count` or `event_count`, where there are no periods; `impact_velocity`,
-    the largest, 0 where nothing was hit. So do `NAME_rms` of each sampled variable, and `variance_accounted_for` of
-    each pair of signals of a replay, numbered.
+    A run that did not come to its end is NaN. Recorded groups give `displacement_range`; the mean of
+    `impacts_per_period`; `impact_count` or `event_count` without periods; and the largest `impact_velocity`, 0 without
+    impacts. Each sampled variable gives `NAME_rms`, and each pair of signals of a replay a numbered
+    `variance_accounted_for`.
     """
     ran = dataset["outcome"].isin(_RAN)
     found = {name: values.where(ran) for name, values in _recorded(dataset)}
@@ -34,22 +34,22 @@ def _recorded(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
         yield "displacement_range", dataset["displacement_range"]
     if "impacts_per_period" in there:
         each = dataset["impacts_per_period"]
-        yield "impacts_per_period", _told(each.mean("period"), "1", "mean number of impacts in a period")
+        yield "impacts_per_period", _named(each.mean("period"), "1", "mean number of impacts in a period")
     elif "impact_count" in there:
         yield "impact_count", dataset["impact_count"]
     if "impact_velocity" in there:
         largest = _by_run(dataset, "impact", dataset["impact_velocity"].values, np.maximum)
-        yield "impact_velocity", _told(largest, _unit(dataset, "impact_velocity"), "largest impact velocity")
+        yield "impact_velocity", _named(largest, _unit(dataset, "impact_velocity"), "largest impact velocity")
     if "event_count" in there:
         yield "event_count", dataset["event_count"]
     for name in _sampled(dataset):
         squares = _by_run(dataset, "sample", dataset[name].values ** 2, np.add)
         root = (squares / dataset["sample_count"].where(dataset["sample_count"] > 0)) ** 0.5
-        yield f"{name}_rms", _told(root, _unit(dataset, name), f"root mean square of {name}")
+        yield f"{name}_rms", _named(root, _unit(dataset, name), f"root mean square of {name}")
     if "variance_accounted_for" in there:
         for number, pair in enumerate(dataset["compared"].values.tolist(), start=1):
             share = dataset["variance_accounted_for"].isel(compared=number - 1, drop=True)
-            yield f"variance_accounted_for_{number}", _told(share, "%", f"variance accounted for of {pair}")
+            yield f"variance_accounted_for_{number}", _named(share, "%", f"variance accounted for of {pair}")
 
 
 def _sampled(dataset: xr.Dataset) -> list[str]:
@@ -59,7 +59,7 @@ def _sampled(dataset: xr.Dataset) -> list[str]:
 
 
 def _by_run(dataset: xr.Dataset, dimension: str, values: Floats, function: np.ufunc) -> xr.DataArray:
-    """Return what the rows of each run come to; 0 of a run without rows."""
+    """Return the values of the rows of each run combined by a function; 0 for a run without rows."""
     owner, run_id = dataset[f"{dimension}_run"].values, dataset["run_id"]
     result = np.zeros(max([int(run_id.max()), *owner[-1:].tolist()], default=0) + 1)
     function.at(result, owner, values)
@@ -70,5 +70,5 @@ def _unit(dataset: xr.Dataset, name: str) -> str:
     return str(dataset[name].attrs.get("units", "1"))
 
 
-def _told(values: xr.DataArray, unit: str, words: str) -> xr.DataArray:
+def _named(values: xr.DataArray, unit: str, words: str) -> xr.DataArray:
     return values.drop_attrs().assign_attrs(units=unit, long_name=words)

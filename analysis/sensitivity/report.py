@@ -83,8 +83,8 @@ class SensitivityOfCampaign(Study[int]):
     def rows(self) -> Generator[int, None, None]:
         """Estimate the indices, then resample the blocks batch after batch.
 
-        DatasetError: the dataset has no Saltelli design, or nothing that varies over it. UsageError: there is no such
-        quantity; or the level, the number of resamples or the seed makes no sense.
+        DatasetError: the dataset has no Saltelli design, or nothing that varies over it. UsageError: the quantity is
+        unknown, or the level, the number of resamples or the seed is out of range.
         """
         dataset, self._design = self.campaign, design_of(self.campaign)
         if taken := sorted({"quantity", "parameter", "bound"} & set(map(str, dataset["outcome"].dims))):
@@ -158,7 +158,7 @@ def sensitivity_report(
 
 
 def _chosen(there: Sequence[str], of: Sequence[str]) -> list[str]:
-    """Return the quantities asked for."""
+    """Return the chosen quantities, or all of them."""
     if not there:
         raise DatasetError(
             "sensitivity: expected something recorded of each run, got nothing. Set extrema, impacts or a time "
@@ -171,7 +171,7 @@ def _chosen(there: Sequence[str], of: Sequence[str]) -> list[str]:
 
 
 def _remarks(report: xr.Dataset, drawn: int) -> list[str]:
-    """Return what is to be said of quantities that are constant, or lost blocks to runs that failed."""
+    """Return remarks on quantities that are constant, or that lost blocks to failed runs."""
     remarks = []
     for name in report["quantity"].values.tolist():
         own = report.sel(quantity=name)
@@ -188,21 +188,21 @@ def _remarks(report: xr.Dataset, drawn: int) -> list[str]:
         if few.any():
             remarks.append(f"{name} has fewer than {FEWEST_BLOCKS} whole blocks of runs: it has no indices.")
         elif blocks.min() < drawn:
-            lost = drawn - int(blocks.min())
+            dropped = drawn - int(blocks.min())
             remarks.append(
-                f"{name}: {lost} of {drawn} blocks are left out, for runs that failed or have no such number; "
+                f"{name}: {dropped} of {drawn} blocks are left out, for runs that failed or have no such number; "
                 "indices are those of what is left."
             )
     return remarks
 
 
 def _print(console: Terminal, found: xr.Dataset) -> None:
-    """Print a table: of indices along other keys their mean, lowest and highest value."""
+    """Print a table of the indices; along other keys their mean, lowest and highest value."""
     along = [str(dim) for dim in found.total_order.dims if dim not in ("quantity", "parameter")]
     interval = f"{100.0 * found.attrs['level']:g} %"
-    beside = "lowest to highest" if along else interval
+    heading = "lowest to highest" if along else interval
     first, total = ("first order, mean", "total, mean") if along else ("first order", "total")
-    headings = ("<quantity", "<parameter", f">{first}", f">{beside}", f">{total}", f">{beside}")
+    headings = ("<quantity", "<parameter", f">{first}", f">{heading}", f">{total}", f">{heading}")
     where = f" (along {', '.join(along)})" if along else ""
     title = f"Shares of variance: {found.attrs.get('title') or found.attrs['source']}{where}"
     console.print(table(title, *headings, rows=_rows(found, bool(along))))

@@ -1,4 +1,4 @@
-"""From pulses to mechanics: the part of the time in contact, impact velocities, calibration of a load cell.
+"""From pulses to mechanics: the share of the time in contact, impact velocities, calibration of a load cell.
 
 Thesis sections 5.2.4 and 5.3, equations (5.1) to (5.6).
 """
@@ -14,13 +14,13 @@ from vibroimpact.fmus.errors import EstimationError, UsageError
 
 Floats = NDArray[np.float64]
 
-#: The rigid-impact model is taken to be adequate below this contact-time measure (thesis section 5.2.4).
+#: Contact-time measure below which the rigid-impact model is adequate (thesis section 5.2.4).
 SHORT_CONTACT = 0.025
 
 
 @dataclass(frozen=True, slots=True)
 class ContactTime:
-    """The contact-time measure: part of the time in contact, with its standard error."""
+    """The contact-time measure: share of the time in contact, with its standard error."""
 
     measure: float
     standard_error: float
@@ -36,11 +36,11 @@ class Calibration:
 
 
 def contact_time_measure(start: Floats, duration: Floats) -> ContactTime:
-    """Return the part of the time in which the spikes are above the threshold (thesis eq. 5.3).
+    """Return the share of the time in which the spikes are above the threshold (thesis eq. 5.3).
 
-    mu_H = (1/t_n) sum S_j over the spikes fired from the first firing to the last one, without the last, which is
-    not completed within t_n. It is a ratio of two means, of which the standard error is taken: that of
-    S_j - mu_H I_j over the mean interval.
+    mu_H = (1/t_n) sum S_j over the spikes from the first firing to the last one. The last spike is excluded, since it
+    is not completed within t_n. mu_H is a ratio of two means; its standard error is that of S_j - mu_H I_j over the
+    mean interval.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def contact_time_measure(start: Floats, duration: Floats) -> ContactTime:
     Raises
     ------
     EstimationError
-        Less than two spikes.
+        Fewer than two spikes.
 
     Examples
     --------
@@ -78,11 +78,11 @@ def impact_velocity(impulse: Floats, restitution: float, mass: float | None) -> 
     Parameters
     ----------
     impulse : ndarray of float, shape (spike,)
-        N s; of an acceleration (m/s) where `mass` is None.
+        N s; m/s for an acceleration, if `mass` is None.
     restitution : float
         0 to 1.
     mass : float or None
-        Effective mass of the contact in the model in use, kg.
+        Effective mass of the contact in the present model, kg.
 
     Raises
     ------
@@ -103,23 +103,23 @@ def impact_velocity(impulse: Floats, restitution: float, mass: float | None) -> 
 
 
 def calibrate(measured: Floats, known: Floats) -> Calibration:
-    """Fit the sensitivity of a load cell to impulses that are known.
+    """Return the sensitivity of a load cell, fitted to known impulses.
 
     Least squares through the origin: measured (V s) = sensitivity (V/N) times known (N s).
 
     Parameters
     ----------
     measured : ndarray of float, shape (spike,)
-        V s, as `measure_pulses` gives it for a channel in volts.
+        V s, from `measure_pulses` for a channel in volts.
     known : ndarray of float, shape (spike,)
         N s, from a pendulum or a dropped mass.
 
     Raises
     ------
     UsageError
-        Not as many impulses known as spikes were found.
+        The number of known impulses differs from the number of spikes.
     EstimationError
-        None of the known impulses differs from 0.
+        All known impulses are 0.
 
     Examples
     --------

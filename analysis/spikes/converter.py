@@ -1,8 +1,8 @@
-"""The steps that the converter of a record leaves of a signal.
+"""The quantisation steps that the converter of a record leaves in a signal.
 
-Between two steps a converter says nothing: noise of less than a step comes out as a few samples of one step more, far
-above the median magnitude, which is 0. A random part of a step, added before the noise is looked at, makes up for it
-(dither; Widrow and Kollar 2008): what is found then is the noise and that of the steps, step / sqrt(12), together.
+A converter resolves nothing between two steps. Noise below a step appears as a few samples one step higher, far above
+the median magnitude, which is 0. A random part of a step, added before the noise is measured, corrects this (dither;
+Widrow and Kollar 2008). The result then is the noise together with that of the steps, step / sqrt(12).
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ Floats = NDArray[np.float64]
 
 LEAST_STEPS = 1.5
 """Lowest threshold in steps: the next value is noise."""
-#: Rounding of values, relative to the largest: they may have been kept as float32, or printed with seven digits.
+#: Rounding of values, relative to the largest: they may have been stored as float32, or printed with seven digits.
 _ROUNDING = 4.0 * float(np.finfo(np.float32).eps)
-#: Shortest step in units of that rounding, and how far values may be from the grid, in steps.
+#: Smallest step in units of this rounding, and largest deviation of values from the grid, in steps.
 _CLEAR, _OFF_GRID = 20.0, 0.1
-#: Noise, in steps, from which on no estimate of it feels the steps.
-_FINE = 10.0
-#: Most distinct values of a converter: 24 bits are never all met in a record.
+#: Noise, in steps, above which estimates of the noise are independent of the steps.
+_RESOLVED_NOISE = 10.0
+#: Largest number of distinct values of a converter: no record contains all values of 24 bits.
 _MOST_VALUES = 1 << 18
-#: Levels from which on a signal is no switch, and samples for which a switch stays.
+#: Number of levels from which a signal is no switch, and number of samples for which a switch keeps its level.
 _FEWEST_LEVELS, _STAYS = 4, 4
 
 
 def converter_step(values: Floats) -> float:
-    """Return the step of the grid of all values, calibrated or not; 0 where there is none, or where noise hides it.
+    """Return the step of the grid of all values, calibrated or not; 0 without a grid, or where noise hides it.
 
     >>> counts = np.array([3, 4, 4, 3, 5, 4, 9, 4])
     >>> round(converter_step(0.25 * counts + 0.1), 12)
@@ -52,11 +52,11 @@ def converter_step(values: Floats) -> float:
         return 0.0
     if distinct.size < _FEWEST_LEVELS and _is_switched(values):
         return 0.0
-    return step if _noise_between(values) < _FINE * step else 0.0
+    return step if _noise_between(values) < _RESOLVED_NOISE * step else 0.0
 
 
 def _is_switched(values: Floats) -> bool:
-    """Return whether a signal of a few levels stays where it has gone, as a switch does and noise does not."""
+    """Return whether a signal of a few levels keeps each new level, as a switch does and noise does not."""
     levels, counts = np.unique(values, return_counts=True)
     away = values != levels[np.argmax(counts)]
     edges = np.flatnonzero(np.diff(np.concatenate(([False], away, [False])).astype(np.int8)))
@@ -64,10 +64,10 @@ def _is_switched(values: Floats) -> bool:
 
 
 def between_steps(length: int, step: float) -> Floats:
-    """Return random parts of a step, one for each sample, the same each time."""
+    """Return random parts of a step, one for each sample, the same in each call."""
     return step * (np.random.default_rng(0).random(length) - 0.5)
 
 
 def _noise_between(values: Floats) -> float:
-    """Return the noise from one sample to the next, which a motion does not feel."""
+    """Return the noise from one sample to the next, which is independent of a motion."""
     return robust_sigma(np.diff(values)) / float(np.sqrt(2.0))

@@ -1,8 +1,8 @@
-"""Periodic excitation in a signal: whether there is any, its period, and the waveform of its cycle.
+"""Periodic excitation in a signal: its existence, its period, and the waveform of its cycle.
 
 A forced system's signal repeats with the forcing; its spikes and shocks do not. The median over all cycles, phase by
-phase, is the periodic part: a shock in a few of them cannot move it. A train of spikes may repeat just as well, and is
-what is looked for; it differs in that the signal rests most of the time.
+phase, is the periodic part, which a shock in a few cycles cannot move. A wanted train of spikes may repeat just as
+well. It differs in that the signal rests most of the time.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from vibroimpact.fmus.messages import Argument, message
 
 Floats = NDArray[np.float64]
 
-#: Fewest cycles whose median is the periodic part.
+#: Smallest number of cycles for a median.
 FEWEST_CYCLES = 10
-#: Fewest samples in a cycle that show its waveform.
+#: Smallest number of samples in a cycle that show its waveform.
 _FEWEST_SAMPLES = 8
 #: Magnitude of the residual, relative to the signal, above which there is no periodic part.
 _MOST_LEFT = 0.5
@@ -30,26 +30,26 @@ _STEADY = 0.1
 #: Highest harmonic of the fundamental that the strongest line may be.
 _HARMONICS = 8
 #: Ratio of the residuals below which the longer of two periods is the true one.
-_LONGER_PAYS = 0.7
+_LONGER_RATIO = 0.7
 _REFINEMENTS = 5
 
 
 @dataclass(frozen=True, slots=True)
 class PeriodicPart:
-    """The periodic part of a signal, or why there is none.
+    """The periodic part of a signal, or the reason why there is none.
 
     Attributes
     ----------
     period : float
-        Samples; 0 where nothing repeats.
+        Samples; 0 if nothing repeats.
     periodic : ndarray of float, shape (sample,)
-        The periodic part, about the signal's own mean level; zeros where there is none.
+        The periodic part, about the signal's own mean level; zeros if there is none.
     count : int
         Cycles in the signal.
     left : float
-        Noise without the periodic part, as a part of the noise with it.
+        Noise without the periodic part, relative to the noise with it.
     reason : str
-        Why it is an excitation or why not, in words.
+        The reason for the decision, in words.
     """
 
     period: float
@@ -65,13 +65,13 @@ class PeriodicPart:
 
 
 def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
-    """Look for a periodic excitation.
+    """Search for a periodic excitation.
 
-    It is one if (a) at least ten cycles are there; (b) the median over its cycles, taken off, leaves less than half of
-    the signal's median magnitude: a train of spikes rests most of the time, so that its median magnitude is noise
-    already, and noise has no cycle; (c) its amplitude in the first and the last third of the cycles agrees within 10 %:
-    a ring decays. Values are evenly sampled, without gaps. A given period (samples) is refined no further, and nothing
-    is tested.
+    Three conditions must hold. (a) There are at least ten cycles. (b) Without the median over its cycles, less than
+    half of the signal's median magnitude is left. A train of spikes rests most of the time, so its median magnitude is
+    noise, and noise has no cycle. (c) Its amplitudes in the first and the last third of the cycles agree within 10 %,
+    unlike those of a decaying ring. Values are evenly sampled, without gaps. A given period (samples) is neither
+    refined nor tested.
     """
     level = values - running_median(values, max(len(values) // 4, 1))
     if period is not None:
@@ -86,24 +86,24 @@ def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
         return _folded(values, period, f"a period of {period:g} samples was asked for")
     first = _strongest_line(level)
     if first is None:
-        return _none(values, "too short for ten cycles")
+        return _no_cycle(values, "too short for ten cycles")
     best = _fundamental(level, first)
     if best is None:
-        return _none(values, "no ten cycles of any line in its spectrum")
+        return _no_cycle(values, "no ten cycles of any line in its spectrum")
     if best.left > _MOST_LEFT:
-        return _none(
+        return _no_cycle(
             values,
             f"no cycle explains it: {min(best.left, 1.0):.0%} of its noise is left without the best one",
         )
     change = _change_of_amplitude(level, best)
     if change > _STEADY:
-        return _none(values, f"what repeats is not steady: its amplitude changes by {change:.0%}")
+        return _no_cycle(values, f"what repeats is not steady: its amplitude changes by {change:.0%}")
     # the drift again, now without the ripple that whole cycles leave in a running median
     drift = running_median(values - best.periodic, max(len(values) // 4, 1))
     return _folded(values - drift, refined_period(values - drift, best.period), "")
 
 
-def _none(values: Floats, reason: str) -> PeriodicPart:
+def _no_cycle(values: Floats, reason: str) -> PeriodicPart:
     return PeriodicPart(0.0, np.zeros(len(values)), 0, 1.0, reason)
 
 
@@ -115,7 +115,7 @@ def _strongest_line(values: Floats) -> float | None:
     if length < FEWEST_CYCLES * _FEWEST_SAMPLES:
         return None
     spectrum = np.abs(np.fft.rfft(values * get_window("hann", length)))
-    # lines below ten cycles, and their skirts, are drift
+    # lines below ten cycles, and their side lobes, are drift
     spectrum[: FEWEST_CYCLES - 1] = 0.0
     spectrum[length // _FEWEST_SAMPLES :] = 0.0
     place = int(np.argmax(spectrum))
@@ -131,7 +131,7 @@ def _fundamental(values: Floats, line: float) -> PeriodicPart | None:
         if len(values) / period < FEWEST_CYCLES:
             break
         trial = _folded(values, period, "")
-        if best is None or trial.left < _LONGER_PAYS * best.left:
+        if best is None or trial.left < _LONGER_RATIO * best.left:
             best = trial
     return best
 
@@ -139,9 +139,9 @@ def _fundamental(values: Floats, line: float) -> PeriodicPart | None:
 def refined_period(values: Floats, period: float) -> float:
     """Return the period of a line from its phase, cycle by cycle.
 
-    The phase of the line against a clock of the trial period grows by a constant from cycle to cycle where the trial is
-    off; the median of the slopes between all pairs of cycles (Theil 1950, Sen 1968) corrects it and takes no notice of
-    a shock. The given period, in samples, is right to a fraction of a cycle over the signal.
+    With an inexact trial period, the phase of the line against a clock of this period grows by a constant in each
+    cycle. The median of the slopes between pairs of cycles (Theil 1950, Sen 1968) corrects the period, unaffected by a
+    shock. The given period, in samples, must be right to a fraction of a cycle over the signal.
 
     >>> samples = np.arange(5000)
     >>> round(refined_period(np.sin(2 * np.pi * samples / 123.4567), 124.0), 3)
@@ -154,12 +154,12 @@ def refined_period(values: Floats, period: float) -> float:
         count = len(values) // whole
         rotated = values[: count * whole] * np.exp(-2j * np.pi * np.arange(count * whole) / period)
         cycles = rotated.reshape(count, whole)
-        # two cycles under a Hann window: harmonics and the image of the line are at its zeros
+        # two cycles under a Hann window: harmonics and the image of the line fall on its zeros
         window = get_window("hann", 2 * whole)
         lines = cycles[:-1] @ window[:whole] + cycles[1:] @ window[whole:]
         phases = np.unwrap(np.angle(lines))
         centres = (np.arange(count - 1) + 1.0) * whole
-        # every cycle against the one half the record later: the slopes with most weight
+        # each cycle against the cycle half the record later: the slopes with most weight
         half = max(1, (count - 1) // 2)
         slopes = (phases[half:] - phases[:-half]) / (centres[half:] - centres[:-half])
         frequency = 1.0 / period + float(np.median(slopes)) / (2.0 * np.pi)
@@ -170,7 +170,7 @@ def refined_period(values: Floats, period: float) -> float:
 
 
 def fold(values: Floats, period: float) -> Floats:
-    """Return the cycles of a signal, shape (cycle, phase): linear between samples, the last part cycle left out."""
+    """Return the cycles of a signal, shape (cycle, phase): linear between samples, without the last partial cycle."""
     bins = max(2, round(period))
     count = int((len(values) - 1) / period)
     grid = (np.arange(count)[:, None] + np.arange(bins) / bins) * period
@@ -179,7 +179,7 @@ def fold(values: Floats, period: float) -> Floats:
 
 
 def unfold(waveform: Floats, period: float, length: int) -> Floats:
-    """Return a waveform of one cycle, repeated over a signal of so many samples."""
+    """Return a waveform of one cycle, repeated over a signal of this length (samples)."""
     bins = len(waveform)
     phase = (np.arange(length) / period) % 1.0 * bins
     repeated: Floats = np.interp(phase, np.arange(bins + 1), np.append(waveform, waveform[0]))
@@ -197,7 +197,7 @@ def _folded(values: Floats, period: float, reason: str) -> PeriodicPart:
 
 
 def _change_of_amplitude(values: Floats, cycle: PeriodicPart) -> float:
-    """Return how much the amplitude of the cycles changes from the first third to the last."""
+    """Return the relative change of the amplitude of the cycles from the first third to the last."""
     cycles = fold(values, cycle.period)
     waveform = np.median(cycles, axis=0)
     waveform = waveform - waveform.mean()
@@ -208,11 +208,11 @@ def _change_of_amplitude(values: Floats, cycle: PeriodicPart) -> float:
 
 
 def cycle_scores(residual: Floats, period: float, window: int) -> Floats:
-    """Return how far the short-window RMS is above what it is at the same phase in the other cycles.
+    """Return the excess of the short-window RMS over its values at the same phase in the other cycles.
 
-    A smooth shock is small against the signal and no larger than the irregular moments of every cycle; it is large
-    against what the same phase of other cycles shows. The score is (rms - median) / (1.4826 MAD), median and MAD over
-    the cycles at that phase, both smoothed over the window. The residual is the signal without its periodic part;
+    A smooth shock is small against the signal and no larger than the irregular parts of every cycle. It is large
+    against other cycles at the same phase. The score is (rms - median) / (1.4826 MAD), with median and MAD over the
+    cycles at that phase; the MAD is smoothed over the window. The residual is the signal without its periodic part;
     period and window are in samples.
     """
     rms = np.sqrt(_moving_mean(residual**2, window))

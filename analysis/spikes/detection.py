@@ -1,4 +1,4 @@
-"""Excursions of a signal past a threshold, and their groups: one spike with the ringing it caused.
+"""Excursions of a signal past a threshold, and their groups: one spike with the ringing that it caused.
 
 Thesis sections 5.2.2 and 5.2.5; equations (5.2) and (5.3).
 """
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Distance, in lengths of the main excursion, below which one less than half as high is its ringing. Contacts as close
-#: would fill a tenth of the time, four times what the rigid-impact model allows (thesis section 5.2.4).
+#: Distance, in lengths of the main excursion, below which an excursion less than half as high is its ringing. Contacts
+#: this close would fill a tenth of the time, four times the limit of the rigid-impact model (thesis section 5.2.4).
 RINGING_LENGTHS = 10.0
-#: Distance, in the same lengths, below which one of comparable height belongs to it; least ratio of such heights.
+#: Distance, in the same lengths, below which an excursion of comparable height is ringing; smallest comparable ratio.
 _AT_ONCE, _COMPARABLE = 2.0, 0.5
-#: Pause of ringing that beats, relative to the group's duration, and the height below which it is granted.
+#: Longest pause of beating ringing, relative to the group's duration, and the height below which it is allowed.
 _BEATS, _BEATS_BELOW = 0.5, 0.1
 
 
@@ -52,7 +52,7 @@ class Excursions:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Excursions that are one spike: numbers of the first, the largest and the last of them."""
+    """Excursions that form one spike: numbers of the first, the largest and the last of them."""
 
     first: int
     main: int
@@ -62,9 +62,9 @@ class Group:
 def find_excursions(time: Floats, statistic: Floats, threshold: float, hysteresis: float) -> Excursions:
     """Return the excursions past a threshold.
 
-    An excursion begins where the statistic rises past `threshold` and is over only where it has fallen below
-    `hysteresis * threshold`, so that noise on its flank does not split it. A change of sign ends it too. The statistic
-    is signed, its magnitude is compared; time is in s.
+    An excursion begins where the statistic rises past `threshold`. It ends where the statistic falls below
+    `hysteresis * threshold`, so that noise on its flank does not split it, or where the sign changes. The statistic is
+    signed, and its magnitude is compared; time is in s.
     """
     magnitude = np.abs(statistic)
     low = (magnitude > hysteresis * threshold) * np.where(statistic < 0.0, -1, 1)
@@ -95,7 +95,7 @@ def _crossings(
 
 
 def crossing(time: Floats, values: Floats, before: int, after: int, level: float) -> float:
-    """Return where the line between two neighbouring samples is at a level, s; an end of the record is its own.
+    """Return the time at which the line between two neighbouring samples crosses a level, s; record ends are crossings.
 
     >>> crossing(np.array([0.0, 1.0]), np.array([0.0, 4.0]), 0, 1, 1.0)
     0.25
@@ -112,12 +112,12 @@ def crossing(time: Floats, values: Floats, before: int, after: int, level: float
 def group_excursions(
     found: Excursions, time: Floats, merge: float | None, minimum_samples: int
 ) -> tuple[list[Group], int]:
-    """Return each spike with its ringing, and how many excursions have too few samples to be one.
+    """Return each spike with its ringing, and the number of excursions in groups with too few samples.
 
-    An excursion joins the group before it if it begins within `merge` (s) of the end of the last one in it. None: ten
-    lengths of the largest excursion in the group for those less than half as high, two for higher ones, and more for
-    small ones after long ringing. A group with fewer than `minimum_samples` above the threshold, over all its half
-    cycles, is no spike (thesis 5.3: four).
+    An excursion joins the group before it if it begins within `merge` (s) of the end of its last excursion. None means
+    ten lengths of the group's largest excursion if the new one is less than half as high, otherwise two. The distance
+    is longer for small excursions after long ringing. A group with fewer than `minimum_samples` above the threshold,
+    over all its half cycles, is no spike (thesis 5.3: four).
     """
     groups: list[Group] = []
     begins, ends = time[found.first], time[found.last]
@@ -134,7 +134,7 @@ def group_excursions(
 
 
 def _reach(found: Excursions, time: Floats, group: Group, place: int, merge: float | None) -> float:
-    """Return how long after a group an excursion still belongs to it, s."""
+    """Return the time after a group within which an excursion still belongs to it, s."""
     if merge is not None:
         return merge
     length = float(time[found.last[group.main]] - time[found.first[group.main]])

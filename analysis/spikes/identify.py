@@ -1,6 +1,6 @@
 """Identify the spikes of a channel: method, baseline, threshold, groups.
 
-`identify` does what thesis section 5.2 calls spike identification; all it decides is in what it returns.
+`identify` is the spike identification of thesis section 5.2; its result contains all its decisions.
 """
 
 from __future__ import annotations
@@ -37,44 +37,44 @@ Floats = NDArray[np.float64]
 METHODS = ("auto", "threshold", "cycle_median", "cycle_threshold")
 _THRESHOLD = Argument("method", "threshold")
 POLARITIES = {"both": 0, "positive": 1, "negative": -1}
-#: Windows of the RMS of a smooth shock in one cycle.
+#: Number of windows of the RMS of a smooth shock in one cycle.
 _RMS_WINDOWS_IN_CYCLE = 10
-#: Cycles in which a forced motion settles, at its start and after a shock.
+#: Number of cycles in which a forced motion settles, at its start and after a shock.
 _CYCLES_TO_SETTLE = 2.0
 #: Lowest threshold, relative to the largest value, for simulated signals, which have no noise.
 _SMALLEST_PART = 1e-3
-#: Longest spike assumed in the first look at the drift, as one over its share of the record.
-_FIRST_LOOK = 2000
+#: One over the assumed share of the record of the longest spike, in the first estimate of the drift.
+_FIRST_WINDOWS = 2000
 _FEWEST_SAMPLES = 16
-#: Height, relative to the noise, at which a person sees a spike, and how many samples of none may be as high: few, or
-#: so many times what normal noise has there.
+#: Height, relative to the noise, at which a person sees a spike. Number of samples without a spike that may be this
+#: high: a few, or this many times the number from normal noise.
 _SEEN_BY_EYE, _FEW, _MANY_TIMES = 4.5, 3, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class SpikeSettings:
-    """How spikes are to be found; None is: chosen from the data.
+    """Settings for finding spikes; None means chosen from the data.
 
     Attributes
     ----------
     method : {"auto", "threshold", "cycle_median", "cycle_threshold"}
-        `threshold`: the signal without its baseline against a threshold. `cycle_median`: the periodic part is removed
-        and the short-window RMS of the residual compared with the same phase of the other cycles.
-        `cycle_threshold`: the periodic part is removed, then as `threshold`.
+        `threshold`: the signal without its baseline is compared with a threshold. `cycle_median`: the periodic part is
+        removed, and the short-window RMS of the residual is compared with the same phase of the other cycles.
+        `cycle_threshold`: the periodic part is removed, then as for `threshold`.
     threshold : float or None
         SI unit of the channel; a robust score with `cycle_median`.
     threshold_part : float or None
-        The threshold as a part of the largest value instead.
+        The threshold as a share of the largest value instead.
     hysteresis : float
-        Lower threshold as a part of the threshold, 0 to 1.
+        Lower threshold as a share of the threshold, 0 to 1.
     minimum_samples : int
-        Fewer samples above the threshold are no spike (thesis section 5.3: four).
+        Number of samples above the threshold below which a group is no spike (thesis section 5.3: four).
     merge : float or None
-        Excursions closer than this are one spike, s; None: ten lengths of its main excursion; two cycles with
-        `cycle_median`, in which the motion settles again.
+        Distance of excursions, s, below which they form one spike. None: ten lengths of its main excursion; with
+        `cycle_median` two cycles, in which the motion settles again.
     polarity : {"both", "positive", "negative"}
     noise : float or None
-        Standard deviation of the noise, SI unit, taken for normal.
+        Standard deviation of the noise, SI unit; the noise is assumed normal.
     false_alarms : float
         Expected number of noise peaks above the threshold in the record.
     baseline_window : float or None
@@ -82,7 +82,7 @@ class SpikeSettings:
     rms_window : float or None
         s; None: a tenth of a cycle.
     period : float or None
-        Of the excitation, s.
+        Period of the excitation, s.
     """
 
     method: str = "auto"
@@ -99,7 +99,7 @@ class SpikeSettings:
     period: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be meant, all of it at once."""
+        """Raise UsageError with all impossible settings at once."""
         problems = [
             f"{name}: expected {rule}, got {got!r}." for name, rule, ok, got in self._rules() if not ok
         ]
@@ -128,19 +128,19 @@ class SpikeSettings:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """What was found in a channel, and how.
+    """The spikes of a channel, and the way they were found.
 
     Attributes
     ----------
     time, signal : ndarray of float, shape (sample,)
-        s; SI unit of the channel, bad samples bridged by straight lines.
+        s; SI unit of the channel, with straight lines across bad samples.
     bad : ndarray of bool, shape (sample,)
-        Samples with no value of their own.
+        Mask of the samples without a value of their own.
     clipped : ndarray of bool, shape (sample,)
     baseline, residual : ndarray of float, shape (sample,)
         Drift and periodic part; the signal without them.
     statistic : ndarray of float, shape (sample,)
-        What was compared with the threshold: the residual, or the robust score.
+        Values compared with the threshold: the residual, or the robust score.
     unit : str
         SI unit of the signal.
     method, reason : str
@@ -149,22 +149,22 @@ class Identification:
     noise : float
         Standard deviation of the residual at rest, SI unit.
     tail : Tail
-        Of the statistic.
+        Tail of the statistic.
     cycle : PeriodicPart
     excursions : Excursions
     groups : list of Group
     short : int
-        Excursions that had too few samples.
+        Number of excursions with too few samples.
     settled : float
-        s; what came before is the start of a periodic motion, not spikes.
+        s; earlier excursions belong to the start of a periodic motion, and are no spikes.
     baseline_window : int
-        Samples.
+        Window of the baseline, samples.
     settings : SpikeSettings
     interval : float
-        Sampling interval, s; the mean one, pauses left out.
+        Sampling interval, s; the mean interval without pauses.
     remarks : list of str
     doubts : list of str
-        What makes it unsure that these are the spikes, and all of them.
+        Reasons to doubt that these are the spikes, and all of them.
     """
 
     time: Floats
@@ -194,7 +194,7 @@ class Identification:
 
     @property
     def verdict(self) -> str:
-        """Whether the spikes found are to be relied on, in one line, and why not."""
+        """One line that says whether the spikes are reliable, and why not."""
         return f"not sure, because {'; '.join(self.doubts)}." if self.doubts else "sure."
 
 
@@ -209,7 +209,7 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
     Raises
     ------
     EstimationError
-        Too few good samples, or a periodic part is asked for and the samples are not even.
+        Too few good samples, or a periodic part is requested for uneven samples.
     """
     chosen = settings or SpikeSettings()
     signal, bad = _bridged(channel)
@@ -264,14 +264,14 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         chosen,
         interval,
         _remarks(channel, bad, step if noise < step else 0.0)
-        + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
-        _dead(signal[~bad])
+        + (_motion_remark(residual[~bad], interval) if method == "threshold" and noise else []),
+        _constant(signal[~bad])
         + (_missed(time, looked_at, noise, threshold, chosen) if method != "cycle_median" else []),
     )
 
 
 def _bridged(channel: Channel) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the values in SI units with straight lines over what is missing, and what is missing."""
+    """Return the values in SI units with straight lines across missing samples, and the mask of missing samples."""
     values = channel.si()
     bad = ~np.isfinite(values)
     if np.count_nonzero(~bad) < _FEWEST_SAMPLES:
@@ -286,7 +286,7 @@ def _bridged(channel: Channel) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[PeriodicPart, str, str]:
-    """Return the periodic part, the method and why it was chosen."""
+    """Return the periodic part, the method and the reason for its choice."""
     interval = channel.axis.interval
     if settings.method == "threshold":
         return PeriodicPart(0.0, np.zeros(len(signal)), 0, 1.0, "not looked for"), "threshold", "asked for"
@@ -320,13 +320,13 @@ def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[
 def _baseline(
     values: Floats, bad: NDArray[np.bool_], settings: SpikeSettings, interval: float
 ) -> tuple[Floats, int]:
-    """Return the drift and the window (samples) it was taken over, spikes left out."""
+    """Return the drift without spikes, and its window (samples)."""
     length = len(values)
     if settings.baseline_window is not None:
         window = min(length, max(2, round(settings.baseline_window / interval)))
         return running_median(values, window, ~bad), window
-    # the first look shows where the spikes are
-    first = running_median(values, drift_window(values, length // _FIRST_LOOK, ~bad), ~bad)
+    # the first estimate shows where the spikes are
+    first = running_median(values, drift_window(values, length // _FIRST_WINDOWS, ~bad), ~bad)
     rest, used = values - first, ~bad
     used[used] = outside_excursions(rest[used])
     found = find_excursions(
@@ -362,7 +362,7 @@ def _noise(
 
 
 def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity: int, least: float) -> float:
-    """Return the threshold asked for, or that of the noise and `least`."""
+    """Return the requested threshold, or that of the noise and `least`."""
     largest = float(np.max(np.abs(statistic) if polarity == 0 else polarity * statistic, initial=0.0))
     if settings.threshold is not None:
         return settings.threshold
@@ -374,10 +374,10 @@ def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity:
 def _after_start(
     groups: list[Group], found: Excursions, time: Floats, reach: float
 ) -> tuple[list[Group], float]:
-    """Return the spikes after the motion has settled, and when it had.
+    """Return the spikes after the motion has settled, and the time of settling.
 
-    A forced motion that does not begin in its own cycle approaches it; what stands out of the cycle's median within the
-    first two cycles, and all that follows it without a quiet cycle, is that approach.
+    A forced motion that starts outside its own cycle approaches the cycle. The first excursion within the first two
+    cycles is this approach, together with all that follow it without a quiet cycle.
     """
     begin = float(time[0])
     if groups and float(found.up[groups[0].first]) - begin < reach:
@@ -385,8 +385,8 @@ def _after_start(
     return groups, begin
 
 
-def _unrest(residual: Floats, interval: float) -> list[str]:
-    """Say so where the signal between the spikes is a motion, of which the threshold then speaks."""
+def _motion_remark(residual: Floats, interval: float) -> list[str]:
+    """Return a remark if the signal between the spikes is a motion, which the threshold then describes."""
     samples = samples_in_half_wave(residual)
     if samples < HALF_WAVE_OF_MOTION:
         return []
@@ -399,8 +399,8 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
     ]
 
 
-def _dead(values: Floats) -> list[str]:
-    """Return a doubt where a channel says nothing."""
+def _constant(values: Floats) -> list[str]:
+    """Return a doubt if a channel is constant."""
     if np.ptp(values) > 0.0:
         return []
     return [f"all {values.size} samples are {values[0]:.6g}: the channel is dead"]
@@ -409,12 +409,12 @@ def _dead(values: Floats) -> list[str]:
 def _missed(
     time: Floats, statistic: Floats, noise: float, threshold: float, settings: SpikeSettings
 ) -> list[str]:
-    """Return a doubt where more of the signal stands out of the noise than normal noise does, and is no spike."""
+    """Return a doubt if more samples stand out of the noise, below the threshold, than normal noise explains."""
     from scipy.special import ndtr
 
     level = _SEEN_BY_EYE * noise
-    asked = settings.threshold is not None or settings.threshold_part is not None
-    if asked or not 0.0 < level < threshold:
+    is_given = settings.threshold is not None or settings.threshold_part is not None
+    if is_given or not 0.0 < level < threshold:
         return []
     high = find_excursions(time, statistic, level, settings.hysteresis)
     groups, _ = group_excursions(high, time, settings.merge, 1)

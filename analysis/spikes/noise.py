@@ -1,16 +1,17 @@
-"""The threshold that noise alone passes a stated number of times in a record, whatever the tail of the noise.
+"""The threshold that noise alone passes a stated number of times in a record, for any tail of the noise.
 
 The peaks of noise above a high level follow a generalised Pareto law (Pickands 1975; Balkema and de Haan 1974):
 
     P(peak > level + y | peak > level) = (1 + shape y / scale)^(-1 / shape)
 
-Its shape is 0 for normal or exponential tails and 1 / nu for Student's t with nu degrees of freedom. Both numbers are
-estimated from the peaks of the record itself. Spikes are not part of the noise, so the fit starts from the lower
-peaks and takes in what the law so far explains, until nothing changes: noise is taken in to its last peak, spikes
-stay out behind the gap before them. Ringing after a spike leaves no such gap; but it raises all of a stretch, where an
-outlier of heavy-tailed noise raises one sample. Stretches whose median magnitude is far above that of the record
-are therefore left out: long ones, and short ones for the pulses and the ring of a load cell, which are over in a few
-milliseconds.
+Its shape is 0 for normal or exponential tails and 1 / nu for Student's t with nu degrees of freedom. Shape and scale
+are estimated from the peaks of the record itself. Spikes are not part of the noise. So the fit starts from the lower
+peaks and adds peaks that the present law explains, until nothing changes. All peaks of the noise are then included,
+and spikes stay excluded behind the gap before them.
+
+Ringing after a spike leaves no such gap. But it raises a whole stretch, while an outlier of heavy-tailed noise raises
+one sample. Stretches whose median magnitude is far above that of the record are therefore left out. There are long
+stretches, and short ones for the pulses and the ring of a load cell, which last a few milliseconds.
 """
 
 from __future__ import annotations
@@ -24,38 +25,38 @@ from vibroimpact.analysis.robust import robust_sigma
 
 Floats = NDArray[np.float64]
 
-#: Quantile above which peaks are the tail; of few peaks more are taken, at most the upper half.
+#: Quantile above which peaks form the tail; of few peaks more are used, at most the upper half.
 _TAIL_QUANTILE = 0.8
 _PEAKS_WANTED = 50
-#: Fewest peaks that make a tail; below, a normal one is assumed.
+#: Number of peaks below which a normal tail is assumed.
 _FEWEST_PEAKS = 20
-#: Share of the tail that the fit starts with: all of it is taken to be noise.
+#: Share of the tail with which the fit starts; all of it counts as noise.
 _FIRST_PART = 0.5
 _MOST_ROUNDS = 200
-#: Expected number, relative to a false alarm, below which a peak is left out of the noise: leaving out the largest
-#: peaks of heavy-tailed noise would make its tail look light.
-_GROWN = 0.01
-#: Stretches in which the record is searched for ringing, and fewest samples in one.
+#: Expected number of peaks, relative to false alarms, below which a peak is excluded from the noise. The number is
+#: small, since without its largest peaks heavy-tailed noise would seem to have a light tail.
+_EXPECTED_PEAKS = 0.01
+#: Number of stretches in which the record is searched for ringing, and smallest number of samples in one.
 _STRETCHES = 200
 _SHORTEST_STRETCH = 32
 _FEWEST_STRETCHES = 4
 #: Median magnitude, relative to that of the median stretch, above which a stretch rings. Noise alone, even Cauchy's in
 #: 32 samples, stays below.
-_RINGS = 3.0
-#: Half waves in a short stretch, and the same ratio for it: narrow-band noise, whose envelope is Rayleigh's, passes it
-#: once in 1e10 stretches.
+_RINGING = 3.0
+#: Number of half waves in a short stretch, and the same ratio for it. Narrow-band noise with a Rayleigh envelope
+#: exceeds this ratio once in 1e10 stretches.
 _HALF_WAVES = 20
-_RINGS_SHORTLY = 6.0
-#: Magnitude, relative to the noise, of samples that stand out, and how many as near make an excursion that is no noise.
+_SHORT_RINGING = 6.0
+#: Magnitude, relative to the noise, of high samples; number of near ones that form an excursion beyond noise.
 STANDS_OUT = 4.0
 _AS_A_SPIKE = 4
 _HALF_CYCLE = 8
 #: Mean samples between two changes of sign above which a signal is a motion and no noise; its peaks are no spikes.
 HALF_WAVE_OF_MOTION = 12.0
-#: RMS over so many samples, relative to the noise, down to which an excursion is not over.
+#: RMS relative to the noise, over this number of samples, above which an excursion continues.
 _LOUD, _LOUD_SAMPLES = 1.5, 16
-_MOST_LOOKS = 20
-#: Share of the samples below which a record has no rest to take its noise from.
+_MOST_PASSES = 20
+#: Share of quiet samples below which all samples count as quiet: the record is never at rest.
 _LEAST_OUTSIDE = 0.5
 #: Largest threshold relative to the largest peak of the noise: a hundred times rarer, with Student's t of 3 degrees.
 _MOST_BEYOND = 5.0
@@ -63,7 +64,7 @@ _MOST_BEYOND = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """The noise of a record and the threshold that follows from it.
+    """The noise of a record and the threshold derived from it.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class Tail:
     shape : float
         Shape of the tail, with one standard error added where it is positive.
     threshold : float
-        What noise passes `false_alarms` times in a record like this.
+        Level that noise passes `false_alarms` times in a record of this kind.
     """
 
     sigma: float
@@ -96,7 +97,7 @@ def half_wave_peaks(values: Floats) -> Floats:
 
 
 def _peaks_of_one_sign(values: Floats) -> Floats:
-    """Return the largest value in each stretch of values above 0."""
+    """Return the largest value in each stretch of positive values."""
     positive = values > 0.0
     starts = np.flatnonzero(positive & ~np.append(False, positive[:-1]))
     if not starts.size:
@@ -106,28 +107,28 @@ def _peaks_of_one_sign(values: Floats) -> Floats:
 
 
 def samples_in_half_wave(values: Floats) -> float:
-    """Return the mean length, in samples, of the stretches of one sign where a signal is quiet."""
+    """Return the mean length, in samples, of the stretches of one sign in the quiet parts of a signal."""
     rest = values[at_rest(values)]
     return len(rest) / max(1, half_wave_peaks(rest).size)
 
 
 def at_rest(values: Floats) -> NDArray[np.bool_]:
-    """Return which samples lie outside excursions, and in stretches that do not ring."""
+    """Return a mask of the samples outside excursions, in stretches that do not ring."""
     rest = outside_excursions(values)
     rest[rest] = quiet(values[rest])
     return rest
 
 
 def quiet(values: Floats) -> NDArray[np.bool_]:
-    """Return which samples lie in stretches that do not ring; the values are without their baseline."""
+    """Return a mask of the samples in stretches that do not ring; the values are without their baseline."""
     long = max(_SHORTEST_STRETCH, len(values) // _STRETCHES)
     short = max(_SHORTEST_STRETCH, _HALF_WAVES * len(values) // max(1, half_wave_peaks(values).size))
-    still = _still(values, long, _RINGS)
-    return still & _still(values, short, _RINGS_SHORTLY) if short < long else still
+    still = _still(values, long, _RINGING)
+    return still & _still(values, short, _SHORT_RINGING) if short < long else still
 
 
 def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
-    """Return which samples are neither in nor beside a stretch whose median magnitude is far above the usual."""
+    """Return a mask of samples neither in nor next to a stretch with a median magnitude far above the usual."""
     length = len(values)
     count = length // stretch
     if count < _FEWEST_STRETCHES:
@@ -135,19 +136,19 @@ def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
     magnitudes = np.abs(values[: count * stretch]).reshape(count, stretch)
     medians = np.median(magnitudes, axis=1)
     rings = medians > ratio * np.median(medians)
-    # ringing begins and ends somewhere in the stretches beside
+    # ringing begins and ends somewhere in the neighbouring stretches
     still = ~(rings | np.append(rings[1:], False) | np.append(False, rings[:-1]))
     place = np.minimum(np.arange(length) // stretch, count - 1)
     return np.asarray(still[place])
 
 
 def outside_excursions(values: Floats) -> NDArray[np.bool_]:
-    """Return which samples, without their baseline, are noise, and no part of an excursion that is as long as a spike.
+    """Return a mask of the samples, without their baseline, that lie in no excursion as long as a spike.
 
-    Excursions of fewer samples are left: they are the tail of the noise.
+    Shorter excursions are kept: they are the tail of the noise.
     """
     outside = np.ones(len(values), dtype=bool)
-    for _ in range(_MOST_LOOKS):
+    for _ in range(_MOST_PASSES):
         sigma = robust_sigma(values[outside])
         found = ~_long_excursions(values, sigma) if sigma > 0.0 else outside
         if np.count_nonzero(found) < _LEAST_OUTSIDE * len(values):
@@ -160,7 +161,7 @@ def outside_excursions(values: Floats) -> NDArray[np.bool_]:
 
 
 def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
-    """Return which samples lie in excursions as long as a spike, or beside one where the signal is still loud."""
+    """Return a mask of the samples in excursions as long as a spike, or next to one where the signal is still loud."""
     high = np.flatnonzero(np.abs(values) > STANDS_OUT * sigma)
     found = np.zeros(len(values), dtype=bool)
     half_wave = len(values) / max(1, half_wave_peaks(values).size)
@@ -170,8 +171,8 @@ def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
     # half cycles of ringing are one excursion
     for part in np.split(high, np.flatnonzero(np.diff(high) > _HALF_CYCLE) + 1):
         if part.size >= fewest:
-            beside = int(part[-1] - part[0]) + 1
-            found[max(0, part[0] - beside) : part[-1] + 1 + beside] = True
+            margin = int(part[-1] - part[0]) + 1
+            found[max(0, part[0] - margin) : part[-1] + 1 + margin] = True
     power = np.convolve(values**2, np.full(_LOUD_SAMPLES, 1.0 / _LOUD_SAMPLES), "same")
     loud = found | (power > (_LOUD * sigma) ** 2)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], loud, [False])).astype(np.int8)))
@@ -182,22 +183,22 @@ def _long_excursions(values: Floats, sigma: float) -> NDArray[np.bool_]:
 
 
 def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Tail:
-    """Return the threshold that noise passes `false_alarms` times a record, from the record itself.
+    """Return the threshold that noise passes `false_alarms` times a record, estimated from the record itself.
 
-    The values are without their baseline; a polarity of 1 or -1 looks at peaks of one sign only, 0 at both.
+    The values are without their baseline; a polarity of 1 or -1 uses peaks of one sign only, 0 of both.
     """
     from scipy.special import ndtri
 
     values = values[at_rest(values)]
     sigma = robust_sigma(values)
     if sigma == 0.0:
-        # a signal that is constant but for its spikes has no noise
+        # a signal that is constant except for its spikes has no noise
         return Tail(0.0, 0.0, 0.0)
     signed = values * polarity if polarity else values
     peaks = half_wave_peaks(signed) if not polarity else _peaks_of_one_sign(signed)
     part = float(np.clip(1.0 - _PEAKS_WANTED / max(peaks.size, 1), 0.5, _TAIL_QUANTILE))
     level = float(np.quantile(peaks, part)) if peaks.size else 0.0
-    # of normal noise the squares fall exponentially: their shape is 0
+    # the squares of normal noise fall exponentially: their shape is 0
     excesses = np.sort(peaks[peaks > level] ** 2 - level**2)
     if excesses.size < _FEWEST_PEAKS:
         normal = -float(ndtri(min(0.5, false_alarms / (2.0 * max(1, len(values))))))
@@ -208,10 +209,10 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
 
 
 def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float]:
-    """Return shape and threshold above the level, of the peaks that are noise."""
+    """Return shape and height above the level that noise exceeds `false_alarms` times, from the noise peaks alone."""
     count = max(_FEWEST_PEAKS // 2, int(_FIRST_PART * excesses.size))
     for _ in range(_MOST_ROUNDS):
-        height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_GROWN * false_alarms))
+        height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_EXPECTED_PEAKS * false_alarms))
         grown = int(np.searchsorted(excesses, height, side="right"))
         if grown <= count:
             break
@@ -230,8 +231,8 @@ def _exceeded(shape: float, scale: float, ratio: float) -> float:
 def _pareto(excesses: Floats, errors: float) -> tuple[float, float]:
     """Return shape and scale from probability-weighted moments (Hosking and Wallis 1987).
 
-    A shape below 0 would claim that the noise has an end; 0 is kept then, with the mean as scale. To the shape
-    `errors` of its standard errors are added: too high a threshold misses a weak spike, too low a one invents spikes.
+    A shape below 0 would mean that the noise is bounded; it becomes 0, with the mean as scale. `errors` standard errors
+    are added to the shape: too high a threshold misses a weak spike, too low a one invents spikes.
     """
     count = excesses.size
     mean = float(excesses.mean())

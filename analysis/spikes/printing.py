@@ -1,4 +1,4 @@
-"""What was found about spikes, as tables and sentences."""
+"""The report on spikes as printed tables and sentences."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
-#: Most spikes printed; all of them are in the dataset.
+#: Largest number of spikes printed; the dataset has all of them.
 _MOST_ROWS = 12
 
 
 def print_spikes(console: Terminal, report: SpikeReport) -> None:
-    """Print how spikes were found, each spike, and what they say of the contact.
+    """Print the method, each spike, and the contact quantities.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def print_spikes(console: Terminal, report: SpikeReport) -> None:
 
 
 def _words(report: SpikeReport) -> list[str]:
-    """Return what a reader must know before any number."""
+    """Return the remarks that a reader needs before the numbers."""
     data, found = report.dataset, report.found
     lines = list(found.remarks)
     if int(data["spikes_cut_off"]):
@@ -67,14 +67,14 @@ def _settings(report: SpikeReport) -> Table:
     shown = "" if unit == "1" else f" {written_unit(unit)}"
     own = "" if found.unit == "1" else f" {written_unit(found.unit)}"
     chosen = found.settings
-    asked = chosen.threshold is not None or chosen.threshold_part is not None
-    why = "asked for" if asked else f"noise passes it {chosen.false_alarms:g} times in such a record"
+    is_given = chosen.threshold is not None or chosen.threshold_part is not None
+    why = "asked for" if is_given else f"noise passes it {chosen.false_alarms:g} times in such a record"
     rows = table("Identification", "<how", "<value", "<why")
     rows.add_row("method", found.method, found.reason)
     if found.cycle.found:
         period = found.cycle.period * found.interval
-        doubt = float(data.attrs["interval_uncertainty"])
-        within = f" ± {doubt:.1%}" if doubt else ""
+        uncertainty = float(data.attrs["interval_uncertainty"])
+        within = f" ± {uncertainty:.1%}" if uncertainty else ""
         rows.add_row("excitation", f"{1.0 / period:.6g} Hz{within}", f"{found.cycle.count} cycles")
     rows.add_row("threshold", f"{found.threshold:.4g}{shown}", why)
     rows.add_row("over at", f"{found.lower_threshold:.4g}{shown}", f"hysteresis {chosen.hysteresis:g}")
@@ -109,7 +109,7 @@ def _spikes(data: xr.Dataset, shown: list[xr.Dataset]) -> Table:
 
 
 def _contacts(data: xr.Dataset, shown: list[xr.Dataset]) -> Table:
-    """Return how long each spike lasts, and its sum above the threshold, which depends on the threshold."""
+    """Return the table of the lengths of spikes, and of their sums above the threshold, which depend on it."""
     heads = (">time (s)", ">foot to foot (ms)", ">above (ms)")
     sums = f">sum above ({written_unit(str(data['spike_impulse'].attrs['units']))})"
     rows = (
@@ -125,7 +125,7 @@ def _contacts(data: xr.Dataset, shown: list[xr.Dataset]) -> Table:
 
 
 def _waveforms(data: xr.Dataset) -> Table:
-    """Return how well each curve fits."""
+    """Return the table of the goodness of fit of each curve."""
     rows = table("Waveform", "<curve", ">goodness", ">length (ms)", "<chosen")
     for name in data["waveform"].values:
         fit = data.sel(waveform=name)

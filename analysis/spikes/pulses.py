@@ -1,4 +1,4 @@
-"""What a spike carries: its peak between the samples, its impulse down to the baseline, its duration.
+"""The pulses of spikes: peak between the samples, impulse down to the baseline, duration.
 
 Thesis sections 5.2.1 and 5.3, equations (5.3) and (5.4). Every quantity of a spike belongs to the largest excursion
 of its group; the ringing after it is no contact.
@@ -21,10 +21,10 @@ Floats = NDArray[np.float64]
 
 #: Foot of a pulse, relative to its peak.
 FOOT = 0.05
-#: Standard deviations of the noise below which no foot is looked for.
+#: Standard deviations of the noise below which no foot is searched.
 _FOOT_NOISE = 3.0
-#: Samples on each side of a peak that its band-limited reading takes in, and points it gives between two samples.
-_SAMPLES_BESIDE = 32
+#: Samples on each side of a peak in its band-limited interpolation, and interpolated points between two samples.
+_SAMPLES_OUTSIDE = 32
 _POINTS_BETWEEN = 16
 
 
@@ -40,25 +40,25 @@ class Pulses:
     duration : ndarray of float
         Time above the threshold, s.
     length : ndarray of float
-        Between the feet, s.
+        Time between the feet, s.
     peak, peak_error : ndarray of float
         Band-limited peak, signed, and its error: noise and resampling.
     sampled_peak : ndarray of float
         The largest sample.
     deficit : ndarray of float
-        Most that the largest sample can fall short of the peak of a half-sine as long as this one.
+        Largest possible shortfall of the largest sample from the peak of a half-sine of this length.
     impulse, impulse_error : ndarray of float
-        Down to the baseline; unit times s.
+        Impulse down to the baseline, and its error; unit times s.
     impulse_above : ndarray of float
-        Only while above the threshold, as thesis section 5.3 does; it depends on the threshold.
+        Impulse only while above the threshold, as in thesis section 5.3; it depends on the threshold.
     excursions : ndarray of int
-        How often the threshold was passed, ringing included.
+        Number of passes of the threshold, ringing included.
     complete : ndarray of bool
-        Both feet are within the record.
+        Whether both feet are within the record.
     clipped : ndarray of bool
-        A sample of it is clipped or missing.
+        Whether a sample of the pulse is clipped or missing.
     waveform : str
-        The curve that fits the pulses best, by which the impulse was extended to the baseline.
+        The curve that fits the pulses best; it extends the impulse to the baseline.
     fits : dict of WaveformFit
     """
 
@@ -98,25 +98,25 @@ class _Pulse:
 
 
 def measure_pulses(found: Identification, foot: float = FOOT, waveform: str = "auto") -> Pulses:
-    """Measure the pulses of all spikes found.
+    """Return the pulses of all spikes found, measured.
 
-    The impulse is integrated from foot to foot, where the pulse has fallen to 5 % of its peak (or to three
-    standard deviations of the noise), and divided by the part of the whole that the best waveform has between these:
-    .9987 of a half-sine, .9952 of a haversine, .9856 of a bell. So it does not depend on the threshold, and neither
-    ringing nor drift far from the pulse enters it.
+    The impulse is integrated between the feet, where the pulse has fallen to 5 % of its peak (or to three standard
+    deviations of the noise). It is divided by the share of the best waveform between these levels: .9987 for a
+    half-sine, .9952 for a haversine, .9856 for a bell. So it does not depend on the threshold, and neither ringing
+    nor drift far from the pulse contributes.
 
     Parameters
     ----------
     found : Identification
     foot : float
-        Part of the peak, 0 to 0.5.
+        Level of the feet as a share of the peak, 0 to 0.5.
     waveform : {"auto", "half_sine", "haversine", "bell"}
-        By which the impulse below the feet is estimated.
+        Waveform for the impulse below the feet.
 
     Raises
     ------
     UsageError
-        `foot` or `waveform` is none of these.
+        `foot` or `waveform` is out of range.
     """
     if not 0.0 < foot <= 0.5:
         raise UsageError(f"foot: expected 0 < foot <= 0.5, got {foot!r}.")
@@ -161,15 +161,15 @@ def _cut_out(found: Identification, excursion: int, foot: float) -> _Pulse:
     sign = -1.0 if found.residual[top] < 0.0 else 1.0
     peak = float(sign * found.residual[top])
     level = min(0.5 * peak, max(foot * peak, _FOOT_NOISE * found.noise))
-    begin = _walk_down(found.residual, top, sign, level, -1)
-    end = _walk_down(found.residual, top, sign, level, 1)
+    begin = _foot_index(found.residual, top, sign, level, -1)
+    end = _foot_index(found.residual, top, sign, level, 1)
     time, values = _stretch(found, sign, begin, end, level)
     complete = begin >= 0 and end < len(found.time)
     return _Pulse(time, values, sign, level / peak if peak > 0.0 else 1.0, top, complete)
 
 
-def _walk_down(residual: Floats, top: int, sign: float, level: float, direction: int) -> int:
-    """Return the first sample beside a peak that is not above a level; just outside the record if there is none."""
+def _foot_index(residual: Floats, top: int, sign: float, level: float, direction: int) -> int:
+    """Return the first sample next to a peak that is not above a level; just outside the record if there is none."""
     reach = 64
     while True:
         part = (
@@ -204,7 +204,7 @@ def _measured(found: Identification, number: int, pulse: _Pulse, waveform: str) 
     half_sine = max(interval, 0.5 * length / float(WAVEFORMS["half_sine"].half_width(level)[0]))
     sampled = float(pulse.sign * found.residual[pulse.top])
     peak, peak_time = _band_limited(found, pulse)
-    # a half-sine falls short of its peak by 1 - cos(pi interval / (2 length)) at worst
+    # a half-sine exceeds its largest sample by at most 1 - cos(pi interval / (2 length))
     deficit = sampled * float(1.0 - np.cos(0.5 * np.pi * interval / half_sine))
     impulse, impulse_error = _impulse(found, pulse, waveform)
     touched = slice(*np.searchsorted(found.time, pulse.time[[0, -1]]))
@@ -226,14 +226,14 @@ def _measured(found: Identification, number: int, pulse: _Pulse, waveform: str) 
 
 
 def _impulse(found: Identification, pulse: _Pulse, waveform: str) -> tuple[float, float]:
-    """Return the impulse down to the baseline and its error: of noise, and half of what the waveforms differ by."""
+    """Return the impulse down to the baseline, and its error from the noise and half the range of the waveforms."""
     between = float(np.trapezoid(pulse.values, pulse.time))
     level = np.array([pulse.level])
     parts = {name: float(each.part_above(level)[0]) for name, each in WAVEFORMS.items()}
-    doubt = 0.5 * between * (1.0 / min(parts.values()) - 1.0 / max(parts.values()))
+    waveform_error = 0.5 * between * (1.0 / min(parts.values()) - 1.0 / max(parts.values()))
     length = max(found.interval, float(pulse.time[-1] - pulse.time[0]))
     noise = found.noise * float(np.sqrt(found.interval * length))
-    return between / parts[waveform], float(np.hypot(noise, doubt))
+    return between / parts[waveform], float(np.hypot(noise, waveform_error))
 
 
 def _impulse_between(found: Identification, sign: float, begin: float, end: float) -> float:
@@ -248,14 +248,14 @@ def _impulse_between(found: Identification, sign: float, begin: float, end: floa
 def _band_limited(found: Identification, pulse: _Pulse) -> tuple[float, float]:
     """Return the peak between the samples and its instant, s.
 
-    The samples about the peak, up to a pause of the record, without the line through the ends, are one period of a
-    band-limited function; it is read at sixteen points between samples. Samples of a clipped peak know nothing of what
-    is between them.
+    The samples about the peak, up to a pause of the record, lose the line through their ends. They are then one period
+    of a band-limited function, which is evaluated at sixteen points between samples. A clipped peak is not
+    interpolated: its samples do not determine the motion between them.
     """
     from scipy.signal import resample
 
     top = pulse.top
-    first, stop = max(0, top - _SAMPLES_BESIDE), min(len(found.time), top + _SAMPLES_BESIDE + 1)
+    first, stop = max(0, top - _SAMPLES_OUTSIDE), min(len(found.time), top + _SAMPLES_OUTSIDE + 1)
     pauses = first + 1 + np.flatnonzero(np.diff(found.time[first:stop]) > PAUSE * found.interval)
     first, stop = max([first, *pauses[pauses <= top]]), min([stop, *pauses[pauses > top]])
     part = pulse.sign * found.residual[first:stop]

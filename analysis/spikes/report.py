@@ -1,4 +1,4 @@
-"""What was found about the spikes of a channel, as one dataset."""
+"""The report on the spikes of a channel, as one dataset."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _IMPULSE_UNITS = {"m s-2": "m s-1", "1": "s", "m": "m s", "m s-1": "m"}
 
 @dataclass(frozen=True, slots=True)
 class Mechanics:
-    """What turns a signal into forces and velocities; None is: not known.
+    """Numbers that turn a signal into forces and velocities; None means unknown.
 
     Attributes
     ----------
@@ -34,13 +34,13 @@ class Mechanics:
         Effective mass of the contact, kg.
     restitution : float or None
     sensitivity : float or None
-        Of the load cell, V/N; that of its scene, for a simulated one.
+        Sensitivity of the load cell, V/N; that of its scene, for a simulated one.
     known_impulses : ndarray of float or None
-        N s, one for each spike: the sensitivity is fitted.
+        N s, one for each spike: the sensitivity is fitted to them.
     foot : float
-        Part of the peak down to which a pulse is integrated.
+        Share of the peak down to which a pulse is integrated.
     waveform : str
-        By which the impulse below that is estimated, or "auto".
+        Waveform for the impulse below that level, or "auto".
     """
 
     mass: float | None = None
@@ -53,7 +53,7 @@ class Mechanics:
 
 @dataclass(frozen=True, slots=True)
 class SpikeReport:
-    """Spikes of one channel: how they were found, what they carry, and the dataset that says both."""
+    """Spikes of one channel: their identification, their pulses, and the dataset of both."""
 
     found: Identification
     pulses: Pulses
@@ -105,7 +105,7 @@ def spike_report(
 
 
 def unobserved(report: SpikeReport) -> tuple[tuple[float, float], ...]:
-    """Return the spans (s) without samples in which a spike would not have been seen: longer than half a pulse."""
+    """Return the spans (s) without samples that could hide a spike: longer than half a pulse."""
     found = report.found
     edges = np.diff(np.concatenate(([False], found.bad, [False])).astype(np.int8))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
@@ -127,7 +127,7 @@ def in_newtons(channel: Channel, sensitivity: float) -> Channel:
     Raises
     ------
     UsageError
-        The sensitivity is not more than 0.
+        The sensitivity is not above 0.
     """
     if not sensitivity > 0.0:
         raise UsageError(f"sensitivity: expected more than 0 V/N, got {sensitivity!r}.")
@@ -190,7 +190,7 @@ def _columns(
 
 
 def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floats] | None:
-    """Return velocities before impact and their errors, where mass and restitution say enough."""
+    """Return velocities before impact and their errors, if mass and restitution are known."""
     if known.restitution is None:
         if known.mass is not None:
             raise UsageError(
@@ -221,23 +221,23 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
 
 
 def _fits(found: Identification, pulses: Pulses) -> Rows:
-    """Return what the fitted curves are, by curve and spike."""
+    """Return the parameters of the fitted curves, by curve and spike."""
     kept = pulses.complete
-    wanted = {
+    fields = {
         "peak": (found.unit, "peak of the fitted curve"),
         "length": ("s", "length of the fitted curve; its standard deviation for a bell"),
         "middle": ("s", "middle of the fitted curve"),
         "goodness": ("1", "part of the variance within the pulse that the curve explains"),
     }
     rows: dict[str, Row] = {}
-    for field, (unit, words) in wanted.items():
+    for field, (unit, words) in fields.items():
         values = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
         rows[f"spike_fit_{field}"] = (("waveform", "spike"), values, unit, words)
     return rows
 
 
 def _scalars(found: Identification, pulses: Pulses, calibration: Calibration | None) -> Rows:
-    """Return what is said of the whole record."""
+    """Return the variables of the whole record."""
     unit = "1" if found.method == "cycle_median" else found.unit
     kept = pulses.complete
     cut_off, window = float(np.count_nonzero(~kept)), found.baseline_window * found.interval
@@ -273,7 +273,7 @@ def _scalars(found: Identification, pulses: Pulses, calibration: Calibration | N
 def _attributes(
     channel: Channel, found: Identification, pulses: Pulses, known: Mechanics
 ) -> dict[str, str | float | int]:
-    """Return what is said in words, and every setting that numbers came from."""
+    """Return the attributes: verdict and remarks in words, and every setting."""
     settings = found.settings
     attributes: dict[str, str | float | int | None] = {
         "results_kind": "spikes",

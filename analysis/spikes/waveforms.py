@@ -2,9 +2,9 @@
 
 Thesis section 5.3.1; a is the peak, u the time from the middle of the pulse:
 
-    half-sine   a cos(pi u / length)        for |u| < length / 2
-    haversine   a cos^2(pi u / length)      for |u| < length / 2
-    bell        a exp(-u^2 / (2 length^2))  for all u, whose limit of short length is Dirac's function
+    half-sine   a cos(pi u / length)        for |u| < length / 2.
+    haversine   a cos^2(pi u / length)      for |u| < length / 2.
+    bell        a exp(-u^2 / (2 length^2))  for all u, whose limit of short length is Dirac's function.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ class Waveform:
     """A curve of unit peak and unit length, and its integrals."""
 
     value: Callable[[Floats], Floats]
-    """Of the time from its middle in units of its length."""
+    """Value as a function of the time from its middle, in units of its length."""
     slope: Callable[[Floats], Floats]
     """Its derivative."""
     half_width: Callable[[Floats], Floats]
-    """Half of its width at a level (part of the peak), in units of its length."""
+    """Half of its width at a level (share of the peak), in units of its length."""
     part_above: Callable[[Floats], Floats]
-    """Part of its impulse between its two crossings of a level, the part below the level included."""
+    """Share of its impulse between its two crossings of a level, the part below the level included."""
     impulse: float
     """Whole impulse over peak times length."""
 
@@ -87,7 +87,7 @@ class WaveformFit:
     Attributes
     ----------
     peak, middle, length : ndarray of float, shape (spike,)
-        SI unit, s, s; NaN for a pulse of fewer samples than its three unknowns ask for.
+        SI unit, s, s; NaN for a pulse with too few samples for three unknowns.
     goodness : ndarray of float, shape (spike,)
         1 - (squares of the residual) / (squares about the mean) within the pulse.
     squares : ndarray of float, shape (spike,)
@@ -104,8 +104,8 @@ class WaveformFit:
 def fit_waveforms(pulses: list[tuple[Floats, Floats]], levels: Floats) -> dict[str, WaveformFit]:
     """Fit each curve to each pulse by least squares.
 
-    All pulses are fitted at once: each is read at 33 instants, and Gauss and Newton's step is one solution of 3 by 3
-    systems. A pulse has instants (s) and values, from its crossing of the level, a part of the peak, to the next one.
+    All pulses are fitted at once: each is read at 33 instants, and a Gauss-Newton step is one solution of 3 by 3
+    systems. A pulse has instants (s) and values, from one crossing of its level (a share of the peak) to the next.
     """
     if not pulses:
         empty = np.zeros(0)
@@ -162,14 +162,14 @@ def _fit(
 
 
 def _step(waveform: Waveform, place: Floats, values: Floats, state: Floats) -> Floats:
-    """Return Gauss and Newton's step for each pulse, shape (spike, 3)."""
+    """Return the Gauss-Newton step for each pulse, shape (spike, 3)."""
     peak, middle, length = (state[:, [column]] for column in range(3))
     time = (place - middle) / length
     value, slope = waveform.value(time), waveform.slope(time)
     gradient = np.stack([value, -peak * slope / length, -peak * slope * time / length], axis=2)
     normal = np.einsum("spi,spj->sij", gradient, gradient)
     size = np.trace(normal, axis1=1, axis2=2)
-    # a curve that has left its pulse has no gradient, and takes no step
+    # a curve outside its pulse has no gradient, and takes no step
     normal += 1e-9 * np.eye(3) * np.where(size > 0.0, size, 1.0)[:, None, None]
     right = np.einsum("spi,sp->si", gradient, values - peak * value)
     step: Floats = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
@@ -185,7 +185,7 @@ def _squares(waveform: Waveform, place: Floats, values: Floats, state: Floats) -
 def chosen_waveform(fits: dict[str, WaveformFit]) -> str:
     """Return the curve with the smallest residual over all pulses; all contacts of a record are of one kind.
 
-    Each has three unknowns, so that the smallest sum of squares is the choice of any information criterion too.
+    Each curve has three unknowns, so the smallest sum of squares is also the choice of any information criterion.
     """
     left = {name: float(np.nansum(fit.squares)) for name, fit in fits.items()}
     return min(left, key=lambda name: left[name])

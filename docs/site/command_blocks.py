@@ -1,4 +1,4 @@
-"""Blocks of commands and of sentences wrap on the site; tables that a command prints keep their lines, and scroll."""
+"""Blocks of commands and of sentences wrap on the site; printed tables keep their lines, and scroll."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import re
 from typing import Any
 
 CLASS = "commands"
-"""Class of blocks that hold commands or sentences alone. `static/site.css` wraps them."""
+"""Class of blocks that hold only commands or sentences. `static/site.css` wraps them."""
 PRINTED = "printed"
 """Class of all other blocks without a language, such as tables. `static/site.css` writes them small."""
 _NO_LANGUAGE = ("", "none", "default", "text")
-# Two blanks within a line, or a ruled line, stand between columns; an indented line hangs below another.
+# Two blanks within a line, or a ruled line, separate columns; an indented line continues the line above.
 _COLUMN = re.compile(r"\S {2,}\S|[─│]|^\s")
-# A command begins a line; the lines that continue it are indented, or the line before them ends with a backslash.
+# A command starts a line; its continuation lines are indented, or follow a line that ends with a backslash.
 _COMMAND = re.compile(r"(vibroimpact|pip|pip3|python|make|git|pytest|docker|curl|cd|export) \S")
 
 
@@ -23,7 +23,7 @@ def setup(sphinx: Any) -> dict[str, bool]:
 
 
 def is_commands(text: str) -> bool:
-    """Return whether a block holds commands alone.
+    """Return whether a block holds only commands.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def is_commands(text: str) -> bool:
 
 
 def is_sentences(text: str) -> bool:
-    """Return whether a block holds messages alone, each of which is a line without columns.
+    """Return whether a block holds only messages, each of them a line without columns.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The directive `command-reference`: every command with its arguments and options, as the program itself knows them."""
+"""The directive `command-reference`: every command with its arguments and options, from the program itself."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CommandReference(SphinxDirective):
 
 
 def commands() -> Iterator[tuple[Any, Any]]:
-    """Yield each command that does something, with the context that knows its whole name."""
+    """Yield each command that does something, with the context of its whole name."""
     load_commands()
     yield from _below(typer.main.get_command(app), None, "vibroimpact")
 
@@ -47,7 +47,7 @@ def _below(command: Any, parent: Any, name: str) -> Iterator[tuple[Any, Any]]:
 
 
 def _described(command: Any, context: Any) -> str:
-    # typer names the context's path with the arguments of groups; ours have none
+    # typer adds the arguments of groups to the context's path; the groups here have none
     lines = [f"## `{context.command_path}`", ""]
     for paragraph in (command.help or "").split("\n\n"):
         if paragraph.startswith(_EXAMPLE):
@@ -63,7 +63,7 @@ def _described(command: Any, context: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return text in one line, in which Markdown finds nothing to format but code."""
+    """Return text in one line, escaped so that Markdown formats nothing but code."""
     parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
     return "".join(
         part if part.startswith("`") else re.sub(r"([\\*_<>\[\]|#])", r"\\\1", part) for part in parts

@@ -1,6 +1,6 @@
-"""Draw the icons of the FMUs: `python docs/site/component_icons.py` writes icon.png beside each component's C file.
+"""Draw the icons of the FMUs: `python docs/site/component_icons.py` writes icon.png next to each component's C file.
 
-A tool shows them on the blocks of a diagram: some thick lines on white, that are read at 40 pixels too.
+A tool shows an icon on the block of a diagram: a few thick lines on white, readable at 40 pixels too.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def mass(axes: Axes, left: float, low: float, size: float) -> None:
 
 
 def stop(axes: Axes, x: float, y: float) -> None:
-    """Draw a stop that is met from the left: a nose before a wall."""
+    """Draw a stop that is hit from the left: a nose before a wall."""
     axes.add_patch(Rectangle((x - 0.9, y - 0.5), 0.9, 1.0, facecolor=RED, edgecolor=RED))
     wall(axes, x, y - 2.2, y + 2.2, 1, RED)
 
 
 def oscillator(axes: Axes) -> None:
-    """A mass on a spring before a stop."""
+    """Draw a mass on a spring before a stop."""
     wall(axes, 0.9, 2.0, 8.0, -1)
     spring(axes, 0.9, 4.0, 5.0)
     mass(axes, 4.0, 3.7, 2.6)
@@ -56,7 +56,7 @@ def oscillator(axes: Axes) -> None:
 
 
 def chain(axes: Axes) -> None:
-    """Three masses on springs before a stop."""
+    """Draw three masses on springs before a stop."""
     wall(axes, 0.8, 2.6, 7.4, -1)
     for left in (0.8, 3.1, 5.4):
         spring(axes, left, left + 1.2, 5.0, turns=2)
@@ -65,7 +65,7 @@ def chain(axes: Axes) -> None:
 
 
 def beam(axes: Axes) -> None:
-    """A bent beam, clamped on the left, with a stop above its tip."""
+    """Draw a bent beam, clamped on the left, with a stop above its tip."""
     wall(axes, 1.0, 1.8, 7.4, -1)
     s = np.linspace(0.0, 1.0, 60)
     bent = 4.2 + 2.0 * s**2 * (6.0 - 4.0 * s + s**2) / 3.0
@@ -78,7 +78,7 @@ def beam(axes: Axes) -> None:
 
 
 def impact_stop(axes: Axes) -> None:
-    """A ball on its way to a stop."""
+    """Draw a ball on its way to a stop."""
     axes.add_patch(Circle((3.0, 5.0), 1.5, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75))
     arrow = {"arrowstyle": "-|>", "color": DARK, "lw": LINE * 0.75, "mutation_scale": 14}
     axes.annotate("", (7.3, 5.0), (4.8, 5.0), arrowprops=arrow)
@@ -86,7 +86,7 @@ def impact_stop(axes: Axes) -> None:
 
 
 def replay(axes: Axes) -> None:
-    """Samples joined by straight lines, a gap bridged."""
+    """Draw samples joined by straight lines, with a bridged gap."""
     x = np.linspace(1.2, 8.8, 12)
     y = 5.0 + 2.6 * np.sin(1.15 * x) * np.exp(-0.12 * x)
     axes.plot([1.0, 1.0, 9.2], [8.4, 1.6, 1.6], color=DARK, lw=LINE * 0.75)
@@ -96,7 +96,7 @@ def replay(axes: Axes) -> None:
 
 
 def gain(axes: Axes) -> None:
-    """The triangle of an amplifier between two lines."""
+    """Draw the triangle of an amplifier between two lines."""
     axes.plot([0.8, 9.2], [5.0, 5.0], color=DARK, lw=LINE * 0.75)
     corners = [(2.8, 1.9), (2.8, 8.1), (7.8, 5.0)]
     axes.add_patch(
@@ -105,7 +105,7 @@ def gain(axes: Axes) -> None:
 
 
 def sensor(axes: Axes) -> None:
-    """A probe before a body that moves."""
+    """Draw a probe before a body that moves."""
     axes.add_patch(Rectangle((0.9, 3.9), 4.0, 2.2, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
     axes.add_patch(Rectangle((7.6, 2.0), 1.4, 6.0, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75))
     arrow = {"arrowstyle": "<|-|>", "color": DARK, "lw": LINE / 2.0, "mutation_scale": 10}
@@ -113,7 +113,7 @@ def sensor(axes: Axes) -> None:
 
 
 def load_cell(axes: Axes) -> None:
-    """The pulse of an impact, and the ring after it."""
+    """Draw the pulse of an impact, and the ring after it."""
     axes.plot([1.0, 1.0, 9.2], [8.8, 3.6, 3.6], color=DARK, lw=LINE * 0.75)
     x = np.linspace(0.0, 1.0, 40)
     axes.plot(1.6 + 2.2 * x, 3.6 + 4.6 * np.sin(np.pi * x), color=RED, lw=LINE)
@@ -123,7 +123,7 @@ def load_cell(axes: Axes) -> None:
 
 
 def exciter(axes: Axes) -> None:
-    """A coil on a core that pulls at a body."""
+    """Draw a coil on a core that pulls at a body."""
     axes.add_patch(Rectangle((1.6, 1.0), 6.8, 1.4, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
     axes.add_patch(Rectangle((4.2, 2.4), 1.6, 3.0, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
     for y in np.linspace(2.9, 4.9, 4):
@@ -134,7 +134,7 @@ def exciter(axes: Axes) -> None:
 
 
 def noise(axes: Axes) -> None:
-    """A line, and what is left of it."""
+    """Draw a noisy line around a straight one."""
     x = np.linspace(0.8, 9.2, 40)
     rough = np.array([math.fmod(7919.0 * (k + 1) ** 2, 104729.0) / 104729.0 - 0.5 for k in range(40)])
     axes.plot(x, 5.0 + 4.5 * rough, color=BLUE, lw=LINE / 2.0, solid_joinstyle="round")
@@ -142,7 +142,7 @@ def noise(axes: Axes) -> None:
 
 
 def analog_input(axes: Axes) -> None:
-    """A curve and its steps."""
+    """Draw a curve and its steps."""
     x = np.linspace(0.0, 1.0, 60)
     axes.plot([1.0, 1.0, 9.2], [8.6, 1.4, 1.4], color=DARK, lw=LINE * 0.75)
     axes.plot(1.2 + 7.6 * x, 5.0 - 2.6 * np.cos(1.5 * np.pi * x), color=GREY, lw=LINE * 0.75)
@@ -158,7 +158,7 @@ ICONS = (
 
 
 def main() -> None:
-    """Write all."""
+    """Write all icons."""
     matplotlib.use("agg")
     for draw in ICONS:
         figure = Figure(figsize=(PIXELS / 100.0, PIXELS / 100.0), dpi=100.0)
@@ -167,7 +167,7 @@ def main() -> None:
         axes.axis("off")
         draw(axes)
         path = NATIVE / draw.__name__ / "icon.png"
-        # without the version of matplotlib: equal drawings make equal files
+        # without the version of matplotlib: equal drawings give equal files
         figure.savefig(path, metadata={"Software": None})
         print(path.relative_to(NATIVE.parents[1]), path.stat().st_size)
 

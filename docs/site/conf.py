@@ -1,4 +1,4 @@
-"""Settings of the documentation site. `make docs` builds it, from the pages that a forge shows too."""
+"""Settings of the documentation site. `make docs` builds it from the same pages that a forge shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ author = "vibroimpact developers"
 copyright = author
 release = version = metadata.version("vibroimpact")
 
-# The source folder is the root of the project: a link to a README or a scene is the same on the site and on a forge.
+# The source folder is the root of the project: a link to a README or a scene works on the site and on a forge.
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/*.md", "docs/**/*.md", "*/README.md", "*/**/README.md"]
 exclude_patterns = [".*", "build", "fmus/built", "tests"]
@@ -52,10 +52,10 @@ html_theme = "pydata_sphinx_theme"
 html_title = "vibroimpact"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
-# The front page is docs/index.html; this one, at the top, leads there.
+# The front page is docs/index.html; this page, at the top, redirects there.
 html_additional_pages = {"index": "to_front_page.html"}
 templates_path = ["templates"]
-# A section of one page has no pages to go to: its sidebar would be empty.
+# A section of a single page would have an empty sidebar.
 html_sidebars = {"docs/index": [], "docs/tutorial": []}
 html_copy_source = False
 html_show_copyright = False
@@ -71,12 +71,12 @@ html_theme_options = {
 def _without_heading(
     sphinx: Sphinx, what: str, name: str, item: object, options: object, lines: list[str]
 ) -> None:
-    """Take the heading off the example of a room: several rooms stand on one page, whose headings differ."""
+    """Remove the heading from a room's example: several rooms share one page, and their headings differ."""
     if what == "module" and "Examples" in lines:
         place = lines.index("Examples")
         lines[place : place + 2] = []
 
 
 def setup(sphinx: Sphinx) -> None:
-    """Connect what Sphinx calls before numpydoc reads a docstring."""
+    """Connect the hook that Sphinx calls before numpydoc reads a docstring."""
     sphinx.connect("autodoc-process-docstring", _without_heading, priority=100)

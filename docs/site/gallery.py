@@ -1,7 +1,7 @@
-"""Make the pictures of the gallery by running what makes them: `python docs/site/gallery.py FOLDER`.
+"""Make the pictures of the gallery by their own commands: `python docs/site/gallery.py FOLDER`.
 
-Every scene of the index in examples/README.md is run and drawn by the commands that stand there; then every kind of
-figure is drawn, of those runs where they have it. `gallery_page.py` makes the page of the same lists.
+The commands of the index in examples/README.md run and draw every scene of it. Then every kind of figure is drawn,
+from those runs where possible. `gallery_page.py` makes the page of the same lists.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from vibroimpact.orchestrator.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 INDEX = ROOT / "examples" / "README.md"
-#: Where the pictures of a build of the site lie.
+#: Folder of the pictures in a build of the site.
 PICTURES = ROOT / "build" / "docs" / "gallery"
 _ROW = re.compile(
     r"^\| \[\w+\]\([\w/.]+\) \| (?P<shows>.*?) \| `(?P<run>vibroimpact (?:run|basins|maps) .*?)` \| `(?P<plot>.*?)` \|$"
@@ -43,11 +43,11 @@ class Picture:
     Attributes
     ----------
     file : str
-        Its name in the folder of the gallery.
+        Name of the file in the folder of the gallery.
     shows : str
         One line in Markdown.
     commands : tuple of str
-        What makes it, in the root of the project.
+        Commands that make it, in the root of the project.
     """
 
     file: str
@@ -56,7 +56,7 @@ class Picture:
 
 
 def scenes() -> list[Picture]:
-    """Return a picture of every scene that needs nothing from elsewhere, in the order of the index."""
+    """Return a picture of every scene without foreign parts, in the order of the index."""
     text = INDEX.read_text(encoding="utf-8")
     found = [match for line in text.splitlines() if (match := _ROW.match(line))]
     pictures = [Picture(_output(row["plot"]), row["shows"], (row["run"], row["plot"])) for row in found]
@@ -151,7 +151,7 @@ def make(folder: Path) -> None:
     Raises
     ------
     RuntimeError
-        If a command fails; what it says stands on the standard error output.
+        A command fails; its messages are on the standard error output.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -183,7 +183,7 @@ def write_hit(path: Path) -> None:
     rate, natural, damping = 50_000.0, 2.0 * np.pi * 802.0, 0.01
     instants = np.arange(2500) / rate
     pulse = 500.0 * np.exp(-0.5 * ((instants - 0.003) / 0.0001) ** 2)
-    # absolute acceleration of a mass on a spring and a dashpot whose foot moves
+    # absolute acceleration of a mass on a spring and a dashpot with a moving foot
     damper, spring = 2.0 * damping * natural, natural**2
     _, board, _ = lsim(([damper, spring], [1.0, damper, spring]), pulse, instants)
     noise = np.random.default_rng(1).normal(size=(2, instants.size))
@@ -202,7 +202,7 @@ def write_grid(path: Path) -> None:
 
 
 def measure_ladder(scene: Path) -> xr.Dataset:
-    """Return errors of two coupled oscillators, over the macro step and the way of the exchange.
+    """Return errors of two coupled oscillators, over the macro step and the exchange scheme.
 
     The reference is the motion in closed form: one mass is (cos t + cos(sqrt(1.2) t)) / 2, the energy is constant.
     """

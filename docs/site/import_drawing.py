@@ -1,7 +1,7 @@
-"""Draw which room imports which: `python docs/site/import_drawing.py` writes docs/imports.svg, of docs/architecture.md.
+"""Draw the imports between rooms: `python docs/site/import_drawing.py` writes docs/imports.svg.
 
-The floors are those of the import-linter contracts in pyproject.toml, the arrows what the files import. A test compares
-the drawing with what this writes.
+docs/architecture.md shows the drawing. The floors come from the import-linter contracts in pyproject.toml, the arrows
+from the imports in the files. A test compares the drawing in docs with a new one.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parents[2]
 DRAWING = ROOT / "docs" / "imports.svg"
 LAYERS = ("hardware", "orchestrator", "analysis", "fmus")
 PREFIX = "vibroimpact."
-#: Imports from which an arrow is drawn thicker: finer steps would change the drawing with every import.
+#: Numbers of imports from which an arrow is thicker: finer steps would change the drawing with every import.
 THICKER = (4, 13)
-#: Heights and widths, px.
+#: Height of a row, width of a box, width of a gutter, top and margin, px.
 ROW, BOX, GUTTER, TOP, MARGIN = 27, 116, 112, 64, 16
 BULGE = 11
 COLOURS = ("#7b3294", "#2166ac", "#1b7837", "#b2622a")
@@ -37,7 +37,7 @@ def modules() -> dict[str, Path]:
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the statements within a node, at any depth, and no expressions, which are most of a tree."""
+    """Yield the statements within a node, at any depth, without expressions, which are most of a tree."""
     for block in ("body", "handlers", "orelse", "finalbody", "cases"):
         for statement in getattr(node, block, ()):
             yield statement
@@ -45,7 +45,7 @@ def statements(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def imported_names(path: Path) -> set[str]:
-    """Return the modules of ours that a file imports, and what could be modules, without `vibroimpact`."""
+    """Return the package's own modules that a file imports, and possible modules, without `vibroimpact`."""
     found = set()
     for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -57,13 +57,13 @@ def imported_names(path: Path) -> set[str]:
 
 @cache
 def imports() -> dict[str, set[str]]:
-    """Return for every module those that it imports; all files are read once in a process."""
+    """Return the imported modules of every module; all files are read once in a process."""
     known = modules()
     return {name: imported_names(path) & set(known) - {name} for name, path in known.items()}
 
 
 def floors(layer: str) -> list[list[str]]:
-    """Return the rooms of each floor of a layer, the highest first, as the contract of the layer has them."""
+    """Return the rooms of each floor of a layer, the highest first, in the order of the layer's contract."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     for contract in settings["tool"]["importlinter"]["contracts"]:
         if contract.get("containers") == [PREFIX + layer]:
@@ -72,7 +72,7 @@ def floors(layer: str) -> list[list[str]]:
 
 
 def arrows() -> Counter[tuple[str, str]]:
-    """Return how many imports lead from a room to another, rooms as `layer.room`."""
+    """Return the number of imports from each room to another, rooms as `layer.room`."""
     count: Counter[tuple[str, str]] = Counter()
     for name, found in imports().items():
         room = ".".join(name.split(".")[:2])
@@ -84,7 +84,7 @@ def arrows() -> Counter[tuple[str, str]]:
 
 
 def drawing() -> str:
-    """Return the drawing, SVG: a column for each layer, which imports from the columns right of it only."""
+    """Return the drawing as SVG: a column for each layer, which imports only from the columns to its right."""
     count = arrows()
     columns = [_column(place, layer, count) for place, layer in enumerate(LAYERS)]
     rows = max(sum(map(len, floors(layer))) for layer in LAYERS)
@@ -134,7 +134,7 @@ def _layer(room: str) -> str:
 
 
 def _arc(x: int, start: int, end: int, count: int, colour: str) -> str:
-    """Return an arrow from a row to another: it leaves at the lower part of a box and arrives at the upper part."""
+    """Return an arrow between two rows: it leaves at the lower part of a box and arrives at the upper part."""
     first, last = TOP + start * ROW + 0.72 * ROW, TOP + end * ROW + 0.28 * ROW
     out = x + min(GUTTER - 10, 8 + BULGE * abs(end - start))
     width = 0.8 + 1.1 * sum(count >= more for more in THICKER)

@@ -51,7 +51,7 @@ def with_key_tables(page: str) -> str:
 
 
 def key_table(model: type[BaseModel]) -> str:
-    """Return the table of the keys of a model in Markdown, with those of tables within it."""
+    """Return the table of the keys of a model in Markdown, with the keys of tables within it."""
     rows = list(_rows(model, ""))
     head = ["key", "type", "unit", "default", "rule"]
     if not any(rule_of(field).unit for field in model.model_fields.values()):
@@ -116,7 +116,7 @@ def _toml(value: Any) -> str:
 
 
 def _said(field: FieldInfo) -> str:
-    """Return the bounds of a field, then what its rule says."""
+    """Return the bounds of a field, then the words of its rule."""
     rule = rule_of(field)
     hint = rule.hint.rstrip(".")
     doc = rule.doc or (hint[:1].lower() + hint[1:])
@@ -137,7 +137,7 @@ def _bounds(field: FieldInfo) -> str:
 
 
 def _short(number: float) -> str:
-    """Return a number; a large power of ten as one."""
+    """Return a number as text; a large power of ten as a power."""
     power = math.log10(number) if number > 0.0 else 0.0
     return f"10^{power:.0f}" if power > 5.0 and power.is_integer() else f"{number:g}"
 

@@ -7,11 +7,9 @@ begins with a relative that hides its noun. The last line gives the mean length 
 from __future__ import annotations
 
 import ast
-import io
 import re
 import subprocess
 import sys
-import tokenize
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,13 +26,18 @@ HIDDEN_NOUN = re.compile(
 ABBREVIATIONS = re.compile(
     r"\b(e\.g|i\.e|cf|vs|eqs?|[Ff]igs?|[Ss]ec|[Nn]o|pp?|[Vv]ol|al|approx|resp|Dr|Prof)\.$"
 )
+PYTHON = re.compile(
+    r"""(\"{3}|'{3})(?:\\.|(?!\1).)*\1|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|#[^\n]*""", re.DOTALL
+)
+"""Strings and comments of Python, so that a mark within a string begins no comment."""
+C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 #: A pragma is no prose.
 PRAGMA = re.compile(r"(noqa|type:|ruff:|mypy:|pragma:|fmt:|clang-format|!)")
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph of a file: its first line, its text without marks, and whether it is a comment's first."""
+    """A paragraph of a file: its first line, its text without marks, and whether it opens a comment."""
 
     path: Path
     line: int
@@ -45,13 +48,13 @@ class Paragraph:
     def sentences(self) -> list[str]:
         """Sentences of the text, in order."""
         found: list[str] = []
-        begun = ""
+        pending = ""
         for piece in re.split(r"(?<=[.!?])[)\"'*_]*\s+", self.text):
-            begun = f"{begun} {piece}".strip()
-            if not ABBREVIATIONS.search(begun):
-                found.append(begun)
-                begun = ""
-        return [sentence for sentence in (*found, begun) if words_in(sentence)]
+            pending = f"{pending} {piece}".strip()
+            if not ABBREVIATIONS.search(pending):
+                found.append(pending)
+                pending = ""
+        return [sentence for sentence in (*found, pending) if words_in(sentence)]
 
     def faults(self) -> Iterator[str]:
         """Yield each rule that the paragraph breaks, with the words that break it."""
@@ -66,12 +69,12 @@ class Paragraph:
 
 
 def words_in(text: str) -> int:
-    """Return the number of words of a text: those with a letter or a digit."""
+    """Return the number of words of a text: only words with a letter or a digit count."""
     return sum(any(map(str.isalnum, word)) for word in text.split())
 
 
 def plain(text: str) -> str:
-    """Return a text without marks: a link is its text, a code span and a formula are one word."""
+    """Return a text without marks: a link becomes its text, a code span or a formula becomes one word."""
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"(`+)(.+?)\1", "code", text)
     text = re.sub(r"\$[^$]+\$", "formula", text)
@@ -82,15 +85,15 @@ def plain(text: str) -> str:
 
 
 def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs and list items of a page; headings, tables, blocks, formulas and quotations are none."""
+    """Yield the paragraphs and list items of a page, without headings, tables, blocks, formulas and quotations."""
     fence = ""
-    begun: list[str] = []
+    pending: list[str] = []
     first = 0
 
     def taken() -> Iterator[Paragraph]:
-        if words := plain("\n".join(begun)):
+        if words := plain("\n".join(pending)):
             yield Paragraph(path, first, words)
-        begun.clear()
+        pending.clear()
 
     text = re.sub(r"<!--.*?-->", lambda found: "\n" * found.group().count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(text.splitlines(), start=1):
@@ -111,24 +114,24 @@ def paragraphs_of_page(path: Path, text: str) -> Iterator[Paragraph]:
         if item:
             yield from taken()
             bare = bare[item.end() :]
-        if not begun:
+        if not pending:
             first = number
-        begun.append(bare)
+        pending.append(bare)
     yield from taken()
 
 
 def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a comment or a docstring; examples, headings of sections and names of fields are none."""
-    begun: list[str] = []
+    """Yield the paragraphs of a comment or a docstring, without examples, headings of sections and names of fields."""
+    pending: list[str] = []
     first, depth, opens, in_example = line, 0, True, False
     lines = text.expandtabs().splitlines()
 
     def taken() -> Iterator[Paragraph]:
         nonlocal opens
-        if words := plain("\n".join(begun)):
+        if words := plain("\n".join(pending)):
             yield Paragraph(path, first, words, opens)
             opens = False
-        begun.clear()
+        pending.clear()
 
     for number, each in enumerate(lines):
         bare, indent = each.strip(), len(each) - len(each.lstrip())
@@ -140,65 +143,74 @@ def paragraphs_of_comment(path: Path, line: int, text: str) -> Iterator[Paragrap
         if not bare or in_example or is_heading or is_field or bare.startswith("|"):
             yield from taken()
             continue
-        if item or (begun and indent != depth and number > 1):
+        if item or (pending and indent != depth and number > 1):
             yield from taken()
         if item:
             bare = bare[item.end() :]
-        if not begun:
+        if not pending:
             first, depth = line + number, indent
-        begun.append(bare)
+        pending.append(bare)
         if item:
             depth = indent + item.end()
     yield from taken()
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements within a node, at any depth."""
+    for block in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for statement in getattr(node, block, ()):
+            yield statement
+            yield from statements(statement)
+
+
 def paragraphs_of_python(path: Path, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of docstrings, of texts below a field, and of comments."""
-    for node in ast.walk(ast.parse(text)):
+    for node in statements(ast.parse(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield from paragraphs_of_comment(path, value.lineno, value.value)
-    lines: list[tuple[int, int, bool, str]] = []
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT:
-            said = token.string.lstrip("#:")
-            if not PRAGMA.match(said.strip()):
-                lines.append((*token.start, not token.line[: token.start[1]].strip(), said))
-    yield from _joined(path, lines)
+    found = ((each.start(), each.group()) for each in PYTHON.finditer(text))
+    yield from _joined(path, _alone(text, ((at, said, "#:") for at, said in found if said[0] == "#")))
+
+
+def _alone(text: str, comments: Iterable[tuple[int, str, str]]) -> Iterator[tuple[int, int, bool, str]]:
+    """Yield line, column, whether it stands alone, and text of comments, given by place, text and mark."""
+    line = last = 0
+    for at, said, mark in comments:
+        line += text.count("\n", last, at)
+        last = at
+        begins = text.rfind("\n", 0, at) + 1
+        words = said.lstrip(mark)
+        if not PRAGMA.match(words.strip()):
+            yield line + 1, at - begins, not text[begins:at].strip(), words
 
 
 def _joined(path: Path, lines: Iterable[tuple[int, int, bool, str]]) -> Iterator[Paragraph]:
-    """Yield the paragraphs of comments, given as line, column, whether it stands alone, and text."""
-    begun: list[str] = []
+    """Yield the paragraphs of comments; a comment is line, column, whether it stands alone, and text."""
+    pending: list[str] = []
     start = last = place = 0
     for number, column, is_alone, said in lines:
-        if begun and not (is_alone and number == last + 1 and column == place):
-            yield from paragraphs_of_comment(path, start, "\n".join(begun))
-            begun.clear()
-        if not begun:
+        if pending and not (is_alone and number == last + 1 and column == place):
+            yield from paragraphs_of_comment(path, start, "\n".join(pending))
+            pending.clear()
+        if not pending:
             start = number
-        begun.append(said)
+        pending.append(said)
         last, place = number, column
-    if begun:
-        yield from paragraphs_of_comment(path, start, "\n".join(begun))
+    if pending:
+        yield from paragraphs_of_comment(path, start, "\n".join(pending))
 
 
 def paragraphs_of_c(path: Path, text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of the comments of a C file."""
-    pattern = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)
-    lines: list[tuple[int, int, bool, str]] = []
-    for found in pattern.finditer(text):
-        said = found.group()
-        before = text[: found.start()]
-        number, column = before.count("\n") + 1, found.start() - before.rfind("\n") - 1
-        if said.startswith("//"):
-            if not PRAGMA.match(said.lstrip("/ ")):
-                lines.append((number, column, not before[before.rfind("\n") + 1 :].strip(), said.lstrip("/")))
-        elif said.startswith("/*"):
+    found = [(each.start(), each.group()) for each in C.finditer(text)]
+    for at, said in found:
+        if said.startswith("/*"):
             inner = re.sub(r"(?m)^[ \t]*\*(?!\*)( ?)", "", said[2:-2].lstrip("*!"))
             if not PRAGMA.match(inner.strip()):
-                yield from paragraphs_of_comment(path, number, inner)
-    yield from _joined(path, lines)
+                yield from paragraphs_of_comment(path, text.count("\n", 0, at) + 1, inner)
+    lines = ((at, said, "/") for at, said in found if said.startswith("//"))
+    yield from _joined(path, _alone(text, lines))
 
 
 def paragraphs_of(path: Path) -> Iterator[Paragraph]:
@@ -214,7 +226,7 @@ def paragraphs_of(path: Path) -> Iterator[Paragraph]:
 
 
 def files(paths: Iterable[Path] = ()) -> list[Path]:
-    """Return the files with prose that git knows, all of them or those below the paths."""
+    """Return the files with prose that git knows: all of them, or those below the paths."""
     named = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "--", *map(str, paths)],
         cwd=ROOT,

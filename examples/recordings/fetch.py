@@ -1,8 +1,8 @@
-"""Fetch the recordings of docs/recordings from where their makers keep them.
+"""Fetch the recordings of docs/recordings from the places where their makers keep them.
 
-`python examples/recordings/fetch.py --list` shows them; it needs `pip install 'vibroimpact[recordings]'`. Each file is
-taken from one commit of its repository and compared with its SHA-256, so that it is the file that the pages speak of.
-None is part of this project; each has the licence named here.
+`python examples/recordings/fetch.py --list` shows them; it needs `pip install 'vibroimpact[recordings]'`. Each file
+comes from one commit of its repository, and its SHA-256 is checked: it is the file that the pages describe. None is
+part of this project; each has the licence named here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class File:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a recording comes from, and under which licence."""
+    """Origin of a recording, and its licence."""
 
     repository: str
     commit: str
@@ -172,20 +172,20 @@ SOURCES = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Fetch what was asked for; return 0 where all of it is there, 1 where a download failed, 2 on misuse."""
+    """Fetch the named recordings; return 0 if all of them are there, 1 if a download failed, 2 for misuse."""
     parser = argparse.ArgumentParser(
         description="Fetch recordings made in laboratories, each under its own licence."
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="recordings to fetch; none: all")
     parser.add_argument(
-        "-o", "--output", type=Path, default=Path(), help="folder to put them into; else this one"
+        "-o", "--output", type=Path, default=Path(), help="folder for the files; the current one by default"
     )
-    parser.add_argument("--list", action="store_true", help="show what there is, and fetch nothing")
-    parser.add_argument("--server", default=SERVER, help="a mirror that has the same paths")
+    parser.add_argument("--list", action="store_true", help="list the recordings, and fetch nothing")
+    parser.add_argument("--server", default=SERVER, help="a mirror with the same paths")
     given = parser.parse_args(arguments)
     unknown = [name for name in given.names if name not in SOURCES]
     if unknown:
-        return _told(
+        return _report(
             f"fetch.py: NAME: expected some of {', '.join(SOURCES)}, got {', '.join(unknown)}.", code=2
         )
     chosen = given.names or list(SOURCES)
@@ -196,13 +196,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         import pooch
     except ImportError:
-        return _told(
+        return _report(
             "fetch.py: expected the package pooch, got none. pip install 'vibroimpact[recordings]'", code=2
         )
     for file in (file for name in chosen for file in SOURCES[name].files):
         there = given.output / file.name
         if there.exists() and pooch.file_hash(str(there)) != file.sha256:
-            return _told(
+            return _report(
                 f"{there}: expected the file that is fetched, or none, got another. Move it away.", code=2
             )
     downloader = pooch.HTTPDownloader(timeout=PATIENCE)
@@ -215,9 +215,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 pooch.retrieve(
                     address, f"sha256:{file.sha256}", file.name, path=given.output, downloader=downloader
                 )
-            # OSError: what requests raises where the network fails, and the disk; ValueError: another SHA-256
+            # OSError: requests and the disk raise it; ValueError: another SHA-256
             except (OSError, ValueError) as problem:
-                return _told(
+                return _report(
                     f"{address}: cannot be fetched as {given.output / file.name}: {_one_line(problem)}",
                     code=1,
                 )
@@ -235,7 +235,7 @@ def _one_line(problem: Exception) -> str:
     return " ".join(str(problem).split())
 
 
-def _told(text: str, code: int) -> int:
+def _report(text: str, code: int) -> int:
     print(text, file=sys.stderr)
     return code
 

@@ -1,1 +1,1 @@
-"""What the operations of this package do on the command line, a module for each."""
+"""The command-line side of this package's operations, one module for each."""

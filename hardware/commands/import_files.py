@@ -1,4 +1,4 @@
-"""What `vibroimpact import` does: read files, write the recording and its figure, print what it holds."""
+"""The command `vibroimpact import`: reads files, writes the recording and its figure, prints a summary."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.hardware.recordings.settings import checked
 
 
 def import_into(options: ImportFiles) -> None:
-    """Import files as the options and the settings say."""
+    """Import files according to the options and the settings."""
     output, figure = options.output, options.figure
     given = _settings_of(options)
     common = None if options.settings is None else read_settings(options.settings)
@@ -28,7 +28,7 @@ def import_into(options: ImportFiles) -> None:
     with writing(output):
         write_recording(recording, output)
     if figure is not None:
-        # matplotlib takes half a second to import; an import alone does not pay for it.
+        # matplotlib takes half a second to import, and an import without a figure does not need it
         from vibroimpact.analysis import figures
         from vibroimpact.analysis.figures.measured.recordings import draw_recording
 
@@ -41,7 +41,7 @@ def import_into(options: ImportFiles) -> None:
 
 
 def _settings_of(options: ImportFiles) -> ImportSettings:
-    """Return what the options say of the columns: they are the keys of a settings file; None or empty: not given."""
+    """Return the options on columns as settings, which have the keys of a settings file; None or empty: not given."""
     written = {key: getattr(options, key) for key in ImportSettings.model_fields}
     if options.columns is not None:
         written["columns"] = [part.strip() for part in options.columns.split(",")]

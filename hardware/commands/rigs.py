@@ -1,4 +1,4 @@
-"""What `vibroimpact rig serve` and `devices` do."""
+"""The commands `vibroimpact rig serve` and `vibroimpact rig devices`."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Readers of file formats: each makes the same table of raw columns."""
+"""Readers of file formats; each makes the same table of raw columns."""

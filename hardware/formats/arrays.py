@@ -1,4 +1,4 @@
-"""From named arrays, as MATLAB and HDF5 files hold them in structures and groups, to tables of vectors."""
+"""Tables of vectors from named arrays, which MATLAB and HDF5 files hold in structures and groups."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ INTERVALS = frozenset({"dt", "ts", "deltat", "delta_t", "sampling_interval", "sa
 
 @dataclass(slots=True)
 class Scope:
-    """A structure or group: its numeric arrays by name, and what it says of their clock."""
+    """A structure or group: its numeric arrays by name, and their clock."""
 
     path: str = ""
-    """Names of the structures around it with dots between; empty for the file itself."""
+    """Names of the enclosing structures, joined by dots; empty for the file itself."""
     arrays: dict[str, Any] = field(default_factory=dict)
     """Numeric arrays by their own names."""
     units: dict[str, str] = field(default_factory=dict)
-    """Unit labels, by the names of arrays that have one."""
+    """Unit labels of arrays that have one, by name."""
     rate: float | None = None
     """Samples per second of all its arrays."""
     around: Scope | None = None
-    """What it lies in; its clock holds here too where there is none."""
+    """The enclosing structure; its clock is used if this one has none."""
     numbers: int = 0
-    """Numbers read into the outermost structure and all within it; kept where reading stops at a limit."""
+    """Numbers read into the outermost structure and all within it; kept if reading stops at a limit."""
 
     def within(self, name: str) -> Scope:
-        """Return a structure of this name that lies in this one."""
+        """Return a structure of this name inside this one."""
         return Scope(self.dotted(name), around=self)
 
     def dotted(self, name: str) -> str:
-        """Return the whole name of an array."""
+        """Return the full name of an array."""
         return f"{self.path}.{name}" if self.path else name
 
     def outward(self) -> Iterator[Scope]:
-        """Yield this structure and those that it lies in, the nearest first."""
+        """Yield this structure and the enclosing ones, the nearest first."""
         yield self
         if self.around is not None:
             yield from self.around.outward()
 
 
 def tables_of(scopes: Sequence[Scope]) -> tuple[list[Table], list[str]]:
-    """Make a table of the arrays of each structure, the outer ones first.
+    """Return a table of the arrays of each structure, the outer ones first, and remarks.
 
-    A vector named `t` or `time` has the instants, a number named `fs` or `dt` the rate; both hold in the structures
-    within, too, where those have none. More columns or samples than one import takes raise DatasetError.
+    A vector named `t` or `time` has the instants, a number named `fs` or `dt` the rate. Both also hold in inner
+    structures that have none. DatasetError: more columns or samples than one import takes.
     """
     remarks: list[str] = []
     if sum(array.size for scope in scopes for array in scope.arrays.values()) > MOST_SAMPLES:
@@ -79,7 +79,7 @@ def tables_of(scopes: Sequence[Scope]) -> tuple[list[Table], list[str]]:
 
 
 def _columns_of(scope: Scope, remarks: list[str]) -> tuple[list[Column], Column | None]:
-    """Return the columns of a structure, and its instants; take its rate from its numbers."""
+    """Return the columns of a structure, and its instants; set its rate from its numbers."""
     columns: list[Column] = []
     time: Column | None = None
     for name, values in scope.arrays.items():
@@ -101,7 +101,7 @@ def _columns_of(scope: Scope, remarks: list[str]) -> tuple[list[Column], Column 
 
 
 def _columns(label: str, values: Any, unit: str, remarks: list[str]) -> list[Column]:
-    """Return the columns of an array; a row vector is a column too."""
+    """Return the columns of an array; a row vector is one column."""
     if values.ndim > 2:
         remarks.append(f"{label}: an array of {values.ndim} dimensions is left out; vectors are read")
         return []

@@ -1,6 +1,6 @@
 """Parquet and Feather files, read with pyarrow: columns of numbers and of dates.
 
-pyarrow is compiled and can crash on damaged bytes, in the process that `reading` asks.
+pyarrow is compiled and can crash on damaged bytes; it runs in the process of `reading`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SIGNATURES = (PARQUET, FEATHER, _OLD_FEATHER)
 
 
 def read_arrow(path: os.PathLike[str] | str) -> RawFile:
-    """Read a Parquet or Feather file: its columns of numbers, one of dates as instants.
+    """Return the numbers of a Parquet or Feather file as columns; a column of dates has the instants.
 
     DatasetError: pyarrow is not installed, or the file is damaged, too large, or of the first version of Feather.
     """
@@ -47,12 +47,12 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
 
 
 def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
-    """Return the columns of numbers and dates, where they are not too many, and remarks on the others."""
+    """Return the columns of numbers and dates, if they are not too many, and remarks on the others."""
     import pyarrow.ipc
     import pyarrow.parquet
 
     if kind == "Parquet":
-        # pages may carry a CRC-32, at which the library looks only when it is told to
+        # pages may carry a CRC-32, which the library checks only on request
         with pyarrow.parquet.ParquetFile(path, memory_map=False, page_checksum_verification=True) as file:
             names, remarks = _chosen(file.schema_arrow)
             _check_size(file.metadata.num_rows, len(names))
@@ -60,10 +60,10 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
     with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path))) as file:
         schema = file.schema
     names, remarks = _chosen(schema)
-    if not names:  # no field would mean all of them
+    if not names:  # an empty selection would mean all fields
         return pyarrow.table({}), remarks
-    wanted = pyarrow.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
-    with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path)), options=wanted) as file:
+    options = pyarrow.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
+    with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path)), options=options) as file:
         rows, batches = 0, []
         for at in range(file.num_record_batches):
             batches.append(file.get_batch(at))
@@ -73,7 +73,7 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
 
 
 def _chosen(schema: Any) -> tuple[list[str], list[str]]:
-    """Return the columns of numbers and dates by name, and remarks on the others."""
+    """Return the names of the columns of numbers and dates, and remarks on the others."""
     from pyarrow import types
 
     names, remarks = [], []

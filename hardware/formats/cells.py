@@ -1,4 +1,4 @@
-"""From cells of text to columns of numbers: decimal commas, empty cells, markers of overrange and of nothing."""
+"""Columns of numbers from cells of text: decimal commas, empty cells, markers of overrange and of missing samples."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.instants import is_clock, is_date, is_day, read_instants
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats
 
-# Instruments write these for an input that is beyond its range, or open.
+# instruments write these for an input beyond its range, or open
 OVERRANGE_WORDS = frozenset(
     {"ovrng", "ovrrng", "ovr", "ovrn", "over", "overrange", "over-range", "overload", "ovl"}
     | {"ovld", "ol", "o.l.", "+ol", "-ol", "+over", "-over", "over+", "over-", "open", "opn"}
     | {"inf", "+inf", "-inf", "infinity", "-infinity", "+infinity", "1.#inf", "-1.#inf", "1.#infoo"}
     | {"#overflow", "overflow", "sat", "saturated", "\u221e", "+\u221e", "-\u221e"}
 )
-# And these for a sample that they do not have.
+# instruments write these for a missing sample
 MISSING_WORDS = frozenset(
     {"nan", "-nan", "+nan", "na", "n/a", "#n/a", "#na", "-", "--", "---", "?", "*", "null"}
     | {"none", "nil", "nodata", "no-data", "missing", "invalid", "bad", "error", "1.#qnan", "-1.#qnan"}
     | {"1.#ind", "-1.#ind"}
 )
 OVERRANGE_FROM = 9.8e37
-"""SCPI instruments give 9.9e37 beyond their range, LabVIEW 1e308; no measured signal is that large."""
+"""Absolute value above which a number means overrange: SCPI instruments write 9.9e37, LabVIEW 1e308."""
 NOT_A_NUMBER = 9.91e37
-"""SCPI's number for a sample that is none."""
+"""SCPI's number for a missing sample."""
 
-# Possessive, for cells of a million digits and a letter.
+# possessive quantifiers, for cells of a million digits and a letter
 _NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eEdD][-+]?\d{1,4})?", re.ASCII)
-# 29.990,96 and 29,990.96: both signs in one number.
+# 29.990,96 and 29,990.96: both signs in one number
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})++,\d++|(?:,\d{3})++\.\d++)", re.ASCII)
-# The same, and beside a decimal comma 101.325; 1,234 beside a decimal point may be two cells.
+# the same; with a decimal comma also 101.325; 1,234 with a decimal point may be two cells
 _POINTS = re.compile(r"[-+]?[1-9]\d{0,2}(?:\.\d{3})++(?:,\d++)?", re.ASCII)
 _COMMAS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:,\d{3})++\.\d++|(?:,\d{3}){2,9})", re.ASCII)
 _LONGEST_QUOTE = 40
@@ -66,7 +66,7 @@ def has_thousands(text: str) -> bool:
 
 
 def is_marker(text: str) -> bool:
-    """Whether a cell is empty or stands for a sample that is not there.
+    """Whether a cell is empty or marks a missing sample.
 
     >>> is_marker("OVRNG"), is_marker(""), is_marker("NaN"), is_marker("velocity")
     (True, True, True, False)
@@ -76,11 +76,11 @@ def is_marker(text: str) -> bool:
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
-    """Return the cells of a line; None splits at blanks."""
+    """Return the cells of a line; a delimiter of None splits at blanks."""
     if delimiter is None:
         return line.split()
     if line.count('"') > 1:
-        # a delimiter between quotes is part of its cell
+        # a delimiter in quotes is part of its cell
         with suppress(csv.Error):
             return [
                 cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
@@ -123,7 +123,7 @@ class _Cells:
     rows: Sequence[int] | None = None
 
     def of_rows(self, count: int) -> Sequence[str]:
-        """Return a cell for each row; empty where the column has none."""
+        """Return a cell for each row; empty for rows without the column."""
         if self.rows is None:
             return self.texts
         cells = [""] * count
@@ -133,7 +133,7 @@ class _Cells:
 
 
 def _ragged(rows: Sequence[Sequence[str]]) -> list[_Cells]:
-    """Return the cells that are not empty of rows of different widths: a wide row costs its own cells alone."""
+    """Return the cells with content from rows of different widths: a wide row costs only its own cells."""
     texts: list[list[str]] = [[] for _ in range(max(map(len, rows)))]
     places: list[list[int]] = [[] for _ in texts]
     for row, cells in enumerate(rows):
@@ -145,7 +145,7 @@ def _ragged(rows: Sequence[Sequence[str]]) -> list[_Cells]:
 
 
 def _refuse_wide(columns: int, rows: int) -> None:
-    """Raise DatasetError for more columns than a file has, or for short rows beside wide ones that fill the memory."""
+    """Raise DatasetError for too many columns, or for short rows next to wide ones that would fill the memory."""
     if columns > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {columns}. Is it turned over?")
     if rows * (columns - 1) > MOST_SAMPLES:
@@ -156,34 +156,34 @@ def _refuse_wide(columns: int, rows: int) -> None:
 
 
 def _first(cells: Sequence[str]) -> str:
-    """Return the first cell that is not empty."""
+    """Return the first cell with content."""
     return next((cell for cell in cells if cell.strip()), "")
 
 
 def _are_days(cells: Sequence[str]) -> bool:
-    """Whether a column has a day in every cell that is not empty."""
+    """Whether a column has a day in every cell with content."""
     return is_day(_first(cells)) and all(is_day(cell) for cell in cells if cell.strip())
 
 
 def _with_days(days: Sequence[str], clock: Sequence[str], dates: str) -> Column | None:
-    """Return the instants of days and times of day; None where the times of day alone are clearer."""
+    """Return the instants of days and times of day; None if the times of day alone are clearer."""
     cells = [f"{day.strip()} {time.strip()}".strip() for day, time in zip(days, clock, strict=True)]
     column = read_instants(cells, is_marker, dates)
     known = column.values[np.isfinite(column.values)]
-    is_clear = not column.strange and not column.doubt and len(known) > 1
+    is_clear = not column.strange and not column.ambiguity and len(known) > 1
     return column if is_clear and bool(np.all(np.diff(known) >= 0.0)) else None
 
 
 def _with_point(text: str, decimal: str) -> str:
     if decimal == ",":
-        if "." in text:  # a point is no decimal sign there
+        if "." in text:  # a point is then no decimal sign
             text = text.replace(".", "" if _POINTS.fullmatch(text) else "x")
         return text.replace(",", ".")
     return text.replace(",", "") if "," in text and _COMMAS.fullmatch(text) else text
 
 
 def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> Floats | None:
-    """Return all columns of a full table of plain numbers, shape (column, row); None where it is not one."""
+    """Return all columns of a full table of plain numbers, shape (column, row); None for other tables."""
     if decimal != "." or not lines:
         return None
     try:
@@ -194,16 +194,16 @@ def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> 
 
 
 def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Column:
-    """Return a column of numbers in which those that stand for overrange, or for no sample, are NaN.
+    """Return a column of numbers, with NaN for overrange and for missing samples.
 
-    `facts` is what else is known of the column, by the names of its attributes.
+    `facts` are further attributes of the column, by name.
 
     >>> column = column_of("base", np.array([1.0, 9.9e37, 9.91e37, -np.inf]))
     >>> column.values, column.overrange
     (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))
     """
     if np.any(missing := np.isnan(values)):
-        values = np.where(missing, np.nan, values)  # of one kind: one that signals is a warning in every sum
+        values = np.where(missing, np.nan, values)  # one kind of NaN: a signalling one warns in every sum
     low, high = np.fmin.reduce(values, initial=0.0), np.fmax.reduce(values, initial=0.0)
     if low >= -OVERRANGE_FROM and high <= OVERRANGE_FROM:
         return Column(label, values, unit, None, **facts)
@@ -215,7 +215,7 @@ def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Colum
 
 
 def _read_column(written: _Cells, decimal: str, dates: str) -> Column:
-    """Read one column up to its last cell that is not empty."""
+    """Return one column up to its last cell with content."""
     cells = written.texts
     length = next((row for row in range(len(cells), 0, -1) if cells[row - 1].strip()), 0)
     column = _read_texts(cells[:length], decimal, dates)
@@ -233,7 +233,7 @@ def _read_column(written: _Cells, decimal: str, dates: str) -> Column:
 
 
 def _read_texts(cells: Sequence[str], decimal: str, dates: str) -> Column:
-    """Read cells as instants where the first of them is one, else as numbers."""
+    """Return cells as instants if the first is one, else as numbers."""
     if is_date(_first(cells)):
         return read_instants(cells, is_marker, dates)
     strange: list[tuple[int, str]] = []

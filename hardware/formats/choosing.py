@@ -1,4 +1,4 @@
-"""From a file to its raw columns: the format is told by the first bytes, not by the ending of the name."""
+"""Chooses the reader of a file: the first bytes decide, not the ending of the name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vibroimpact.hardware.formats.wav import read_wav
 _NETCDF3 = (b"CDF\x01", b"CDF\x02")
 _NETCDF_64_BIT = b"CDF\x05"
 _WORDS_OF_NETCDF = (b"_NCProperties", b"DIMENSION_SCALE", b"vibroimpact SHA-256")
-"""An HDF5 file that a NetCDF library or this program wrote has one of them; HDF5 writes attributes as they are."""
+"""Words of a NetCDF library or this program, one of which its HDF5 files hold; HDF5 writes attributes unchanged."""
 _LONGEST_WORD = max(map(len, _WORDS_OF_NETCDF))
 _STRETCH = 1 << 22
 _OTHERS = {
@@ -42,7 +42,7 @@ _OTHERS = {
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is no regular file of a bearable size.
+    """Raise unless the path is a regular file of a readable size.
 
     Raises
     ------
@@ -68,14 +68,14 @@ def check_file(path: Path) -> None:
 
 
 def holds_recording(path: Path) -> bool:
-    """Tell whether a file is a recording of this program already.
+    """Return whether a file is a recording of this program already.
 
     Raises
     ------
     DatasetError
-        It begins as one might, and crashes the library that reads it.
+        It looks like one, and crashes the library that reads it.
     """
-    # recordings take half a second to load, which the process that reads other formats does without
+    # recordings take half a second to load; the process for other formats does without them
     from vibroimpact.analysis.recording import is_recording
 
     with path.open("rb") as file:
@@ -93,7 +93,7 @@ def holds_recording(path: Path) -> bool:
 
 
 def _has_word_of_netcdf(path: Path) -> bool:
-    """Whether an HDF5 file may be one of NetCDF: another one is never shown to the library of that."""
+    """Whether an HDF5 file may be NetCDF; the NetCDF library never gets any other."""
     with path.open("rb") as file:
         before = b""
         while stretch := file.read(_STRETCH):
@@ -105,9 +105,9 @@ def _has_word_of_netcdf(path: Path) -> bool:
 
 
 def read_raw(path: Path, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
-    """Read a file of any format known here, one that `check_file` has passed; the rest is for `text.read_text`.
+    """Return a file of a known format, checked by `check_file`; the other arguments are for `text.read_text`.
 
-    An unknown format or a damaged file raises DatasetError.
+    DatasetError: the format is unknown, or the file is damaged.
     """
     with path.open("rb") as file:
         start = file.read(512)

@@ -1,4 +1,4 @@
-"""Which column of a table has the instants of the others: by its heading, its unit, or because it ascends."""
+"""The column of instants in a table: known by its heading, its unit, or its ascent."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.hardware.formats.labels import is_time_name, seconds_in, unit_i
 from vibroimpact.hardware.formats.table import Column, Table
 
 FIRST_WITHOUT_HEADING = "column_1"
-"""What a first column is called that has no heading."""
+"""Label of a first column without heading."""
 _COUNTS = frozenset(
     {"index", "no", "no.", "nr", "nr.", "#", "sample", "samples", "row", "point", "scan", "record"}
 )
@@ -20,7 +20,7 @@ _COUNTS = frozenset(
 
 
 def without_count(table: Table) -> Table:
-    """Return the table without a first column that counts its rows, where another one has the instants."""
+    """Return the table without a first column that counts its rows, if another column has the instants."""
     first = table.columns[0] if table.columns and table.time is not None and table.time_place > 0 else None
     if first is None or first.label.strip().lower() not in _COUNTS or len(table.columns) < 2:
         return table
@@ -31,10 +31,10 @@ def without_count(table: Table) -> Table:
 
 
 def with_time(table: Table) -> Table:
-    """Return the table with the column of its instants told apart, where one is clear.
+    """Return the table with the column of its instants set apart, if one is clear.
 
-    Clear is a heading that means time, or a first column without heading that ascends from row to row and is
-    followed by others.
+    A column is clear if its heading means time. So is a first column without heading that ascends from row to row and
+    is followed by others.
     """
     for place, column in enumerate(table.columns):
         if column.dated or is_time_name(column.label) or _is_time_by_unit(column, place):
@@ -52,7 +52,7 @@ def with_time(table: Table) -> Table:
 
 
 def in_pairs(columns: Sequence[Column]) -> list[Table]:
-    """Return a table for each column of instants with those that follow it, where there are several: `t1 a1 t2 a2`."""
+    """Return a table for each of several columns of instants, with its following columns: `t1 a1 t2 a2`."""
     clocks = [place for place, column in enumerate(columns) if _is_clock(column)]
     ends = [*clocks[1:], len(columns)]
     if (

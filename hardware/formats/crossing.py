@@ -1,6 +1,6 @@
-"""Carries what was read from one process to another: facts that JSON can say, and the arrays as raw bytes.
+"""Carries a read file from one process to another: facts as JSON, arrays as raw bytes.
 
-What is one object in the file stays one: instants that several tables share, an array that two columns have.
+Shared objects stay shared: instants of several tables, an array of two columns.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from vibroimpact.fmus.messages import Message, typed
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 
-_PLAIN = ("label", "unit", "interval", "start", "group", "dated", "doubt")
+_PLAIN = ("label", "unit", "interval", "start", "group", "dated", "ambiguity")
 _KINDS = "fiub"
 _COMPLEX_KINDS = "fiubc"
 _ARRAY = "array"
@@ -27,7 +27,7 @@ class _Numbered:
         self._places: dict[int, int] = {}
 
     def place(self, item: Any) -> int | None:
-        """Return the number of an object; None for none."""
+        """Return the number of an object; None for None."""
         if item is None:
             return None
         place = self._places.setdefault(id(item), len(self.items))
@@ -39,7 +39,7 @@ class _Numbered:
 def packed(raw: RawFile) -> tuple[dict[str, Any], list[Any]]:
     """Return a file as facts for JSON, and its arrays.
 
-    Cells that are no numbers (`Column.strange`) stay behind: the remarks have told them.
+    Cells that are no numbers (`Column.strange`) are left out: the remarks report them.
     """
     columns, arrays = _Numbered(), _Numbered()
     tables = [
@@ -68,7 +68,7 @@ def packed(raw: RawFile) -> tuple[dict[str, Any], list[Any]]:
 def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
     """Return the file that `packed` has taken apart.
 
-    Other facts raise ValueError, TypeError, KeyError or IndexError.
+    ValueError, TypeError, KeyError or IndexError: the facts have another form.
     """
     arrays = [
         np.frombuffer(buffer, dtype=_kind(text)) for buffer, text in zip(buffers, facts["kinds"], strict=True)
@@ -92,7 +92,7 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> RawFile:
 def packed_datasets(
     types: Sequence[int], datasets: Sequence[Mapping[str, Any]], cut: bool
 ) -> tuple[dict[str, Any], list[Any]]:
-    """Return what `uff.read_datasets` found as facts for JSON, and its arrays."""
+    """Return the datasets from `uff.read_datasets` as facts for JSON, and their arrays."""
     arrays: list[Any] = []
     facts = [{key: _value_of(value, arrays) for key, value in one.items()} for one in datasets]
     return {"types": list(types), "datasets": facts, "cut": cut}, arrays
@@ -101,7 +101,7 @@ def packed_datasets(
 def unpacked_datasets(
     facts: Mapping[str, Any], buffers: Sequence[bytearray]
 ) -> tuple[list[int], list[dict[str, Any]], bool]:
-    """Return what `packed_datasets` has taken apart. Other facts raise errors as in `unpacked`."""
+    """Return the datasets that `packed_datasets` has taken apart. Errors are as in `unpacked`."""
     datasets = [
         {str(key): _value_in(value, buffers) for key, value in one.items()} for one in facts["datasets"]
     ]
@@ -109,7 +109,7 @@ def unpacked_datasets(
 
 
 def _value_of(value: Any, arrays: list[Any]) -> Any:
-    """Return a value of a dataset for JSON: numbers of an array, or complex ones, become an array."""
+    """Return a value of a dataset for JSON; numbers of an array, and complex ones, become an array."""
     numbers = (
         np.asarray(value) if isinstance(value, np.ndarray | np.generic | complex | list | tuple) else None
     )
@@ -151,7 +151,7 @@ def _column_of(known: Mapping[str, Any], arrays: Sequence[Any]) -> Column:
 
 
 def _plain(value: Any) -> Any:
-    """Return a number of numpy as one of Python."""
+    """Return a number of numpy as a number of Python."""
     return value.item() if isinstance(value, np.generic) else value
 
 

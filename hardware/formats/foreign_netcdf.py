@@ -1,7 +1,7 @@
-"""NetCDF files of other programs: variables on one dimension, with their coordinate of time where there is one.
+"""NetCDF files of other programs: variables on one dimension, with their coordinate of time if there is one.
 
-Files of the classic format are read with scipy, in Python alone, since the C library can crash on damaged ones; files
-of version 4 (HDF5) have been read whole before by a process of their own, for the same reason.
+scipy reads files of the classic format, in Python alone, since the C library can crash on damaged ones. For the same
+reason, a process of its own has read files of version 4 (HDF5) whole before.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<date>.+)")
 
 
 def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
-    """Read the numeric variables of one dimension; a table for each dimension.
+    """Return the numeric variables of one dimension, in a table for each dimension.
 
-    A damaged file, or one without such variables, raises DatasetError.
+    DatasetError: the file is damaged, or has no such variables.
     """
     with one_refusal("a whole NetCDF file"):
         with open(path, "rb") as file:
@@ -35,7 +35,7 @@ def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
     return _sorted_out(variables)
 
 
-#: Name and dimension of a variable, its column where it is numeric and of one dimension, and the remark on it.
+#: Name and dimension of a variable, its column if it is numeric and of one dimension, and the remark on it.
 _Variable = tuple[str, str, Column | None, str]
 
 
@@ -60,11 +60,11 @@ def _hdf5(path: os.PathLike[str] | str) -> Iterator[_Variable]:
             yield name, "", None, "a group is left out; variables outside groups are read"
         for name, variable in file.variables.items():
             numeric = getattr(variable.dtype, "kind", "O") in "fiu" and len(variable.dimensions) == 1
-            # the library warns of a scale or a fill value that means nothing, and goes on without it
-            with warnings.catch_warnings(record=True) as said:
+            # the library warns of a meaningless scale or fill value, and continues without it
+            with warnings.catch_warnings(record=True) as warned:
                 warnings.simplefilter("always")
                 values = np.ma.asarray(variable[...], dtype=np.float64).filled(np.nan) if numeric else None
-            yield _variable(name, variable, values, "; ".join({str(warning.message) for warning in said}))
+            yield _variable(name, variable, values, "; ".join({str(warning.message) for warning in warned}))
 
 
 def _check_sizes(sizes: list[int]) -> None:
@@ -87,7 +87,7 @@ def _text(variable: Any, key: str) -> str:
 
 
 def _sorted_out(variables: Iterable[_Variable]) -> RawFile:
-    """Put the variables of each dimension into one table, with its coordinate of time."""
+    """Return the variables of each dimension in one table, with its coordinate of time."""
     remarks: list[str] = []
     by_dimension: dict[str, list[Column]] = {}
     for name, dimension, column, remark in variables:
@@ -120,5 +120,5 @@ def _counted(time: Column, attrs: dict[str, Any]) -> Column:
     if since is None:
         return time
     attrs["source_date"] = since["date"]
-    # a clock's seconds since 1970 would leave too few digits for the interval
+    # seconds since 1970 would leave too few digits for the interval
     return Column(time.label, time.values - time.values[0], since["unit"])

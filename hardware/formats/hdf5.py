@@ -1,7 +1,7 @@
 """HDF5 files, read with h5py: datasets of numbers in groups, and MATLAB files of version 7.3.
 
-A file may name other files in links, in external storage and in virtual datasets: nothing of that is followed. h5py is
-compiled and can crash on damaged bytes, in the process that `reading` asks.
+A file may name other files in links, in external storage and in virtual datasets: none of them is followed. h5py is
+compiled and can crash on damaged bytes; it runs in the process of `reading`.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("units", "unit")
 _CLASS = "MATLAB_class"
 _SPARSE = "MATLAB_sparse"
-"""Attribute of a group of MATLAB that holds the values, rows and columns of a sparse matrix."""
+"""Attribute of a MATLAB group with the values, rows and columns of a sparse matrix."""
 _DEEPEST = 16
 _MOST_OBJECTS = 10_000
-# MATLAB keeps what its cells refer to, and objects of its classes, in groups of these names.
+# MATLAB keeps the targets of its cells, and objects of its classes, in groups of these names
 _OF_MATLAB = frozenset({"#refs#", "#subsystem#"})
 
 
 def is_h5py_there() -> bool:
-    """Whether HDF5 files that are no NetCDF files can be read."""
+    """Whether HDF5 files other than NetCDF can be read."""
     try:
         import h5py  # noqa: F401
     except ImportError:
@@ -39,7 +39,7 @@ def is_h5py_there() -> bool:
 
 
 def is_netcdf4(path: os.PathLike[str] | str) -> bool:
-    """Whether an HDF5 file was written by a NetCDF library, or has dimensions as such a file has."""
+    """Whether a NetCDF library wrote an HDF5 file, or the file has dimensions like NetCDF."""
     import h5py
 
     with one_refusal("a whole HDF5 file"), h5py.File(path, "r") as file:
@@ -49,10 +49,10 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
 
 
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
-    """Read the numeric datasets of an HDF5 file by the dotted names of their groups.
+    """Return the numeric datasets of an HDF5 file, by the dotted names of their groups.
 
-    In a MATLAB file of version 7.3 the dimensions are the other way round, and groups are structures. DatasetError:
-    h5py is not installed, or the file is damaged or promises too much.
+    In a MATLAB file of version 7.3 the dimensions are transposed, and groups are structures. DatasetError: h5py is not
+    installed, or the file is damaged or declares too much.
     """
     what = "a MATLAB file of version 7.3" if matlab else "an HDF5 file"
     try:
@@ -68,7 +68,7 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
 
 
 def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str], matlab: bool) -> None:
-    """Read the datasets of a group, and of the groups in it."""
+    """Read the datasets of a group, and of its inner groups."""
     import h5py
 
     _read_rate(group, scope)
@@ -94,7 +94,7 @@ def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str
 
 
 def _items(group: Any, remarks: list[str], scope: Scope) -> Iterator[tuple[str, Any]]:
-    """Yield what lies in a group; links that lead elsewhere are not followed."""
+    """Yield the contents of a group; links to other places are not followed."""
     import h5py
 
     for name in group:
@@ -105,7 +105,7 @@ def _items(group: Any, remarks: list[str], scope: Scope) -> Iterator[tuple[str, 
 
 
 def _is_around(item: Any, group: Any) -> bool:
-    """Whether a group is one of those that another one lies in: a file may lead in circles."""
+    """Whether a group encloses another one: a file may lead in circles."""
     while True:
         if item == group:
             return True
@@ -115,7 +115,7 @@ def _is_around(item: Any, group: Any) -> bool:
 
 
 def _why_not(item: Any, matlab: bool) -> str:
-    """Return why a dataset is left out; empty for one that is read."""
+    """Return the reason for leaving out a dataset; empty for a readable one."""
     if item.external or item.is_virtual:
         return "its values are in another file, it is left out"
     kind = _text(item.attrs.get(_CLASS)) if matlab else ""
@@ -129,7 +129,7 @@ def _why_not(item: Any, matlab: bool) -> str:
 
 
 def _read_dataset(name: str, item: Any, scope: Scope, scopes: list[Scope], matlab: bool) -> None:
-    """Read the values of a dataset; its own rate makes it a structure of its own."""
+    """Read the values of a dataset; a rate of its own makes it a structure of its own."""
     scopes[0].numbers += item.size
     if scopes[0].numbers > MOST_SAMPLES:
         raise DatasetError(f"expected at most {MOST_SAMPLES} numbers, got more. Save fewer datasets.")
@@ -147,7 +147,7 @@ def _read_dataset(name: str, item: Any, scope: Scope, scopes: list[Scope], matla
 
 
 def _read_rate(item: Any, scope: Scope) -> None:
-    """Take the rate from the attributes of a group or dataset, where they give one."""
+    """Take the rate from the attributes of a group or dataset, if they give one."""
     for key in item.attrs:
         if key.lower() in RATES | INTERVALS:
             value = np.asarray(item.attrs[key])
@@ -157,7 +157,7 @@ def _read_rate(item: Any, scope: Scope) -> None:
 
 
 def _text(value: Any) -> str:
-    """Return an attribute as text; empty for another kind."""
+    """Return an attribute as text; empty for another type."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     return value if isinstance(value, str) else ""

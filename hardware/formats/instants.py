@@ -1,4 +1,4 @@
-"""From cells of text to instants: dates with times of day, clocks of 12 and 24 hours, minutes and seconds."""
+"""Instants from cells of text: dates with times of day, clocks of 12 and 24 hours, minutes and seconds."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ _MONTHS = {
     )
 }
 _CENTURY = 2000
-"""Years of two digits are those of this century: files of instruments are younger."""
+"""Century of years with two digits: files of instruments are younger."""
 _LONGEST_QUOTE = 40
 _DAY_SECONDS, _HOUR_SECONDS = 86_400.0, 3_600.0
 _NEXT_DAY = np.datetime64("1970-01-02", "ns")
-"""Times of day without a date are those of 1970-01-01."""
+"""Day of times without a date: they count as 1970-01-01."""
 _EVEN_STEPS = 1.5
-"""Largest step, in usual ones, of a clock that goes on over midnight without a pause."""
+"""Largest step, in usual steps, of a clock that runs over midnight without a pause."""
 
 _Stamps = NDArray[np.datetime64]
 
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """Instants of a column: as dates, as text that is no instant, and whether day and month may change places."""
+    """Instants of a column: dates, text that is no instant, and whether day and month are interchangeable."""
 
     stamps: _Stamps
     strange: list[tuple[int, str]]
@@ -68,7 +68,7 @@ def is_date(text: str) -> bool:
 
 
 def is_clock(text: str) -> bool:
-    """Whether a cell is a time of day without a date; minutes alone may be something else.
+    """Whether a cell is a time of day without a date; minutes and hours alone may mean something else.
 
     >>> is_clock("9:15:00"), is_clock("09:15 AM"), is_clock("09:15")
     (True, True, False)
@@ -78,7 +78,7 @@ def is_clock(text: str) -> bool:
 
 
 def is_day(text: str) -> bool:
-    """Whether a cell is a date alone, which says nothing of when a row was sampled.
+    """Whether a cell is a date alone, without the time of a sample.
 
     >>> is_day("2026-07-30"), is_day("30.07.2026"), is_day("2026.5")
     (True, True, False)
@@ -87,7 +87,7 @@ def is_day(text: str) -> bool:
 
 
 def date_of(text: str, order: str = DAY_FIRST) -> np.datetime64 | None:
-    """Return the instant of a time of day with or without its date (UTC, where it has an offset); None for no instant.
+    """Return the instant of a time of day with or without its date (UTC if it has an offset); None for no instant.
 
     >>> str(date_of("2026/07/30 20:07:43.5")), date_of("2026/13/30 20:07"), date_of("today")
     ('2026-07-30T20:07:43.500000000', None, None)
@@ -111,7 +111,7 @@ def date_of(text: str, order: str = DAY_FIRST) -> np.datetime64 | None:
 
 
 def _hour(match: re.Match[str]) -> int | None:
-    """Return the hour of a clock; None where there is no such hour."""
+    """Return the hour of a clock; None for an invalid hour."""
     hour, half = int(match["hour"]), match["half"]
     if half is None:
         return hour if hour <= 23 else None
@@ -121,7 +121,7 @@ def _hour(match: re.Match[str]) -> int | None:
 
 
 def _day(match: re.Match[str], order: str) -> str | None:
-    """Return the date of a stamp as ISO writes it; None where there is no such month."""
+    """Return the date of a stamp in ISO form; None for an invalid month."""
     if match["year"] is not None:
         year, month, day = int(match["year"]), int(match["month"]), int(match["day"])
     elif match["name"] is not None:
@@ -130,13 +130,13 @@ def _day(match: re.Match[str], order: str) -> str | None:
     else:
         one, other, year = int(match["one"]), int(match["other"]), int(match["late"])
         year += _CENTURY if len(match["late"]) == 2 else 0
-        # points stand between day and month wherever they are written at all
+        # dates with points always have the day first
         day, month = (one, other) if match["mark"] == "." or order != MONTH_FIRST else (other, one)
     return f"{year:04d}-{month:02d}-{day:02d}" if 1 <= month <= 12 else None
 
 
 def _at(day: str, hour: int, minute: int, second: int, fraction: str) -> np.datetime64 | None:
-    """Return an instant of a day, to the nanosecond; None where there is no such day."""
+    """Return an instant of a day, to the nanosecond; None for an invalid day."""
     nanoseconds = (hour * 3600 + minute * 60 + second) * 10**9 + int(f"{fraction:0<9.9}")
     try:
         return np.datetime64(day, "ns") + np.timedelta64(nanoseconds, "ns")
@@ -145,7 +145,7 @@ def _at(day: str, hour: int, minute: int, second: int, fraction: str) -> np.date
 
 
 def _offset(match: re.Match[str]) -> np.timedelta64:
-    """Return how far a stamp's clock is ahead of UTC."""
+    """Return the offset of a stamp's clock ahead of UTC."""
     zone = match["zone"] if match.re is _STAMP else None
     if zone is None or zone == "Z":
         return np.timedelta64(0, "ns")
@@ -157,9 +157,9 @@ def _offset(match: re.Match[str]) -> np.timedelta64:
 def read_instants(cells: Sequence[str], is_marker: Callable[[str], bool], order: str = "") -> Column:
     """Return cells of dates and times of day as seconds after the first one.
 
-    Where dates such as 02/03/2019 have their instants both with the day and with the month first, and the two differ,
-    the column says so in `doubt`. `is_marker` tells whether a cell stands for a missing sample. `order` is `day-first`
-    or `month-first`; empty: found from the dates.
+    Dates such as 02/03/2019 may be valid with the day first and with the month first. If the two orders give different
+    instants, `ambiguity` of the column reports it. `is_marker` recognises cells of missing samples. `order` is
+    `day-first` or `month-first`; empty: found from the dates.
     """
     read = _read(cells, is_marker, order or DAY_FIRST)
     known = _seconds(read.stamps, cells)
@@ -175,13 +175,13 @@ def read_instants(cells: Sequence[str], is_marker: Callable[[str], bool], order:
     if len(fitting) == 1:
         return _column(*fitting[0])
     first = next(cell.strip() for cell in cells if is_date(cell))
-    doubt = f"the dates, such as {first[:_LONGEST_QUOTE]!r}, may have the day or the month first"
-    return _column(known, read, doubt)
+    ambiguity = f"the dates, such as {first[:_LONGEST_QUOTE]!r}, may have the day or the month first"
+    return _column(known, read, ambiguity)
 
 
-def _column(seconds: Floats, read: _Read, doubt: str = "") -> Column:
+def _column(seconds: Floats, read: _Read, ambiguity: str = "") -> Column:
     dated = not bool(np.all(np.isnan(seconds)))
-    return Column("", seconds, dated=dated, strange=read.strange, doubt=doubt)
+    return Column("", seconds, dated=dated, strange=read.strange, ambiguity=ambiguity)
 
 
 def _read(cells: Sequence[str], is_marker: Callable[[str], bool], order: str) -> _Read:
@@ -199,7 +199,7 @@ def _read(cells: Sequence[str], is_marker: Callable[[str], bool], order: str) ->
 
 
 def _seconds(stamps: _Stamps, cells: Sequence[str]) -> Floats:
-    """Return instants as seconds after the first one; a clock without a date goes on over midnight."""
+    """Return instants as seconds after the first one; a clock without a date runs on over midnight."""
     known = stamps[~np.isnat(stamps)]
     if not len(known):
         return np.full(len(stamps), np.nan)
@@ -212,7 +212,7 @@ def _seconds(stamps: _Stamps, cells: Sequence[str]) -> Floats:
 
 
 def _wraps(seconds: Floats, period: float) -> Floats:
-    """Return how often a clock has begun again up to each row: a step back of half its period; less is disorder."""
+    """Return the restarts of a clock up to each row: steps back by half its period; smaller ones are disorder."""
     there = np.flatnonzero(np.isfinite(seconds))
     passed = np.zeros(len(seconds))
     passed[there[1:]] = np.diff(seconds[there]) < -0.5 * period

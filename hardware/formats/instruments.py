@@ -1,7 +1,7 @@
-"""Exports of instruments, told apart by the tables of `dialects/`: a file for each maker, a form for each export.
+"""Exports of instruments, recognised by the tables of `dialects/`: a file for each maker, a form for each export.
 
-A form says how an export is recognised, and where headings, units, rate and instants stand in it. What a form does not
-say is found by the general reader of texts, which reads the exports of all other makers alone.
+A form says how to recognise an export, and where it has headings, units, rate and instants. The general reader of
+texts finds the rest; it reads the exports of all other makers alone.
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ from vibroimpact.hardware.formats.table import Column, Table
 
 _FOLDER = Path(__file__).parent / "dialects"
 _HEAD = 8_000
-"""Characters from the start of a text in which a form is recognised."""
+"""Characters at the start of a text, in which a form is recognised."""
 _MARKS = {"tab": "\t", "semicolon": ";", "comma": ","}
 _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d{1,3})?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One export of a maker; texts are regular expressions over lines, whose first group is taken."""
+    """One export of a maker; texts are regular expressions for lines, and their first group is used."""
 
     maker: str
     signature: Sequence[str]
-    """All of them are found in an export of this form."""
+    """Expressions that an export of this form must all match."""
     delimiter: str = ""
     decimal: str = ""
-    """As the options of these names; empty: found from the rows."""
+    """As in the options of these names; empty: found from the rows."""
     replaced: Sequence[Sequence[str]] = ()
-    """Pairs of an expression and a text, which replaces it before the rows are read."""
+    """Pairs of an expression and its replacement, applied before the rows are read."""
     first_column: int = 1
-    """Cells before this one are settings beside the rows; 1 is the first."""
+    """Cells before this one are settings next to the rows; 1 is the first."""
     headings: str = ""
     """Headings of all columns."""
     names: str = ""
     units: str = ""
-    """Names and units are those of the last columns."""
+    """Names and units of the last columns."""
     time_unit: str = ""
     unit_words: Mapping[str, str] = field(default_factory=dict)
     """The maker's words for units."""
     headings_are_units: bool = False
-    """A heading that is a unit alone is the unit of its column."""
+    """A heading that is only a unit is the unit of its column."""
     time: str = ""
     """Heading of the instants."""
     time_column: int = 0
-    """Place of the instants where no heading says so; 1 is the first."""
+    """Place of the instants without a heading; 1 is the first."""
     interval: str = ""
     rate: str = ""
     start: str = ""
-    """`interval`, `rate` and `start` are numbers in the header; the second group is their unit, where there is one."""
+    """`interval`, `rate` and `start` are numbers in the header; the second group is their unit, if there is one."""
     counts: bool = False
     """The first column counts the samples."""
     left_out: str = ""
@@ -81,7 +81,7 @@ def forms() -> tuple[Form, ...]:
 
 
 def instrument_of(content: str) -> Instrument | None:
-    """Return the instrument that wrote a text; None where no maker's form is recognised.
+    """Return the instrument that wrote a text; None if no maker's form is recognised.
 
     >>> instrument_of("Time (s),Force (N)\\n0,1\\n") is None
     True
@@ -95,13 +95,13 @@ def instrument_of(content: str) -> Instrument | None:
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """A form, and the start of the text that has it."""
+    """A form, and the start of a text in this form."""
 
     form: Form
     head: str
 
     def prepared(self, content: str) -> str:
-        """Return the text as the general reader takes it: without settings beside the rows, as the form says."""
+        """Return the text for the general reader: replaced, and without settings next to the rows, as in the form."""
         for expression, text in self.form.replaced:
             content = re.sub(expression, text, content, flags=re.M)
         if self.form.first_column == 1:
@@ -118,7 +118,7 @@ class Instrument:
         return mark.join(cells[first - 1 :]) if is_row else line
 
     def described(self, columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
-        """Return columns, as the general reader names them, with names, units and clock of the form, and remarks."""
+        """Return columns of the general reader with names, units and clock of the form, and remarks."""
         named = self._with_headings(columns)
         filled = [column for column in named if len(column.values)]
         left_out = [column.label for column in filled if self._has(self.form.left_out, column.label)]
@@ -141,7 +141,7 @@ class Instrument:
         return named
 
     def _with_last(self, what: str, columns: Sequence[Column]) -> list[Column]:
-        """Return columns of which the last ones have the names or units of the header."""
+        """Return the columns, the last of them with the names or units of the header."""
         cells = [cell.strip("()[] ") for cell in self._cells(getattr(self.form, what))[: len(columns)]]
         kept = list(columns)
         for place, cell in enumerate(cells, len(columns) - len(cells)):
@@ -152,7 +152,7 @@ class Instrument:
         return kept
 
     def _with_own_unit(self, column: Column) -> Column:
-        """Return a column whose unit is one that is known here, from the words of the maker."""
+        """Return a column with a known unit, translated from the words of the maker."""
         unit = self.form.unit_words.get(column.unit, column.unit)
         if not unit and self.form.headings_are_units:
             word = self.form.unit_words.get(column.label, column.label)
@@ -169,7 +169,7 @@ class Instrument:
         return [replace(column, interval=interval, start=start) for column in columns]
 
     def tables(self, columns: Sequence[Column]) -> list[Table] | None:
-        """Return the tables of columns whose instants the form knows; None where the general rules find them."""
+        """Return the tables of columns if the form knows their instants, else None."""
         form = self.form
         if form.pairs:
             if not all(map(self._is_clock, columns[::2])) or len(columns) < 2 or len(columns) % 2:
@@ -189,7 +189,7 @@ class Instrument:
         return [Table(others, self._clock(columns[place]), time_place=place)]
 
     def _is_clock(self, column: Column) -> bool:
-        """Whether a column may have instants: its unit is one of time, or there is none; dates are in s already."""
+        """Whether a column may have instants: its unit is one of time, or empty; dates are in s already."""
         return column.dated or not column.unit or seconds_in(column.unit) is not None
 
     def _clock(self, column: Column) -> Column:
@@ -202,7 +202,7 @@ class Instrument:
         return replace(column, label=label, unit=unit if seconds_in(unit) is not None else "s")
 
     def _counted(self, count: Column, columns: Sequence[Column]) -> Table:
-        """Return columns whose samples are counted: one by one, or at instants where some are left out."""
+        """Return columns of counted samples: evenly spaced, or at instants if some samples are missing."""
         interval, begin = count.interval or 0.0, count.values[0]
         if len(count.values) == len(columns[0].values) and bool(np.all(np.diff(count.values) == 1.0)):
             start = count.start + interval * float(begin)
@@ -211,7 +211,7 @@ class Instrument:
         return Table([replace(column, interval=None) for column in columns], instants)
 
     def _cells(self, expression: str) -> list[str]:
-        """Return the cells of what an expression takes from the header; none where it takes nothing."""
+        """Return the cells that an expression finds in the header; empty without a match."""
         match = re.search(expression, self.head, re.M) if expression else None
         if match is None:
             return []
@@ -220,7 +220,7 @@ class Instrument:
         return [cell.strip() for cell in split_line(text, mark)]
 
     def _seconds(self, expression: str) -> float | None:
-        """Return a number of the header, of s (or Hz) where it has a unit."""
+        """Return a number of the header, in s (or Hz) if it has a unit."""
         match = re.search(expression, self.head, re.M) if expression else None
         number = _NUMBER.match(match[1].strip()) if match is not None else None
         if match is None or number is None:

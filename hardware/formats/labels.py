@@ -11,7 +11,7 @@ _WITH_UNIT = re.compile(r"(?P<name>[^\[\](){}<>]*?)\s*[\[({<]\s*(?P<unit>[^\[\](
 _AFTER_SLASH = re.compile(r"(?P<name>[^/]*[^/\s])\s+/\s+(?P<unit>\S.*)")
 _AFTER_IN = re.compile(r"(?P<name>\S.*\S|\S)\s+in\s+(?P<unit>\S{1,20})")
 _NO_UNITS_IN_WORDS = frozenset({"C", "F", "K", "total", "1", "-"})
-"""Words after `in` that are more likely degrees, or none, than the units that they could be."""
+"""Words after `in` that rather mean degrees, or nothing, than their unit."""
 _TIME_NAMES = frozenset(
     {"t", "time", "times", "zeit", "temps", "tempo", "tiempo", "x_value", "seconds", "sec"}
     | {"secs", "timestamp", "timestamps", "elapsed", "elapsed_time", "time_s", "time_sec", "t_s"}
@@ -19,7 +19,7 @@ _TIME_NAMES = frozenset(
 )
 
 _SMALLEST, _LARGEST, _LONGEST_TIME = 1e-15, 1e12, 86_400.0
-"""SI value of units that somebody measures in; of time, of a day."""
+"""Range of plausible units in SI; for a unit of time, at most a day."""
 _GRAVITY = 9.80665
 _LENGTH, _SPEED, _ACCELERATION, _FORCE = "m", "m s-1", "m s-2", "N"
 _WORDS = {
@@ -32,7 +32,7 @@ _WORDS = {
     )
     for word in words
 }
-"""Words in headings, with the units that they allow beside electrical ones and pure numbers."""
+"""Words in headings, with the units that they allow besides electrical ones and pure numbers."""
 _MECHANICAL = frozenset(
     {
         _LENGTH,
@@ -56,13 +56,13 @@ _PARTS_OF_SECONDS = {
     **dict.fromkeys(("millis", "millisecond", "milliseconds", "millisekunden", "msec", "msecs"), "ms"),
     **dict.fromkeys(("micros", "microsecond", "microseconds", "mikrosekunden", "usec", "usecs"), "us"),
 }
-"""Headings that name the instants by their unit."""
+"""Headings of instants that are themselves a unit."""
 _TIME_WITH_UNIT = re.compile(r"(?P<name>[a-z_]{1,20})_(?P<unit>ms|msec|millis|us|usec|micros|ns|s|sec)")
 
 _TIME_UNITS = frozenset({"s", "ms", "us", "µs", "μs", "ns"})
 
 LONGEST_LABEL = 120
-"""Characters of a heading that are read: it is a name and a unit, and goes into names and messages."""
+"""Most characters of a heading that are read: it is a name and a unit, and goes into names and messages."""
 
 
 def split_label(text: str) -> tuple[str, str]:
@@ -85,7 +85,7 @@ def split_label(text: str) -> tuple[str, str]:
 
 
 def is_time_unit(label: str) -> bool:
-    """Whether a heading is a unit of time alone, as `ms` is.
+    """Whether a heading is only a unit of time, such as `ms`.
 
     >>> is_time_unit("ms"), is_time_unit("m")
     (True, False)
@@ -103,7 +103,7 @@ def is_time_name(label: str) -> bool:
 
 
 def unit_in_time_name(label: str) -> str:
-    """Return the unit that a heading of instants names itself; empty where it is no such heading.
+    """Return the unit in a heading of instants; empty for any other heading.
 
     >>> unit_in_time_name("millis"), unit_in_time_name("timestamp_ms"), unit_in_time_name("force_ms")
     ('ms', 'ms', '')
@@ -117,7 +117,7 @@ def unit_in_time_name(label: str) -> str:
 
 
 def is_known_unit(label: str) -> bool:
-    """Whether a unit label means anything that is measured.
+    """Whether a unit label means a plausible measured unit.
 
     >>> is_known_unit("mV"), is_known_unit("acc"), is_known_unit("velocity")
     (True, False, False)
@@ -131,10 +131,9 @@ def is_known_unit(label: str) -> bool:
 
 
 def meant_unit(heading: str, unit: str) -> tuple[str, str]:
-    """Return the unit that a heading with this unit means, and what is to be said of it.
+    """Return the meaning of a unit under this heading, and a remark on it.
 
-    A mass is no unit of an acceleration, but thousandths of g are. A unit that contradicts its heading is taken for
-    none.
+    A unit of mass under an acceleration means thousandths of g. A unit that contradicts its heading counts as none.
 
     >>> meant_unit("Acceleration", "mg")[0], meant_unit("Force", "mV")[0], meant_unit("Displacement", "V s")[0]
     ('0.00980665 m s-2', 'mV', 'V s')
@@ -156,7 +155,7 @@ def meant_unit(heading: str, unit: str) -> tuple[str, str]:
 
 
 def seconds_in(unit: str) -> float | None:
-    """Return how many seconds a unit of time has; None where it is no unit of time.
+    """Return the seconds in a unit of time; None for any other unit.
 
     >>> seconds_in("ms"), seconds_in("m")
     (0.001, None)

@@ -1,7 +1,8 @@
 """LabVIEW measurement files (.lvm): a header for the file, one for each segment, and rows of text.
 
-National Instruments, "Specification for the LabVIEW Measurement File (.lvm)": `X_Columns` tells whether no, one or
-each channel has a column of instants; `Multi_Headings` whether each segment repeats its header.
+The source is National Instruments, "Specification for the LabVIEW Measurement File (.lvm)". `X_Columns` gives the
+number of columns of instants: none, one, or one per channel. `Multi_Headings` says whether each segment repeats its
+header.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class _Segment:
 
 
 def read_labview(content: str) -> RawFile:
-    """Read a LabVIEW measurement file. A header without end, or no rows, raises DatasetError."""
+    """Return the content of a LabVIEW measurement file; DatasetError for a header without end, or without rows."""
     lines, special = _without_special_blocks(content.splitlines())
     separator = _separator(lines)
     header, after = _header(lines, 0, separator)
@@ -54,7 +55,7 @@ def read_labview(content: str) -> RawFile:
         origin = begins if origin is None else origin
         late = _seconds_between(origin, begins)
         title = "" if number == 1 else f"segment {number}"
-        # what began at the same instant has one trigger, whatever its segment
+        # channels with equal starts share one trigger, in any segment
         own = "" if begins is not None and not late else title
         found, more = _tables(replace(segment, rows=rows), header, separator, decimal, late, own)
         tables += found
@@ -71,7 +72,7 @@ def read_labview(content: str) -> RawFile:
 
 
 def _without_special_blocks(lines: Sequence[str]) -> tuple[list[str], int]:
-    """Take out what other programs put between ***Start_Special*** and ***End_Special***."""
+    """Return the lines outside blocks of other programs (`***Start_Special***` and on), and the number of blocks."""
     kept, blocks, inside = [], 0, False
     for line in lines:
         if line.startswith("***Start_Special***"):
@@ -148,7 +149,7 @@ def _starts_header(lines: Sequence[str], place: int, separator: str, decimal: st
 
 
 def _is_row(line: str, separator: str, decimal: str) -> bool:
-    """Whether a line has numbers; a comment may stand in its last cell, an entry of a header has a key first."""
+    """Whether a line has numbers; its last cell may be a comment, and an entry of a header has a key first."""
     cells = split_line(line, separator)
     if not any(is_number(cell, decimal) for cell in cells):
         return any(cells) and all(is_marker(cell) for cell in cells) and len(cells) > 1
@@ -160,14 +161,14 @@ def _earliest(header: Header) -> np.datetime64 | None:
 
 
 def _seconds_between(first: np.datetime64 | None, later: np.datetime64 | None) -> float:
-    """Return the time between two instants, s; 0 where one is not known."""
+    """Return the time between two instants, s; 0 if one is unknown."""
     if first is None or later is None:
         return 0.0
     return float((later - first) / np.timedelta64(1, "ns")) * 1e-9
 
 
 def _stamps(header: Header) -> list[np.datetime64 | None]:
-    """Return when each channel began, cell by cell; None where the header does not say, or says 1904 or earlier."""
+    """Return the start of each channel, cell by cell; None if the header has none, or 1904 or earlier."""
     found: list[np.datetime64 | None] = []
     for date, time in zip(header.get("Date", ()), header.get("Time", ()), strict=False):
         # LabVIEW writes more digits of a second than a datetime64 holds
@@ -180,7 +181,7 @@ def _stamps(header: Header) -> list[np.datetime64 | None]:
 def _tables(
     segment: _Segment, header: Header, separator: str, decimal: str, late: float, title: str
 ) -> tuple[list[Table], list[str]]:
-    """Return the tables of one segment: one, or one for each channel where each has instants of its own."""
+    """Return the tables of one segment: one, or one per channel if each has instants of its own."""
     width = max(
         len(split_line(line, separator)) for line in (*segment.rows[:100], separator.join(segment.headings))
     )
@@ -208,13 +209,13 @@ def _tables(
 
 
 def _later(time: Column, late: float) -> Column:
-    """Return instants that begin when their segment did; some writers let them run on, others begin again."""
+    """Return instants shifted to the start of their segment, unless their writer lets them run on."""
     runs_on = late > 0.0 and float(np.nan_to_num(time.values[0])) >= late / 2.0
     return time if runs_on or not late else replace(time, values=time.values + late)
 
 
 def _without_false_units(columns: list[Column], remarks: list[str]) -> list[Column]:
-    """Take away a unit of time that the header gives to every channel: it is that of the instants."""
+    """Return columns without a unit of time that the header gives to every channel: it belongs to the instants."""
     unit = columns[0].unit if columns else ""
     if len(columns) < 2 or any(column.unit != unit for column in columns) or seconds_in(unit) is None:
         return columns
@@ -236,7 +237,7 @@ def _paired_tables(columns: Sequence[Column], header: Header, late: float, title
 
 @dataclass(frozen=True, slots=True)
 class _Declared:
-    """The entries of a segment header by channel, when each channel began, and when the first of them did."""
+    """The entries of a segment header by channel, the start of each channel, and the first start."""
 
     entries: Header
     stamps: Sequence[np.datetime64 | None]
@@ -246,8 +247,8 @@ class _Declared:
     def of(cls, header: Header, channels: int, step: int = 1) -> _Declared:
         """Return the entries of a header.
 
-        With a column of instants for each channel, the entries stand above every second column; some writers give
-        them without the empty cells between.
+        With a column of instants per channel, the entries stand above every second column. Some writers leave out the
+        empty cells between them.
         """
         entries = {}
         for key, cells in header.items():
@@ -257,7 +258,7 @@ class _Declared:
 
 
 def _declare(column: Column, declared: _Declared, number: int, late: float) -> Column:
-    """Return a column with what its segment header says of it."""
+    """Return a column with the entries of its segment header."""
 
     def entry(key: str) -> str:
         cells = declared.entries.get(key, ())
@@ -286,7 +287,7 @@ def _declare(column: Column, declared: _Declared, number: int, late: float) -> C
 
 
 def _length_remarks(columns: Sequence[Column]) -> list[str]:
-    """Say where the header and the rows do not agree."""
+    """Return remarks on different lengths in header and rows."""
     samples = [(column, column.attrs.get("declared_samples"), len(column.values)) for column in columns]
     return [
         f"{column.label}: the header says {declared} samples, the file has {there}"

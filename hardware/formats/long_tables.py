@@ -9,9 +9,9 @@ import numpy as np
 from vibroimpact.hardware.formats.table import Floats
 
 LONG = 8_000_000
-"""Characters from which a table is tried in pieces; a shorter one takes little memory as lines."""
+"""Characters from which a table is parsed in pieces; a shorter one takes little memory as lines."""
 _PIECE = 4_000_000
-"""Characters of a piece; its lines take some ten times their bytes while it is parsed."""
+"""Characters of a piece; its lines take some ten times their bytes during parsing."""
 
 
 def read_pieces(
@@ -21,10 +21,10 @@ def read_pieces(
     decimal: str,
     last_lines: Callable[[list[str]], list[str]],
 ) -> Floats | None:
-    """Return all columns of a full table of plain numbers, shape (column, row); None where it is not one.
+    """Return all columns of a full table of plain numbers, shape (column, row); None for other tables.
 
-    The first row begins at `begin`; no delimiter: blanks. `last_lines` returns the lines of the last piece as they are
-    to be read: the text may be cut off.
+    The first row begins at `begin`; a delimiter of None means blanks. `last_lines` returns the lines of the last piece
+    without cut cells.
     """
     if decimal == delimiter:
         return None
@@ -41,7 +41,7 @@ def read_pieces(
 
 
 def _end_of_piece(content: str, begin: int) -> int:
-    """Return where a piece ends: after a line, and the last one is no shorter than the others."""
+    """Return the end of a piece: after a line, with the last piece at least as long as the others."""
     if len(content) - begin < 2 * _PIECE:
         return len(content)
     end = content.find("\n", begin + _PIECE)
@@ -49,7 +49,7 @@ def _end_of_piece(content: str, begin: int) -> int:
 
 
 def _read(lines: Sequence[str], delimiter: str | None, decimal: str) -> Floats | None:
-    """Return the columns of full lines of plain numbers; None where they are something else."""
+    """Return the columns of full lines of plain numbers; None for other lines."""
     if decimal == ",":
         if any("." in line for line in lines):
             return None

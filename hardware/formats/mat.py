@@ -1,7 +1,7 @@
 """MATLAB files up to version 7, read with scipy: vectors of numbers, also in structures.
 
-scipy's reader is compiled and can crash on damaged bytes, in the process that `reading` asks. Version 7.3 is HDF5, see
-`hdf5`.
+scipy's reader is compiled and can crash on damaged bytes; it runs in the process of `reading`. Version 7.3 is HDF5,
+see `hdf5`.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ NUMERIC = frozenset(
 _READ = NUMERIC | {"struct"}
 _DEEPEST = 8
 _MOST_FIELDS = 10_000
-"""Fields of one structure: scipy compares each name with all others, which takes .2 s of so many and 40 of 16 MiB."""
+"""Most fields of one structure: scipy compares all pairs of names, in .2 s for this number and 40 s for 16 MiB."""
 _HEADER, _TAG, _BEGINNING = 128, 8, 256
 _MATRIX, _COMPRESSED = 14, 15
 _CELL, _STRUCTURE, _OBJECT = 1, 2, 3
-"""Classes of arrays that hold others."""
+"""Classes of arrays that hold other arrays."""
 
 
 def read_mat(path: os.PathLike[str] | str) -> RawFile:
-    """Read a MATLAB file of version 4 to 7: its numeric arrays, and those in its structures by dotted names.
+    """Return the numeric arrays of a MATLAB file of version 4 to 7, and those in its structures by dotted names.
 
-    A vector of instants (`t`, `time`) beside others makes them channels; `fs` or `dt` gives their rate. A damaged file,
-    or one without arrays of numbers, raises DatasetError.
+    A vector of instants (`t`, `time`) makes other vectors channels; `fs` or `dt` gives their rate. DatasetError: the
+    file is damaged, or has no arrays of numbers.
     """
     from scipy.io import loadmat, whosmat
 
@@ -73,7 +73,7 @@ def _check_sizes(listed: list[tuple[str, tuple[int, ...], str]]) -> None:
 
 
 def _check_fields(file: BinaryIO) -> None:
-    """Refuse a structure of very many fields; what is no file of version 5 to 7, or damaged, is left to scipy."""
+    """Raise DatasetError for a structure with too many fields; scipy handles other versions and damage."""
     order = {b"IM": "<", b"MI": ">"}.get(file.read(_HEADER)[-2:])
     if order is None:
         return
@@ -85,21 +85,21 @@ def _check_fields(file: BinaryIO) -> None:
 
 
 def _holders(file: BinaryIO, order: str) -> Iterator[bytes]:
-    """Yield the variables of a file that hold other arrays, without their tags; of others the beginning is read."""
+    """Yield the variables of a file that hold other arrays, without their tags; of others only the start is read."""
     while len(tag := file.read(_TAG)) == _TAG:
         kind, size = struct.unpack(f"{order}II", tag)
         following = file.tell() + size
         head = file.read(min(size, _BEGINNING))
         packed = kind == _COMPRESSED
-        begun = zlib.decompressobj().decompress(head, 3 * _TAG) if packed else tag + head
-        if (packed or kind == _MATRIX) and _class_of(memoryview(begun), order):
+        start = zlib.decompressobj().decompress(head, 3 * _TAG) if packed else tag + head
+        if (packed or kind == _MATRIX) and _class_of(memoryview(start), order):
             content = head + file.read(size - len(head))
             yield zlib.decompress(content)[_TAG:] if packed else content
         file.seek(following)
 
 
 def _class_of(matrix: memoryview, order: str) -> int:
-    """Return the class of an array that holds others, from its tag on; 0 of any other."""
+    """Return the class of an array that holds others, from its tag on; 0 for any other."""
     found: int = struct.unpack_from(f"{order}I", matrix, 2 * _TAG)[0] & 0xFF
     return found if found in (_CELL, _STRUCTURE, _OBJECT) else 0
 
@@ -131,19 +131,19 @@ def _check_fields_within(matrix: memoryview, order: str) -> None:
 
 
 def _size_of(inside: memoryview, place: int, order: str) -> int:
-    """Return the bytes of an element; those of a small one are in its tag."""
+    """Return the bytes of an element; a small element has them in its tag."""
     kind, size = struct.unpack_from(f"{order}II", inside, place)
     return int(kind >> 16 or size)
 
 
 def _after(inside: memoryview, place: int, order: str) -> int:
-    """Return where the element after one begins."""
+    """Return the start of the next element."""
     kind, size = struct.unpack_from(f"{order}II", inside, place)
     return place + _TAG if kind >> 16 else place + _TAG + -(-size // 8) * 8
 
 
 def _put(name: str, value: Any, scope: Scope, scopes: list[Scope], remarks: list[str]) -> None:
-    """Put a variable or field where it belongs: its numbers into its structure, a structure among the structures."""
+    """Put the numbers of a variable or field into its structure, and a structure among the structures."""
     label = scope.dotted(name)
     if not isinstance(value, np.ndarray) or (value.dtype.kind not in "fiub" and value.dtype.names is None):
         remarks.append(f"{label}: holds no real numbers and is left out")

@@ -1,4 +1,4 @@
-"""Formats of measurements that are not read here, by their first bytes, each with a package that reads it."""
+"""Formats of measurements that this package does not read, by their first bytes, each with a package that does."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import DatasetError
 
-# Sequence number, quality, a blank or NUL, then the station: the fixed header of miniSEED 2.
+# sequence number, quality, a blank or NUL, then the station: the fixed header of miniSEED 2
 _MINISEED = re.compile(rb"\d{6}[DRQM][ \x00][A-Z0-9 ]{5}", re.ASCII)
 _EDF_START = re.compile(rb"\d\d\.\d\d\.\d\d\d\d\.\d\d\.\d\d")
 """Date and time of EDF, at their place in its header."""
@@ -22,7 +22,7 @@ _SEGY_CARD = 80
 
 @dataclass(frozen=True, slots=True)
 class OtherFormat:
-    """A format: its name, a package that reads it, and whether a file that begins so is one."""
+    """A format: its name, a package that reads it, and a test of the first bytes."""
 
     name: str
     package: str
@@ -30,7 +30,7 @@ class OtherFormat:
 
 
 def _is_sac(start: bytes) -> bool:
-    """Whether the version in the header of SAC, in either order of bytes, is one that SAC has."""
+    """Whether the version in the header of SAC, in either byte order, is valid."""
     if len(start) < _SAC_HEADER or b"\x00" not in start:
         return False
     found = {struct.unpack_from(order, start, _SAC_VERSION_AT)[0] for order in ("<i", ">i")}
@@ -65,7 +65,7 @@ OTHERS = (
 
 
 def refuse_other_format(start: bytes) -> None:
-    """Raise DatasetError, with the format and a package that reads it, if a file begins as one that is not read here.
+    """Raise DatasetError, with the format and a package for it, if a file begins as an unsupported format.
 
     >>> refuse_other_format(b"# time, force")
     >>> [other.package for other in OTHERS if other.begins(b"MDF     4.10    ")]

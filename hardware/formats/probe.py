@@ -1,4 +1,4 @@
-"""Refuse a file that a library cannot read: for damage, since it would crash or never end, or since it is not there."""
+"""Refuses a file that a library cannot read: damaged, missing, or never ending."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 
 class UnreadableError(DatasetError):
-    """A file does not read; `raised` is the name of the exception of the library, if that is how it ended."""
+    """A file does not read; `raised` is the name of the library's exception, if there was one."""
 
     def __init__(self, message: str, raised: str) -> None:
         super().__init__(message)
@@ -19,7 +19,7 @@ class UnreadableError(DatasetError):
 
 
 def check_reads(path: os.PathLike[str] | str) -> None:
-    """Raise UnreadableError, which the importer gives the file's name, if the library cannot read a NetCDF file.
+    """Raise UnreadableError, to which the importer adds the file's name, if the library cannot read a NetCDF file.
 
     See `analysis.files.probing`.
     """
@@ -34,7 +34,7 @@ def check_reads(path: os.PathLike[str] | str) -> None:
 
 @contextmanager
 def one_refusal(what: str) -> Iterator[None]:
-    """Turn what a library raises on a damaged file, MemoryError too, into one DatasetError.
+    """Turn a library's errors on a damaged file, MemoryError too, into one DatasetError.
 
     >>> with one_refusal("a whole MATLAB file"):
     ...     raise KeyError("t")

@@ -1,4 +1,4 @@
-"""Reads a file of any format in a process of its own: whatever its bytes do to a library, they do it there.
+"""Reads a file of any format in a process of its own, so that its bytes can harm no other process.
 
 The process has limits of time and memory, writes nothing and has no network (`fmus.confinement`).
 """
@@ -17,14 +17,14 @@ from vibroimpact.hardware.formats.crossing import unpacked, unpacked_datasets
 from vibroimpact.hardware.formats.table import RawFile
 
 SECONDS, RATE = 10.0, 2.5e5
-"""Limit of the processor time: a constant, s, and the size of the file over a rate, bytes/s.
+"""Limit of the processor time: a constant, s, plus the size of the file over a rate, bytes/s.
 
-A text with cells that are no numbers, the slowest of all, is read at some 2e6 bytes/s.
+The slowest files, texts with cells that are no numbers, are read at some 2e6 bytes/s.
 """
 MEMORY, PER_BYTE = 4 << 30, 128
-"""Limit of the memory, bytes: what small files expand to, and for each byte of the file.
+"""Limit of the memory, bytes: a constant for the expansion of small files, plus this many per byte of the file.
 
-A text of one digit a row takes 125 bytes for each of its own.
+A text of one digit a row takes 125 bytes per byte.
 """
 _MOST_BYTES = 1 << 32
 _READER = "vibroimpact.hardware.formats.reading_child:read"
@@ -41,39 +41,39 @@ _KINDS: tuple[tuple[tuple[bytes, ...], str, tuple[str, ...]], ...] = (
     (arrow.SIGNATURES, "Parquet or Feather", ("pyarrow.parquet", "pyarrow.ipc")),
     ((labview.SIGNATURE.encode(),), "LabVIEW", ()),
 )
-"""First bytes of a file, what messages call it, and the modules that read it."""
+"""First bytes of a file, its name in messages, and the modules that read it."""
 
 
 def read_file(path: Path, **options: Any) -> RawFile:
-    """Return what `choosing.read_raw` finds in a file, read in a process of its own.
+    """Return the content of a file from `choosing.read_raw`, run in a process of its own.
 
     Parameters
     ----------
     path : Path
-        Of a file that `check_file` has passed.
+        A file that `check_file` has passed.
     **options
-        Those of `read_raw`, of what JSON can say.
+        Options of `read_raw`, as JSON values.
 
     Raises
     ------
     DatasetError, UsageError
-        As `read_raw`, and where the file crashes its library, or is not read within the limits.
+        As in `read_raw`; also if the file crashes its library, or is not read within the limits.
     """
     return _read_apart(path, _READER, options, unpacked)
 
 
-def read_datasets_apart(path: Path, wanted: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
-    """Return what `uff.read_datasets` finds in a universal file, read in another process.
+def read_datasets_apart(path: Path, kinds: frozenset[int]) -> tuple[list[int], list[dict[str, Any]], bool]:
+    """Return the content of a universal file from `uff.read_datasets`, run in another process.
 
-    Errors are those of `read_file`.
+    Errors are as in `read_file`.
     """
-    return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(wanted)}, unpacked_datasets)
+    return _read_apart(path, _READER_OF_DATASETS, {"wanted": sorted(kinds)}, unpacked_datasets)
 
 
 def _read_apart(
     path: Path, reader: str, options: Mapping[str, Any], taken: Callable[[Any, Sequence[bytearray]], Found]
 ) -> Found:
-    """Return what a reader finds in a file, taken from the facts and buffers of its answer."""
+    """Return a reader's result for a file, from the facts and buffers of its answer."""
     size = path.stat().st_size
     kind, libraries = _kind_of(path)
     seconds = SECONDS + size / RATE
@@ -100,7 +100,7 @@ def _read_apart(
 
 
 def _kind_of(path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return what messages call a file by its first bytes, and the modules that read it."""
+    """Return a file's name in messages, by its first bytes, and the modules that read it."""
     with path.open("rb") as file:
         start = file.read(512)
     if uff.is_uff(start):
@@ -112,7 +112,7 @@ def _kind_of(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _error_of(answer: Answer, kind: str) -> Exception:
-    """Return the error of the process that read; one that no reader foresaw is what the file did to it."""
+    """Return the error of the reading process; an unexpected one is an effect of the file."""
     for known in (DatasetError, UsageError):
         if answer.error == known.__name__:
             return known(answer.text)

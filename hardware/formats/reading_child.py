@@ -1,4 +1,4 @@
-"""The other end of `reading`: reads a file in the process that was asked to."""
+"""The child side of `reading`: reads a file in its own process."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.crossing import packed, packed_datasets
 from vibroimpact.hardware.formats.uff import read_datasets as datasets_of
 
-measured_unit("g")  # loads the units once: this module is imported before a process is made for each file
+measured_unit("g")  # loads the units once: this module is imported before each file's process is forked
 
 
 def read(path: str, options: dict[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-    """Return what a file holds, for another process."""
+    """Return the content of a file, for another process."""
     return packed(read_raw(Path(path), **options))
 
 

@@ -1,4 +1,4 @@
-"""What a file holds before anything is decided: columns of numbers as they stand in it.
+"""The raw content of a file, before any decision: its columns of numbers.
 
 Every format's module returns a `RawFile`; the modules that make a recording of it know no format.
 """
@@ -16,11 +16,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 LARGEST_FILE = 2**29
-"""Bytes; a longer recording is better cut where it was made than guessed at here."""
+"""Largest file, bytes; a longer recording is better cut by its own program."""
 MOST_SAMPLES = 50_000_000
-"""Samples of all channels together that one import may hold in memory."""
+"""Most samples of all channels together in one import."""
 MOST_COLUMNS = 1024
-"""Columns of one file; more are most likely rows."""
+"""Most columns of one file; more are most likely rows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,29 +30,29 @@ class Column:
     Attributes
     ----------
     label : str
-        What the file calls it; empty where it does not.
+        Its name in the file, or empty.
     values : ndarray of float, shape (row,)
-        NaN where the file has no number.
+        NaN for a missing number.
     unit : str
-        Unit label of the file; empty where it has none.
+        Unit label of the file, or empty.
     overrange : ndarray of bool, shape (row,), or None
-        Where the file says that the input was beyond its range or open.
+        Samples that the file marks as beyond the range, or as an open input.
     interval : float or None
-        Sampling interval that the header declares for this column, s.
+        Declared sampling interval of this column, s.
     start : float
         Instant of the first row by the header, s.
     group : str
-        What began this column, where a table holds columns of several starts.
+        The start event of this column, if a table has columns of several starts.
     rails : tuple of float or None
         Smallest and largest value that the converter can give, in the unit of `values`.
     attrs : dict
-        What else the file says.
+        Further facts in the file.
     dated : bool
         The cells are dates or times of day, and so instants; the values are s after the first one.
     strange : sequence of (row, text)
         Cells of text that are neither a number nor a known marker; their values are NaN.
-    doubt : str
-        What else the instants may be, in words; a column with a doubt is asked about where it is used.
+    ambiguity : str
+        Another possible reading of the instants, in words; using such a column needs a decision of the user.
     """
 
     label: str
@@ -66,26 +66,26 @@ class Column:
     attrs: dict[str, Any] = field(default_factory=dict)
     dated: bool = False
     strange: Sequence[tuple[int, str]] = ()
-    doubt: str = ""
+    ambiguity: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns that were written row by row together; they may end at different rows.
+    """Columns written together, row by row; they may end at different rows.
 
     Attributes
     ----------
     columns : sequence of Column
     time : Column or None
-        Instants of the rows, where the format says which column has them, s.
+        Instants of the rows, s, if the format names their column.
     title : str
-        Group or segment of the file; empty where it has one only.
+        Group or segment of the file; empty if it has only one.
     vectors : bool
-        The columns are arrays of their own, not rows of one table: lengths and meanings need not agree.
+        The columns are separate arrays, not rows of one table: lengths and meanings may differ.
     time_place : int
-        How many columns stand before that of the instants in the file.
+        Number of columns before the instants in the file.
     rate : float or None
-        Samples per second, where the file says so for all columns.
+        Samples per second, if the file gives one rate for all columns.
     """
 
     columns: Sequence[Column]
@@ -96,9 +96,9 @@ class Table:
     rate: float | None = None
 
     def clock_of(self, column: Column) -> Floats | None:
-        """Return the instants that hold for the rows of a column, s; None where no column has them.
+        """Return the instants of a column's rows, s; None if no column has them.
 
-        Shape (row,); they may end before the column does, in a table of rows.
+        Shape (row,); in a table of rows they may end before the column does.
         """
         if self.time is None or column.group:
             return None
@@ -112,7 +112,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class RawFile:
-    """All that an importer found in a file.
+    """The content of a file, as an importer found it.
 
     Attributes
     ----------
@@ -120,11 +120,11 @@ class RawFile:
         In words: "LabVIEW measurement file, version 2".
     tables : sequence of Table
     remarks : sequence of str
-        What was noticed on the way, one sentence each.
+        Observations, one sentence each.
     attrs : dict
-        Provenance that the file itself gives: `source_date`, `operator`, ...
+        Provenance in the file itself: `source_date`, `operator`, ...
     damage : str
-        What is wrong with the file as a whole; a remark, and part of a refusal for another reason.
+        Damage of the file as a whole; it is a remark, and part of other refusals.
     """
 
     source_format: str

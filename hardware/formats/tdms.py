@@ -1,7 +1,7 @@
 """TDMS files of National Instruments, read with npTDMS.
 
-The instants come from `wf_increment` and `wf_start_offset`; `wf_samples` is the size of a block, not the length,
-and a start in 1904 (the epoch of LabVIEW) means that time is relative.
+The instants come from `wf_increment` and `wf_start_offset`. `wf_samples` is the size of a block, not the length. A
+start in 1904 (the epoch of LabVIEW) means relative time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, Floats, Raw
 
 _MOST_HEARD = 20
 _LONGEST_HEARD = 120
-_SAYS_CUT_OFF = re.compile(
+_CUT_OFF_WARNING = re.compile(
     r"Last segment (of file has less data than expected|metadata is incomplete)"
     r"|Data size \d+ is not a multiple|Cropping data from"
 )
@@ -34,18 +34,18 @@ _SCALE_NUMBER = re.compile(r"NI_Scale\[(\d+)\]")
 _COEFFICIENTS = re.compile(r"NI_Scale\[\d+\]_Polynomial_Coefficients_Size")
 _SCALES = "NI_Number_Of_Scales"
 _MOST_SCALES = 100
-"""Scales of one channel, and coefficients of one polynomial: npTDMS loops as often as a file says, NI writes a few."""
+"""Most scales of a channel, and coefficients of a polynomial: npTDMS loops over the declared number, NI writes few."""
 _EPOCH_ENDS = np.datetime64("1904-01-02")
 
 
 def read_tdms(path: os.PathLike[str] | str) -> RawFile:
-    """Read a TDMS file: a table for each group.
+    """Return the content of a TDMS file, in a table for each group.
 
-    A damaged file, or one without channels of numbers, raises DatasetError.
+    DatasetError: the file is damaged, or has no channels of numbers.
     """
     from nptdms import TdmsFile
 
-    # opened here, so that it is closed too where the reader gives up
+    # opened here, so that it is closed even if the reader gives up
     with (
         one_refusal("a whole TDMS file"),
         _heard() as heard,
@@ -53,14 +53,14 @@ def read_tdms(path: os.PathLike[str] | str) -> RawFile:
         TdmsFile.open(stream) as file,
     ):
         raw = _read(file, os.stat(path).st_size)
-    damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
-    others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
+    damage = _CUT_OFF if any(_CUT_OFF_WARNING.match(line) for line in heard) else ""
+    others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _CUT_OFF_WARNING.match(line))
     return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
 
 
 @contextmanager
 def _heard() -> Iterator[list[str]]:
-    """Collect what npTDMS would write to the terminal: that a file is cut off, that a text is not UTF-8."""
+    """Collect npTDMS' messages, such as on a cut file or a text that is not UTF-8."""
     from nptdms.log import log_manager
 
     heard: list[str] = []
@@ -84,13 +84,13 @@ def _read(file: Any, size: int) -> RawFile:
     for holder in (file, *groups, *channels):
         _refuse_many_scales(holder.properties)
     declared = sum(len(channel) for channel in channels)
-    if declared > size:  # nothing in this format is compressed: a sample is a byte at least
+    if declared > size:  # nothing in this format is compressed: a sample has at least one byte
         raise DatasetError(
             f"expected at most {size} samples in as many bytes, got {declared}. It is damaged."
         )
     starts = [stamp for channel in channels if (stamp := _start(channel)) is not None]
     origin = min(starts, default=None)
-    # what began at the same instant has one trigger, whatever its group
+    # channels with equal starts share one trigger, in any group
     tables = [
         _table(group, origin, remarks, len(groups) > 1 and None in [_start(one) for one in group.channels()])
         for group in groups
@@ -106,7 +106,7 @@ def _read(file: Any, size: int) -> RawFile:
 
 
 def _refuse_many_scales(known: Mapping[str, Any]) -> None:
-    """Raise DatasetError where properties promise more scales, or coefficients of one, than any program writes."""
+    """Raise DatasetError if properties declare more scales, or coefficients of one, than any program writes."""
     numbers = [int(found[1]) + 1 for key in known if (found := _SCALE_NUMBER.match(key))]
     promised = {_SCALES: known[_SCALES]} if _SCALES in known else {"scales": max(numbers, default=0)}
     promised |= {key: known[key] for key in known if _COEFFICIENTS.fullmatch(key)}
@@ -122,7 +122,7 @@ def _refuse_many_scales(known: Mapping[str, Any]) -> None:
 
 
 def _without_copies(groups: list[Any]) -> tuple[list[Any], list[str]]:
-    """Leave out the decimated copies that SignalExpress keeps beside its samples, to draw them."""
+    """Return the groups without the decimated copies that SignalExpress keeps for drawing, and a remark."""
     levels = [_number(group.properties.get("DecimationLevel")) or 0.0 for group in groups]
     if not any(levels) or all(levels):
         return groups, []
@@ -163,9 +163,9 @@ def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks:
     )
     increment = _number(known.get("wf_increment"))
     samples = _number(known.get("wf_samples"))
-    said = "wf_samples is the size of a block, not the length: the samples are counted"
-    if samples is not None and samples != len(values) and said not in remarks:
-        remarks.append(said)
+    remark = "wf_samples is the size of a block, not the length: the samples are counted"
+    if samples is not None and samples != len(values) and remark not in remarks:
+        remarks.append(remark)
     return column_of(
         channel.name,
         values,
@@ -182,7 +182,7 @@ def _number(value: Any) -> float | None:
 
 
 def _rails(channel: Any) -> tuple[float, float] | None:
-    """Return what the smallest and largest raw integers become by a linear scale; None where it is another."""
+    """Return the scaled ends of the raw integers' range; None unless the scale is linear."""
     known = channel.properties
     raw = channel.read_data(0, 1, scaled=False)
     if isinstance(raw, dict):  # DAQmx: raw data by scaler

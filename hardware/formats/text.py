@@ -1,4 +1,4 @@
-"""CSV and other tables of text: the delimiter, the decimal sign, headings and units are found from the data."""
+"""CSV and other tables of text: delimiter, decimal sign, headings and units are found from the data."""
 
 from __future__ import annotations
 
@@ -53,18 +53,18 @@ _SUMMARIES = frozenset(
     | {"max", "maximum", "sum", "total", "count", "n", "range", "peak", "pk-pk", "peak-peak", "crest"}
     | {"mittelwert", "mittel", "effektivwert", "standardabweichung", "summe", "anzahl", "moyenne", "somme"}
 )
-"""Words before a number that is one of a whole column, in the lines below a table."""
+"""Words before a number that summarises a whole column, in the lines below a table."""
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
 _LONG_HEAD = 200_000
-"""Characters at the start and in the middle of a long text from which its dialect is found."""
+"""Characters at the start and in the middle of a long text, from which its dialect is found."""
 _MOST_STRANGE = 0.01
 DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "blank": None}
 
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How the rows of a text are written: what is between cells, the decimal sign, and whether words are among them."""
+    """The form of a text's rows: delimiter, decimal sign, and whether there are columns of words."""
 
     delimiter: str | None
     decimal: str
@@ -75,9 +75,9 @@ class Dialect:
         return split_line(line, self.delimiter)
 
     def is_row(self, line: str) -> bool:
-        """Whether a line is a row of numbers, markers and dates, with at least one that says something.
+        """Whether a line is a row of numbers, markers and dates, with at least one number or date.
 
-        Where there are columns of words, a row begins with a number, a time or a day.
+        With columns of words, a row begins with a number, a time or a day.
         """
         cells = self.cells(line)
         kinds = [is_number(cell, self.decimal) or is_date(cell) for cell in cells]
@@ -87,10 +87,10 @@ class Dialect:
 
 
 def read_text(content: str, delimiter: str | None = "", decimal: str = "", dates: str = "") -> RawFile:
-    """Read a table of text, as its instrument writes it where a form of `dialects/` is recognised.
+    """Return a table of text, in the form of its instrument if `dialects/` has it.
 
-    The delimiter stands between cells (None: blanks), `dates` is `day-first` or `month-first`; what is empty is found
-    from the rows. Without rows of numbers DatasetError is raised.
+    The delimiter stands between cells (None: blanks), `dates` is `day-first` or `month-first`. Empty arguments are
+    found from the rows. DatasetError: there are no rows of numbers.
     """
     content = with_plain_numbers(content)
     instrument = instrument_of(content)
@@ -117,7 +117,7 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "", dates
 
 @dataclass(frozen=True, slots=True)
 class _Parsed:
-    """How rows are written, all columns with names and units, those without cells too, and remarks."""
+    """The dialect, all columns with names and units, including empty ones, and remarks."""
 
     dialect: Dialect
     columns: list[Column]
@@ -145,7 +145,7 @@ def _parsed(content: str, delimiter: str | None, decimal: str, dates: str) -> _P
 
 
 def _parsed_in_pieces(content: str, delimiter: str | None, decimal: str) -> _Parsed | None:
-    """Return the columns of a long table that has plain numbers alone below its headings; None for another text."""
+    """Return the columns of a long table with only plain numbers below its headings; None for another text."""
     head = content[:_LONG_HEAD].splitlines(keepends=True)[:-1]
     middle = content.find("\n", len(content) // 2) + 1
     beyond = content[middle : middle + _LONG_HEAD].splitlines()[:_LINES_TRIED]
@@ -160,8 +160,8 @@ def _parsed_in_pieces(content: str, delimiter: str | None, decimal: str) -> _Par
     cut: list[str] = []
 
     def last_lines(lines: list[str]) -> list[str]:
-        rows, said = without_cut_cells(lines, content, dialect.delimiter, dialect.decimal)
-        cut.extend(said)
+        rows, cut_remarks = without_cut_cells(lines, content, dialect.delimiter, dialect.decimal)
+        cut.extend(cut_remarks)
         return rows
 
     begin = sum(map(len, head[:first]))
@@ -175,12 +175,12 @@ def _parsed_in_pieces(content: str, delimiter: str | None, decimal: str) -> _Par
 
 
 def _tables(columns: Sequence[Column]) -> list[Table]:
-    """Return the tables of columns, their instants told apart by the general rules."""
+    """Return the tables of columns, with instants set apart by the general rules."""
     return in_pairs(columns) or [without_count(with_time(Table(columns)))]
 
 
 def _remarks_on(tables: Sequence[Table]) -> list[str]:
-    """Say which columns are taken as instants where no heading says so."""
+    """Return remarks on columns that are taken as instants without a heading."""
     remarks: list[str] = []
     if tables[0].time is not None and tables[0].time.label == FIRST_WITHOUT_HEADING:
         remarks.append(
@@ -207,22 +207,22 @@ def _is_plain(line: str) -> bool:
 def find_dialect(
     lines: Sequence[str], delimiter: str | None = "", decimal: str = ""
 ) -> tuple[Dialect, list[str]]:
-    """Return how the rows are written, and remarks on what is doubtful about it.
+    """Return the dialect of the rows, and remarks on doubts about it.
 
-    That dialect is chosen in which most lines are rows of one width; of equals the one with more columns.
+    The dialect with most lines as rows of one width is chosen; of equals, the one with more columns.
     """
     return _dialect_of(_tried_lines(lines), delimiter, decimal)
 
 
 def _dialect_of(tried: Sequence[str], delimiter: str | None, decimal: str) -> tuple[Dialect, list[str]]:
-    """Return how some lines are written, and remarks on what is doubtful about it."""
+    """Return the dialect of some lines, and remarks on doubts about it."""
     delimiters = DELIMITERS.values() if delimiter == "" else (delimiter,)
     signs = (".", ",") if not decimal else (decimal,)
     is_quoted = 2 * sum(line.count('"') > 1 for line in tried) > len(tried)
-    # a comma may be both where quotes tell which it is: "0,002","1,5"
+    # a comma may be both if quotes distinguish the two
     tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign or is_quoted]
     best, (count, width) = _best_of(tries, tried)
-    if 2 * count < len(tried):  # a column of words may be among the numbers
+    if 2 * count < len(tried):  # there may be a column of words among the numbers
         lax, (rows, more) = _best_of([replace(dialect, words=True) for dialect in tries], tried)
         if rows > 2 * count:
             best, width = lax, more
@@ -247,7 +247,7 @@ def _dialect_of(tried: Sequence[str], delimiter: str | None, decimal: str) -> tu
 
 
 def _grouped(rows: Sequence[str], dialect: Dialect) -> list[str]:
-    """Say where points are separators of thousands, since commas are decimal."""
+    """Return remarks on points that count as separators of thousands, since commas are decimal."""
     if dialect.decimal != ",":
         return []
     remarks: list[str] = []
@@ -271,9 +271,9 @@ def _thousands(where: str, cell: str) -> DatasetError:
 
 
 def _best_of(dialects: Sequence[Dialect], lines: Sequence[str]) -> tuple[Dialect | None, tuple[int, int]]:
-    """Return the dialect in which most lines are rows of one width, and how many of what width.
+    """Return the dialect in which most lines are rows of one width, and their number and width.
 
-    Of equals that one counts which makes numbers of more cells, then that of more cells.
+    Of equals, the dialect with more numbers wins, then the one with more cells.
     """
     best: Dialect | None = None
     score = (0, 0, 0)
@@ -288,7 +288,7 @@ def _best_of(dialects: Sequence[Dialect], lines: Sequence[str]) -> tuple[Dialect
 
 
 def _tried_lines(lines: Sequence[str]) -> list[str]:
-    """Return lines from the start, where the header is, and from the middle, where the data are."""
+    """Return lines from the start, with the header, and from the middle, with the data."""
     start = [line for line in lines[:_LONGEST_HEADER] if _is_plain(line)]
     middle = len(lines) // 2
     return start[:_LINES_TRIED] + [line for line in lines[middle : middle + _LINES_TRIED] if _is_plain(line)]
@@ -316,7 +316,7 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
 
 
 def _without_footer(body: list[tuple[int, str]], dialect: Dialect) -> tuple[list[tuple[int, str]], list[str]]:
-    """Return the lines without those of means, counts and the like that end a table, and a remark on them."""
+    """Return the lines without final lines of means, counts and the like, and a remark on these."""
     end = len(body)
     while end > 1 and _first_cell(body[end - 1][1], dialect) in _SUMMARIES:
         end -= 1
@@ -338,7 +338,7 @@ def _without_footer(body: list[tuple[int, str]], dialect: Dialect) -> tuple[list
 
 
 def _is_footer(lines: Sequence[tuple[int, str]], total: int, dialect: Dialect) -> bool:
-    """Whether lines of words that end a table have numbers, or are many; others are left to `_rows`."""
+    """Whether lines of words at the end of a table have numbers, or are many; `_rows` handles others."""
     numbers = any(is_number(cell, dialect.decimal) for _, line in lines for cell in dialect.cells(line))
     return numbers or len(lines) > max(1, _MOST_STRANGE * total)
 
@@ -356,9 +356,9 @@ def _begins_with_number(line: str, dialect: Dialect) -> bool:
 
 
 def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
-    """Return names and units of as many columns as `width`, as far as the lines before the first row give them.
+    """Return names and units of `width` columns, as far as the lines before the first row give them.
 
-    Marks of comments are taken off. The delimiter is that of the rows; headings may use another.
+    Comment marks are removed. The delimiter belongs to the rows; headings may use another.
     """
     lines = [line for line in header if _uncommented(line)][-8:]
     found = [cells for cells in (_heading_cells(line, width, delimiter) for line in lines) if cells]
@@ -375,18 +375,20 @@ def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[
 def _all_headings(
     header: Sequence[str], rows: Sequence[str], width: int, delimiter: str | None
 ) -> tuple[list[str], list[str], list[str]]:
-    """Return names and units of all columns, also where some begin below the headings, and remarks on these."""
+    """Return names and units of all columns, even if some begin below the headings, and remarks on these."""
     labels, units = headings(header, width, delimiter)
     narrow = len(split_line(rows[0], delimiter)) if rows else width
     if any(labels) or narrow >= width:
         return labels, units, []
-    begun = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
+    first_row = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
     labels, units = headings(header, narrow, delimiter)
     several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
     verb = "have" if width > narrow + 1 else "has"
-    said = message(f"{several} in row {begun} of the table, and {verb} no heading (", Argument("name"), ")")
+    remark = message(
+        f"{several} in row {first_row} of the table, and {verb} no heading (", Argument("name"), ")"
+    )
     more = [""] * (width - narrow)
-    return labels + more, units + more, [said] if any(labels) else []
+    return labels + more, units + more, [remark] if any(labels) else []
 
 
 def _uncommented(line: str) -> str:
@@ -404,7 +406,7 @@ def _heading_cells(line: str, width: int, delimiter: str | None) -> list[str]:
         for form in (cells, [cell for cell in cells if cell]):
             if len(form) == width and any(form):
                 return form
-            # a row may end in a delimiter, or its last heading be left out
+            # a row may end in a delimiter, or its last heading may be missing
             is_short = len(form) == width - 1 and (ends or len(form) >= 2)
             if is_short and mark == delimiter and mark is not None and any(form):
                 return [*form, ""]
@@ -412,7 +414,7 @@ def _heading_cells(line: str, width: int, delimiter: str | None) -> list[str]:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a line is one of units: all in brackets, or two and all of them known; one may be a short name."""
+    """Whether a line has units: all in brackets, or several and all known; a single one may be a short name."""
     filled = [cell for cell in cells if cell]
     if all(cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled):
         return True
@@ -423,7 +425,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 def columns_of(
     cells: Sequence[Column], labels: Sequence[str], units: Sequence[str]
 ) -> tuple[list[Column], list[str]]:
-    """Return the columns of numbers, without those of words, and remarks on them."""
+    """Return the columns of numbers, without columns of words, and remarks on these."""
     columns, remarks = [], []
     for place, (column, label, unit) in enumerate(zip(cells, labels, units, strict=True), 1):
         name = label or f"column_{place}"
@@ -453,5 +455,5 @@ def columns_of(
 
 
 def _is_text(column: Column) -> bool:
-    """Whether a column is one of words: remarks, names."""
+    """Whether a column has mostly words: remarks, names."""
     return 2 * len(column.strange) >= max(1, int(np.isfinite(column.values).sum()) + len(column.strange))

@@ -20,7 +20,7 @@ from vibroimpact.hardware.formats.probe import missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
 
 SIGNATURE = re.compile(rb"(?:[ ]*\r?\n)*[ ]{4}-1[ ]*\r?\n[ ]{1,5}\d{1,5}(?:[bB][^\r\n]*)?[ ]*\r?\n")
-# The edges of datasets as pyuff looks for them: binary samples stand right before.
+# edges of datasets as pyuff looks for them; binary samples stand right before
 _EDGE = re.compile(rb"[ ]{4}-1(?:[\r\n]|[ ]{74}|\Z)")
 _FUNCTION = 58
 _UNITS = 164
@@ -39,14 +39,14 @@ KINDS = {
     12: "a spectrum",
 }
 _OVER_TIME = frozenset({0, 1})
-# What the ordinate is, in SI (dataset 164, units code 1); others have a label of their own.
+# units of the ordinate in SI (dataset 164, units code 1); others have a label of their own
 _SI_UNITS = {8: "m", 9: "N", 11: "m/s", 12: "m/s^2", 13: "N", 15: "Pa", 16: "kg"}
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 _CUT_OFF = "the file is cut off: its last dataset has no end, and is left out"
 
 
 def is_uff(start: bytes) -> bool:
-    """Whether a file begins as a universal file does: the mark of a dataset alone in a line, then its number.
+    """Whether a file begins as a universal file: the mark of a dataset alone in a line, then its number.
 
     >>> is_uff(b"    -1\\n    58\\nNONE\\n"), is_uff(b"-1\\n58\\n"), is_uff(b"    -1\\r\\n    58b     1     2\\r\\n")
     (True, False, True)
@@ -55,24 +55,24 @@ def is_uff(start: bytes) -> bool:
 
 
 def read_uff(path: os.PathLike[str] | str) -> RawFile:
-    """Read the functions over time of a universal file; those with one set of instants share a table.
+    """Return the functions over time of a universal file; functions with the same instants share a table.
 
     DatasetError: pyuff is not installed, or the file is damaged or has no function over time.
     """
     types, datasets, cut = read_datasets(path, frozenset({_FUNCTION, _UNITS}))
     functions = [found for found in datasets if found["type"] == _FUNCTION]
     units: Mapping[str, Any] = next((found for found in datasets if found["type"] == _UNITS), {})
-    with one_refusal("a whole universal file (UFF)"):  # of which pyuff leaves out what it does not find
+    with one_refusal("a whole universal file (UFF)"):  # pyuff leaves out what it does not find
         raw = _sorted_out(functions, units, Counter(types), cut)
     return replace(raw, damage=_CUT_OFF if cut else "")
 
 
 def read_datasets(
-    path: os.PathLike[str] | str, wanted: frozenset[int]
+    path: os.PathLike[str] | str, kinds: frozenset[int]
 ) -> tuple[list[int], list[Mapping[str, Any]], bool]:
-    """Return the types of all datasets, those of the wanted types as pyuff reads them, and whether the file is cut off.
+    """Return the types of all datasets, the contents of the wanted types, and whether the file is cut off.
 
-    Without pyuff, and for a damaged file, DatasetError is raised.
+    DatasetError: pyuff is not installed, or the file is damaged.
     """
     try:
         import pyuff
@@ -82,15 +82,15 @@ def read_datasets(
         cut = len(_EDGE.findall(stream.read())) % 2 == 1
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # numpy's, of numbers in damaged files
+            warnings.simplefilter("ignore")  # numpy's, on numbers in damaged files
             file = pyuff.UFF(os.fspath(path))
             types = [int(kind) for kind in file.get_set_types()]
             if len(types) > 2 * MOST_COLUMNS:
                 raise DatasetError(f"expected at most {2 * MOST_COLUMNS} datasets, got {len(types)}.")
-            return types, [file.read_sets(at) for at, kind in enumerate(types) if kind in wanted], cut
+            return types, [file.read_sets(at) for at, kind in enumerate(types) if kind in kinds], cut
     except DatasetError:
         raise
-    # the reader gives up on damaged bytes with whatever error they lead to
+    # on damaged bytes the reader may raise any error
     except Exception as problem:
         besides = f" Besides, {_CUT_OFF}." if cut else ""
         raise DatasetError(
@@ -101,7 +101,7 @@ def read_datasets(
 def _sorted_out(
     functions: Sequence[Mapping[str, Any]], units: Mapping[str, Any], types: Counter[int], cut: bool
 ) -> RawFile:
-    """Return the functions over time; say what the others are."""
+    """Return the functions over time, with remarks on the others."""
     remarks = [
         f"{count} datasets of type {kind} are left out; functions (58) over time are read"
         for kind, count in sorted(types.items())
@@ -139,21 +139,21 @@ def _sorted_out(
         tables.insert(0, Table(even, vectors=True))
     if not tables:
         kinds = ", ".join(str(kind) for kind in sorted(types)) or "none"
-        lost = f" Besides, {_CUT_OFF}." if cut else ""
+        cut_remark = f" Besides, {_CUT_OFF}." if cut else ""
         what = joined("; ", (reworded(line, lambda text: text.split(";")[0]) for line in remarks))
         raise DatasetError(
             message(
                 "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type ",
                 *(kinds, *((" (", reworded(what, lambda text: text[:300]), ")") if what else ())),
                 ". In Python, hardware.formats.universal.read_universal reads frequency responses, spectra, shapes "
-                f"and geometry.{lost}",
+                f"and geometry.{cut_remark}",
             )
         )
     return RawFile("universal file (UFF 58)", tables, remarks)
 
 
 def _add(tables: dict[bytes, Table], column: Column, instants: Floats) -> None:
-    """Add a function to the table that has its instants, or a table of its own."""
+    """Add a function to the table with its instants, or to a new table."""
     key = (instants + 0.0).tobytes()  # 0 and -0 are one instant
     table = tables.get(key)
     if table is None:
@@ -163,7 +163,7 @@ def _add(tables: dict[bytes, Table], column: Column, instants: Floats) -> None:
 
 
 def _why_not(found: Mapping[str, Any]) -> str:
-    """Return what a function is that is none over time; empty for one that is."""
+    """Return the kind of a function that is not over time; empty for one that is."""
     if found.get("data") is None:  # the reader knows no samples of this type, or the file ends before them
         return "a function without samples"
     kind = int(found.get("func_type", 0))
@@ -179,7 +179,7 @@ def _why_not(found: Mapping[str, Any]) -> str:
 
 
 def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, Floats | None]:
-    """Return a function, and its instants (s) where they are not counted by an increment."""
+    """Return a function, and its instants (s) unless an increment counts them."""
     declared = int(found.get("num_pts", 0))
     values = np.asarray(found["data"], dtype=np.float64)[: declared or None]
     unit = text_of(found.get("ordinate_axis_units_lab"))
@@ -197,7 +197,7 @@ def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, F
 
 
 def _label(found: Mapping[str, Any], with_place: bool) -> str:
-    """Return what a function is called: its first line, and its node and direction where that is not enough."""
+    """Return a function's name: its first line, with its node and direction if that is not unique."""
     name = text_of(found.get("id1"))
     if name and not with_place:
         return name
@@ -208,6 +208,6 @@ def _label(found: Mapping[str, Any], with_place: bool) -> str:
 
 
 def text_of(value: Any) -> str:
-    """Return a text of the file; NONE stands for none."""
+    """Return a text of the file; NONE counts as empty."""
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

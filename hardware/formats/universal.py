@@ -1,6 +1,6 @@
-"""What a universal file (UFF) holds beside functions over time: frequency responses, spectra, shapes and geometry.
+"""Contents of a universal file (UFF) besides functions over time: frequency responses, spectra, shapes, geometry.
 
-A recording has channels over time alone, so that these are not imported; analyses of modes take them from here.
+A recording has only channels over time, so they are not imported; analyses of modes read them here.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Numbers = NDArray[np.float64] | NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A node and a direction of it: `+X`, `-RZ`; empty where the file has none."""
+    """A node and a direction: `+X`, `-RZ`; empty if the file has none."""
 
     node: int
     direction: str
@@ -52,7 +52,7 @@ class UniversalFunction:
     abscissa : ndarray of float, shape (point,)
         In `abscissa_unit`: Hz for a spectrum, s for a time response.
     values : ndarray of float or complex, shape (point,)
-        In `unit`, over `per_unit` where there is one: `m/s^2` per `N`.
+        In `unit`, over `per_unit` if there is one: `m/s^2` per `N`.
     response, reference : Place
     """
 
@@ -69,7 +69,7 @@ class UniversalFunction:
 
 @dataclass(frozen=True, slots=True)
 class UniversalShape:
-    """Data at nodes of dataset 55.
+    """Data at nodes, from dataset 55.
 
     Attributes
     ----------
@@ -77,16 +77,16 @@ class UniversalShape:
         `a normal mode`, `a complex mode`, ...
     name : str
     number : int
-        Of the mode, or of the step of frequency.
+        Number of the mode, or of the frequency step.
     frequency : float
         Hz; NaN for a complex mode.
     damping_ratio : float
-        Viscous, relative to the critical one; NaN where the dataset has none.
+        Viscous, relative to the critical one; NaN if the dataset has none.
     eigenvalue : complex
         1/s; NaN for a normal mode.
     nodes : ndarray of int, shape (node,)
     values : ndarray of float or complex, shape (node, direction)
-        X, Y, Z, and rotations about them where there are six.
+        X, Y, Z, and rotations about them if there are six.
     """
 
     kind: str
@@ -101,7 +101,7 @@ class UniversalShape:
 
 @dataclass(frozen=True, slots=True)
 class UniversalFile:
-    """Datasets of a universal file by what they are.
+    """Datasets of a universal file, by kind.
 
     Attributes
     ----------
@@ -112,9 +112,9 @@ class UniversalFile:
     coordinates : ndarray of float, shape (node, 3)
         In the unit of length of the file, `units`.
     traces : mapping
-        Labels of nodes that are joined by lines, by the name of the trace; 0 lifts the pen.
+        Labels of nodes joined by lines, by the name of the trace; 0 lifts the pen.
     units : str
-        The system of units of dataset 164; empty where there is none.
+        The system of units of dataset 164, or empty.
     left_out : mapping
         Number of datasets of other types, by type.
     """
@@ -129,7 +129,7 @@ class UniversalFile:
 
 
 def read_universal(path: os.PathLike[str] | str) -> UniversalFile:
-    """Return functions, shapes and geometry of a universal file, equal to what pyuff reads.
+    """Return functions, shapes and geometry of a universal file, equal to pyuff's.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ def read_universal(path: os.PathLike[str] | str) -> UniversalFile:
     Returns
     -------
     UniversalFile
-        Of datasets 58, 55, 15, 82, 2411 and 164.
+        From datasets 58, 55, 15, 82, 2411 and 164.
 
     Raises
     ------
     DatasetError
-        pyuff is not installed, the file is damaged, cut off, or holds more than an import takes.
+        pyuff is not installed, or the file is damaged, cut off, or larger than an import takes.
     """
     types, datasets, cut = read_datasets_apart(Path(path), _READ)
     if cut:

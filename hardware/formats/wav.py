@@ -1,4 +1,4 @@
-"""WAV files, read with scipy: integers of 8 to 64 bits as parts of full scale, floats as they are."""
+"""WAV files, read with scipy: integers of 8 to 64 bits as parts of full scale, floats unchanged."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 
 SIGNATURES = (b"RIFF", b"RIFX", b"RF64")
-# What scipy says of parts of a file that hold no samples (names, comments), and of one that is cut off.
+# scipy's warnings on parts of a file without samples (names, comments), and on a cut file
 _KNOWN_WORDS = ("Chunk (non-data) not understood", "Reached EOF prematurely", "Incomplete chunk ID")
 _MOST_PARTS = 10_000
 _CUT_OFF = "the file is cut off: it holds less samples than it declares, and what is there is read"
 
 
 def read_wav(content: bytes) -> RawFile:
-    """Read the bytes of a WAV file: a column for each of its channels.
+    """Return the content of a WAV file: a column for each channel.
 
-    A damaged, compressed or empty file raises DatasetError.
+    DatasetError: the file is damaged, compressed or empty.
     """
     from scipy.io import wavfile
 
     data = _samples_of(content)
-    with one_refusal("a whole WAV file of plain samples"), warnings.catch_warnings(record=True) as said:
+    with one_refusal("a whole WAV file of plain samples"), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
-        # a frame that was cut off is none
+        # an incomplete frame is dropped
         rate, samples = wavfile.read(io.BytesIO(content[: data.end] if data.is_cut else content))
     if samples.size > MOST_SAMPLES:
         raise DatasetError(
@@ -45,7 +45,7 @@ def read_wav(content: bytes) -> RawFile:
             f"expected samples of 1 to {MOST_COLUMNS} channels at a rate above 0, got {len(table)} of "
             f"{table.shape[1]} at {rate} Hz."
         )
-    heard = sorted({str(one.message) for one in said if not str(one.message).startswith(_KNOWN_WORDS)})
+    heard = sorted({str(one.message) for one in warned if not str(one.message).startswith(_KNOWN_WORDS)})
     remarks = [f"scipy says: {line[:120]}" for line in heard]
     if table.dtype.kind != "f":
         remarks.append(
@@ -63,7 +63,7 @@ def read_wav(content: bytes) -> RawFile:
 
 @dataclass(frozen=True, slots=True)
 class _Samples:
-    """Where a file has its samples: the byte after the last whole frame, bits of a sample, and if some are missing."""
+    """The place of the samples: the byte after the last whole frame, bits of a sample, and whether it is cut."""
 
     end: int
     bits: int
@@ -71,9 +71,9 @@ class _Samples:
 
 
 def _samples_of(content: bytes) -> _Samples:
-    """Return where the samples are; scipy says what is wrong where they cannot be found.
+    """Return the place of the samples; if they cannot be found, scipy reports the problem.
 
-    More parts than any program writes raise DatasetError.
+    DatasetError: more parts than any program writes.
     """
     order, place, frame, bits = (">" if content.startswith(b"RIFX") else "<"), 12, 0, 0
     found: _Samples | None = None

@@ -1,12 +1,12 @@
-"""Signs in numbers that are no ASCII: the minus of typesetters, and blanks between thousands."""
+"""Non-ASCII signs in numbers: the minus of typesetters, and blanks between thousands."""
 
 from __future__ import annotations
 
 import re
 
-# Before a digit, at the start of a cell or of an exponent.
+# before a digit, at the start of a cell or of an exponent
 _MINUS = re.compile('(?<![^\\s;,\t|"eE])\u2212(?=[\\d.,])')
-# Narrow, fixed and thin blanks between groups of three digits; a plain one only where it is in a cell of its own.
+# narrow, fixed and thin blanks between groups of three digits; a plain one only in a cell of its own
 _BLANKS = "\u202f\u00a0\u2009"
 _GROUPS = re.compile(rf"(?<=\d)[{_BLANKS}](?=\d{{3}}(?!\d))")
 _PLAIN = re.compile(
@@ -14,7 +14,7 @@ _PLAIN = re.compile(
 )
 _PLAIN_GROUP = re.compile(r"\d \d{3}(?!\d)")
 _FIRST_LINES = 20_000
-"""Characters in which a delimiter other than a blank is looked for."""
+"""Characters in which a delimiter other than a blank is searched."""
 
 
 def with_plain_numbers(content: str) -> str:

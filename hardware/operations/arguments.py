@@ -1,4 +1,4 @@
-"""Arguments that operations on rigs share, worded once."""
+"""Arguments shared by operations on rigs."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Recorded = Annotated[Path, Option("--output", "-o", help="Recording to write (.n
 Channels = Annotated[
     list[str],
     Option(
-        help="NAME=TERMINAL[,RANGE]: an input and its range in V; repeat it, 8 at most.",
+        help="NAME=TERMINAL[,RANGE]: an input and its range in V; repeatable, 8 at most.",
         metavar="NAME=TERMINAL[,RANGE]",
         python="channels: Sequence[str]",
     ),
 ]
 Rate = Annotated[float, Option(help="Samples per second and channel.")]
-Duration = Annotated[float | None, Option(help="s; else until Ctrl-C.")]
+Duration = Annotated[float | None, Option(help="Duration, s; by default until Ctrl-C.")]
 Calibrations = Annotated[
     list[Path] | None,
     Option(
-        help="File of calibrations (TOML): volts become m, N.",
+        help="File of calibrations (TOML), for values in m or N instead of V.",
         metavar="FILE.toml",
         python="calibration: Sequence[str | os.PathLike[str]] = ()",
     ),

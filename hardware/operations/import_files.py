@@ -9,7 +9,7 @@ from typing import Annotated
 from vibroimpact.fmus.operations import Door, Force, Operation, Option, Positional, operation
 
 Setting = partial(Option, python="")
-"""Options that say something of the columns are one argument in Python: `settings`."""
+"""Options on columns are one argument in Python: `settings`."""
 
 
 @operation(
@@ -17,7 +17,7 @@ Setting = partial(Option, python="")
     Door("import_recording", also=("settings: ImportSettings | Mapping[str, Any] | None = None",)),
 )
 class ImportFiles(Operation):
-    """Import measurements of one laboratory run into a recording, and say what is odd about them.
+    """Import measurements of one laboratory run as a recording, and report gaps, clipping and unit doubts.
 
     Example: vibroimpact import base.txt board.txt --name base --name board --unit g -o a0.nc --figure a0.png
     """
@@ -32,50 +32,57 @@ class ImportFiles(Operation):
     output: Annotated[Path, Option("--output", "-o", help="Recording to write (.nc).", python="")]
     name: Annotated[
         list[str] | None,
-        Setting(help="Name of a column; repeat it for each, in order, without the instants."),
+        Setting(help="Name of a column; repeat it for each column in order, except the instants."),
     ] = None
     unit: Annotated[
         list[str] | None,
-        Setting(help="Unit of a column (g, m/s^2, mV, N, ...); one is for all."),
+        Setting(help="Unit of a column (g, m/s^2, mV, N, ...); a single one holds for all."),
     ] = None
-    scale: Annotated[list[float] | None, Setting(help="Factor on the values; one is for all.")] = None
-    offset: Annotated[list[float] | None, Setting(help="Added after the scale; one is for all.")] = None
-    rate: Annotated[float | None, Setting(help="Samples per second, whatever the file says.")] = None
+    scale: Annotated[
+        list[float] | None, Setting(help="Factor on the values; a single one holds for all columns.")
+    ] = None
+    offset: Annotated[
+        list[float] | None, Setting(help="Offset added after the scale; a single one holds for all columns.")
+    ] = None
+    rate: Annotated[float | None, Setting(help="Samples per second, in place of the file's rate.")] = None
     start: Annotated[float | None, Setting(help="Instant of the first sample, s.")] = None
     time_column: Annotated[
         str | None, Setting(help="Heading or number of the column of instants, or none.")
     ] = None
     columns: Annotated[
         str | None,
-        Setting(help="Columns to import, headings or numbers with commas between; 1 is the first."),
+        Setting(help="Columns to import: headings or numbers, separated by commas; 1 is the first."),
     ] = None
     events: Annotated[
         bool | None,
         Setting(
-            "--events/--no-events", help="The columns are instants of events, or none is; else it is found."
+            "--events/--no-events",
+            help="Treat all columns as instants of events, or none; by default detected.",
         ),
     ] = None
     window: Annotated[
         str | None,
-        Setting(help="Observation of the events, START:END in s.", metavar="START:END"),
+        Setting(help="Observation window of the events, START:END in s.", metavar="START:END"),
     ] = None
     masked: Annotated[
         list[str] | None,
-        Setting(help="Span in which nothing was measured, START:END in s; repeat it.", metavar="START:END"),
+        Setting(help="Span without measurement, START:END in s; may be repeated.", metavar="START:END"),
     ] = None
     delimiter: Annotated[
         str | None,
-        Setting(help="Between cells of text: tab, comma, semicolon, bar, blank; else it is found."),
+        Setting(help="Delimiter of text: tab, comma, semicolon, bar, blank; by default detected."),
     ] = None
-    decimal: Annotated[str | None, Setting(help='Decimal sign of text, "." or ","; else it is found.')] = None
+    decimal: Annotated[str | None, Setting(help='Decimal sign of text, "." or ","; by default detected.')] = (
+        None
+    )
     dates: Annotated[
         str | None,
-        Setting(help="Dates such as 02/03/2019: day-first or month-first; else it is found."),
+        Setting(help="Dates such as 02/03/2019: day-first or month-first; by default detected."),
     ] = None
     settings: Annotated[
         Path | None,
         Option(
-            help="The same as keys of a TOML file; without it, FILE.toml beside each file.",
+            help="TOML file with these options as keys; by default FILE.toml beside each file.",
             python="common: ImportSettings | None = None",
         ),
     ] = None

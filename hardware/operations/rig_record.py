@@ -22,7 +22,7 @@ from vibroimpact.hardware.operations.arguments import (
 class Record(Operation):
     """Record inputs of a rig; the recording says which rig made it.
 
-    A journal beside it has all samples meanwhile: after any death of the program `rig recover` makes the recording.
+    A journal beside it has all samples: after any death of the program, `rig recover` makes the recording.
 
     Example: vibroimpact rig record --rig virtual:RIG.toml --channel tip=Dev1/ai0,5 --rate 5000 --duration 2 -o tip.nc
     """
@@ -34,7 +34,7 @@ class Record(Operation):
     loopback: Annotated[
         list[str] | None,
         Option(
-            help="The same of an input to which an output is wired.",
+            help="Input to which an output is wired, and its range in V.",
             metavar="NAME=TERMINAL[,RANGE]",
             python="loopback: Sequence[str] = ()",
         ),

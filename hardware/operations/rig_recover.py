@@ -1,4 +1,4 @@
-"""Operation `rig recover`: the journal of a measurement that died into a recording."""
+"""Operation `rig recover`: the journal of an aborted measurement into a recording."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vibroimpact.fmus.operations import Door, Force, Operation, Option, Position
 
 @operation("hardware.programs.recover:recover_into", Door("recover"))
 class Recover(Operation):
-    """Make the recording of a measurement that died, from its journal.
+    """Make the recording of an aborted measurement, from its journal.
 
     Example: vibroimpact rig recover tip.journal -o tip.nc
     """
@@ -18,12 +18,13 @@ class Recover(Operation):
     journal: Annotated[
         Path,
         Positional(
-            help="Journal of a measurement that died.",
+            help="Journal of an aborted measurement.",
             metavar="REC.journal",
             python="journal: str | os.PathLike[str]",
         ),
     ]
     output: Annotated[
-        Path | None, Option("--output", "-o", help="Recording to write; else REC.nc beside it.", python="")
+        Path | None,
+        Option("--output", "-o", help="Recording to write; by default REC.nc beside the journal.", python=""),
     ] = None
     force: Force = False

@@ -16,10 +16,10 @@ class ServeRig(Operation):
     """
 
     file: Annotated[Path, Positional(help="File of a virtual rig (TOML).", metavar="RIG.toml")]
-    port: Annotated[int, Option(min=0, max=65535, help="Port; 0: any free one.")] = 31763
-    speed: Annotated[float | None, Option(help="Seconds of the rig in a second; else as the file says.")] = (
-        None
-    )
+    port: Annotated[int, Option(min=0, max=65535, help="Port; 0: any free port.")] = 31763
+    speed: Annotated[
+        float | None, Option(help="Seconds of the rig in a second of real time; by default as the file says.")
+    ] = None
     lockstep: Annotated[
-        bool, Option("--lockstep", help="Time goes on only while a program waits for it.")
+        bool, Option("--lockstep", help="Time advances only while a program waits for it.")
     ] = False

@@ -15,12 +15,16 @@ class DriveSine(Operation):
     Example: vibroimpact rig sine --rig grpc://127.0.0.1:31763 --output Dev1/ao0 --frequency 5.3 --amplitude 1
     """
 
-    output: Annotated[str, Option(help="Output that drives.", metavar="TERMINAL", python="terminal: str")]
-    frequency: Annotated[float, Option(help="Hz.")]
-    amplitude: Annotated[float, Option(help="V.")]
-    ramp: Annotated[float, Option(help="Time in which it rises, and falls at the end, s.")] = 0.5
-    duration: Annotated[float | None, Option(help="s, ramps included; else until Ctrl-C.")] = None
+    output: Annotated[str, Option(help="Driving output.", metavar="TERMINAL", python="terminal: str")]
+    frequency: Annotated[float, Option(help="Frequency, Hz.")]
+    amplitude: Annotated[float, Option(help="Amplitude, V.")]
+    ramp: Annotated[
+        float, Option(help="Duration of the rise at the start and of the fall at the end, s.")
+    ] = 0.5
+    duration: Annotated[
+        float | None, Option(help="Duration, ramps included, s; by default until Ctrl-C.")
+    ] = None
     rate: Annotated[float, Option(help="Samples per second.")] = 10_000.0
-    most_amplitude: Annotated[float, Option(help="Limit of the output, V.")] = 5.0
-    most_slew: Annotated[float, Option(help="Limit of the output, V/s.")] = 2000.0
+    most_amplitude: Annotated[float, Option(help="Limit of the output voltage, V.")] = 5.0
+    most_slew: Annotated[float, Option(help="Limit of the output slew rate, V/s.")] = 2000.0
     rig: RigChoice = None

@@ -28,19 +28,19 @@ class RecordSpikes(Operation):
     output: Recorded
     channel: Channels
     rate: Rate
-    threshold: Annotated[float, Option(help="Beyond it is a pulse, unit of the channel; negative: below it.")]
+    threshold: Annotated[
+        float, Option(help="Threshold of a pulse, unit of the channel; a negative one is passed downwards.")
+    ]
     duration: Duration = None
-    pulses: Annotated[int | None, Option(help="Pulses after which it ends.")] = None
-    on: Annotated[str, Option(help="Channel that has the pulses; else the first.")] = ""
-    presamples: Annotated[int, Option(help="Samples that are kept of before a pulse.")] = 64
-    postsamples: Annotated[int, Option(help="Samples that are kept of after a pulse.")] = 64
+    pulses: Annotated[int | None, Option(help="Number of pulses after which the measurement ends.")] = None
+    on: Annotated[str, Option(help="Channel with the pulses; by default the first.")] = ""
+    presamples: Annotated[int, Option(help="Number of samples kept before a pulse.")] = 64
+    postsamples: Annotated[int, Option(help="Number of samples kept after a pulse.")] = 64
     dead_time: Annotated[
         float,
-        Option(
-            help="Time from the start of a pulse, s, within which what passes the threshold belongs to it."
-        ),
+        Option(help="Dead time from the start of a pulse, s; later crossings within it belong to the pulse."),
     ] = 0.0
-    hysteresis: Annotated[float, Option(help="Part of the threshold below which a pulse is over.")] = 0.5
+    hysteresis: Annotated[float, Option(help="Part of the threshold below which a pulse ends.")] = 0.5
     calibration: Calibrations = None
     rig: MeasuringRig = None
     force: Force = False

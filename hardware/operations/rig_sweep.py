@@ -13,9 +13,9 @@ from vibroimpact.hardware.operations.arguments import RigChoice
     "hardware.programs.sweep.command:sweep_rig", Door("measure_sweep", also=("progress: bool = True",))
 )
 class MeasureSweep(Operation):
-    """Measure a frequency sweep, up and down, as a dataset like that of a campaign; the same command goes on with it.
+    """Measure a frequency sweep, up and down, as a dataset like a campaign's; the same command continues it.
 
-    Ctrl-C brings the output to rest; what is measured is kept.
+    Ctrl-C brings the output to rest; finished steps are kept.
 
     Example: vibroimpact rig sweep examples/rig/sweep.toml -o sweep
     """
@@ -31,7 +31,7 @@ class MeasureSweep(Operation):
         Option(
             "--output",
             "-o",
-            help="Folder of its dataset.",
+            help="Folder of the dataset.",
             metavar="FOLDER",
             python="folder: str | os.PathLike[str]",
         ),
@@ -39,5 +39,7 @@ class MeasureSweep(Operation):
     rig: RigChoice = None
     dry_run: Annotated[
         bool,
-        Option("--dry-run", help="Draw the planned output, say how long it takes, drive nothing.", python=""),
+        Option(
+            "--dry-run", help="Draw the planned output and print its duration without driving it.", python=""
+        ),
     ] = False

@@ -1,4 +1,4 @@
-"""Measure until the end, keep what is wanted in a journal or in memory, and make the recording of it."""
+"""Measure to the end, keep the selected samples in a journal or in memory, and make the recording."""
 
 from __future__ import annotations
 
@@ -32,15 +32,16 @@ from vibroimpact.hardware.rig.opening import refusal_of
 
 NO_END = "the program died: what its journal has is here"
 LONG_PULSE = 1.0
-"""Duration of a pulse, s, from which on the threshold is doubted."""
+"""Duration of a pulse, s, above which the threshold is doubted."""
 ABOVE_REST = "the level of rest may lie beyond the lower threshold"
 _GAP, _COUNT = TypeAdapter(Gap), TypeAdapter(int)
 
 
 class Store:
-    """Where samples are kept: a journal, or memory; and in memory what a journal no longer takes.
+    """The store of samples: a journal or memory; memory also takes the samples that a failed journal does not.
 
-    `failure` is why the journal takes no more (empty where it does), `kept` the number of samples of each input.
+    `failure` is the reason for which the journal takes no more (else empty), `kept` the number of samples of each
+    input.
     """
 
     def __init__(self, header: Mapping[str, Any], journal: Journal | None) -> None:
@@ -50,7 +51,7 @@ class Store:
 
     @property
     def journal(self) -> Journal | None:
-        """The journal, while it takes anything."""
+        """The journal, while it works."""
         return None if self.failure else self._journal
 
     def append(self, block: Block) -> None:
@@ -64,7 +65,7 @@ class Store:
         self._rest.blocks.append(block)
 
     def note(self, **values: Any) -> None:
-        """Keep what is to be known."""
+        """Keep facts on the measurement."""
         if self.journal is not None:
             try:
                 return self.journal.note(**values)
@@ -73,7 +74,7 @@ class Store:
         self._rest.notes.append(values)
 
     def content(self) -> JournalContent:
-        """Return all that was kept."""
+        """Return all kept samples and notes."""
         if self._journal is None:
             return self._rest
         there = read_journal(self._journal.path, ended=False)
@@ -85,9 +86,9 @@ class Store:
 def keep_all(
     acquired: Acquisition, store: Store, progress: Progress, finder: PulseFinder | None, most: int | None
 ) -> Exception | None:
-    """Keep what an acquisition, not started yet, gives until it ends; return what it failed with.
+    """Keep the samples of an acquisition, not started yet, until it ends; return its error.
 
-    The finder chooses what is kept (None: all of it); it ends after `most` samples of each input.
+    `finder` selects the samples (None: all); the acquisition ends after `most` samples of each input.
     """
     acquired.start()
     store.note(started_at=acquired.facts.started_at)
@@ -96,7 +97,7 @@ def keep_all(
     try:
         for block in acquired.blocks():
             keeper.take(block)
-            progress.saw(block, keeper.said)
+            progress.saw(block, keeper.status)
     except (daqmx.DaqError, daqmx.RpcError, RigError) as error:
         failure = error
     keeper.end(str(refusal_of(acquired.rig.name, failure)) if failure is not None else "")
@@ -104,7 +105,7 @@ def keep_all(
 
 
 class _Keeper:
-    """Keeps the wanted ones of the samples that come, notes what is to be known of the others, and ends in time."""
+    """Keeps the selected samples as they come, notes the gaps between them, and ends in time."""
 
     def __init__(
         self, acquired: Acquisition, store: Store, finder: PulseFinder | None, most: int | None
@@ -116,15 +117,15 @@ class _Keeper:
         self._long = False
 
     @property
-    def said(self) -> str:
-        """How many pulses there are."""
+    def status(self) -> str:
+        """The number of pulses, in words."""
         if self._finder is None:
             return ""
         count = len(self._finder.starts)
         return "1 pulse" if count == 1 else f"{count} pulses"
 
     def take(self, block: Block) -> None:
-        """Take a block in."""
+        """Take a block."""
         over = [gap for gap in self._acquired.gaps[self._gaps :] if gap.end <= block.first]
         self._note_gaps(over)
         self._keep([block] if self._finder is None else self._finder.feed(block))
@@ -136,7 +137,7 @@ class _Keeper:
             self._acquired.stop()
 
     def end(self, failure: str) -> None:
-        """Keep the rest, and note that the end has come and why."""
+        """Keep the rest, and note the end with its reason."""
         if self._finder is not None:
             self._keep(self._finder.finish())
             self._store.note(watched=self._watched)
@@ -156,7 +157,7 @@ class _Keeper:
         self._gaps += len(gaps)
 
     def _watch(self, finder: PulseFinder) -> None:
-        """Note how far the samples were looked at, and doubt a threshold that is passed for long."""
+        """Note the number of examined samples, and doubt a threshold that is exceeded for long."""
         now = time.monotonic()
         if now - self._noted >= SYNC_SECONDS:
             self._noted = now
@@ -169,13 +170,13 @@ class _Keeper:
             self._acquired.stop()
 
     def _reason(self, block: Block) -> str:
-        """Return why the measurement ends early; empty where it goes on."""
+        """Return the reason for an early end; empty if the measurement continues."""
         journal = self._store.journal
         if self._store.failure:
             return f"the journal cannot be written: {self._store.failure}"
         if journal is not None and journal.is_short_of_room():
             return "the disk has hardly room for the recording"
-        # what waits in the queue is still to come
+        # samples in the queue are still to come
         coming = QUEUE_BLOCKS * block.volts.shape[1]
         if self._most is not None and self._store.kept + coming > self._most:
             return "a recording takes no more samples"
@@ -183,9 +184,9 @@ class _Keeper:
 
 
 def recording_in(content: JournalContent, source: str) -> Recording:
-    """Return the recording of what was kept; messages call it `source`.
+    """Return the recording of kept samples; messages name it by `source`.
 
-    Another version raises DatasetError; too few samples, or no pulses, raise RigError.
+    DatasetError: the version is another one. RigError: there are too few samples, or no pulses.
     """
     measurement = measurement_in(content.header, source)
     notes = {key: value for each in content.notes for key, value in each.items()}
@@ -214,7 +215,7 @@ def recording_in(content: JournalContent, source: str) -> Recording:
 
 
 def write_and_show(recording: Recording, output: Path) -> None:
-    """Write a recording, print its table, and say where it is."""
+    """Write a recording, and print its table and its path."""
     with writing(output):
         write_recording(recording, output)
     print_recording(wide_terminal(), recording)

@@ -1,4 +1,4 @@
-"""What programs that measure have in common: what is asked for, checked; the rig opened; the recording at the end."""
+"""Shared parts of measuring programs: the checked request, the opened rig, the recording at the end."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from vibroimpact.hardware.rig.opening import Rig, opened_rig, refusal_of
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 
 UNKNOWN_DURATION = 60.0
-"""Time, s, for which a disk must have room where nobody says how long it is to be measured."""
+"""Time, s, for which a disk must have room if a measurement has no duration."""
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """Which inputs are measured, how fast and how long."""
+class Request:
+    """The request: inputs, rate and duration."""
 
     inputs: tuple[Input, ...]
     loopbacks: frozenset[str]
-    """Names of inputs to which an output is wired."""
+    """Names of inputs that an output is wired to."""
     calibrations: dict[str, Calibration]
     rate: float
     """Hz."""
@@ -50,14 +50,14 @@ class Wanted:
         return None if self.duration is None else round(self.rate * self.duration)
 
 
-def wanted_of(
+def request_of(
     channels: Sequence[str],
     loopbacks: Sequence[str],
     calibrations: Sequence[str | os.PathLike[str]],
     rate: float,
     duration: float | None,
-) -> Wanted:
-    """Return the measurement that is asked for; raise UsageError, with nothing opened yet, if it cannot be meant."""
+) -> Request:
+    """Return the requested measurement; UsageError, before anything is opened, if the request is invalid."""
     inputs = inputs_of([*channels, *loopbacks])
     if not inputs:
         raise UsageError(
@@ -71,7 +71,7 @@ def wanted_of(
             f"--rate, --duration: expected {FEWEST_SAMPLES} samples or more, got {rate:g} Hz for {duration:g} s."
         )
     back = frozenset(each.name for each in inputs[len(channels) :])
-    return Wanted(
+    return Request(
         tuple(inputs), back, read_calibrations([Path(each) for each in calibrations], inputs), rate, duration
     )
 
@@ -81,32 +81,32 @@ Describe = Callable[[Rig, Facts], Measurement]
 
 def measured(
     rig: str | Rig | None,
-    wanted: Wanted,
+    request: Request,
     describe: Describe,
     *,
     most_pulses: int | None = None,
     journal: str | os.PathLike[str] | None = None,
     live: bool = False,
 ) -> Recording:
-    """Measure, and return the recording; its attribute `ended` says why it is shorter than asked for.
+    """Measure, and return the recording; its attribute `ended` is the reason if it is shorter than requested.
 
-    The rig is as `--rig` has it, one that is open, or (None) the board of this machine. `describe` returns the
-    measurement, once the device has said what it makes of the inputs and the rate. It ends after `most_pulses`, where
-    only pulses are measured. All is kept in `journal` meanwhile (None: in memory), which stays there: who has the
-    recording removes it. UsageError, RigError: the rig refuses what is asked for, or fails before there are samples.
+    The rig is a text for `--rig`, an open rig, or (None) the board of this machine. `describe` returns the
+    measurement, once the device has given its actual inputs and rate. A measurement of pulses ends after
+    `most_pulses`. All samples go to `journal` meanwhile (None: to memory). The journal stays there: the owner of the
+    recording removes it. UsageError, RigError: the rig refuses the request, or fails before there are samples.
     """
     with ExitStack() as stack:
         opened = rig if isinstance(rig, Rig) else stack.enter_context(opened_rig(rig))
         try:
             acquired = stack.enter_context(
-                Acquisition(opened, wanted.inputs, wanted.rate, count=wanted.count)
+                Acquisition(opened, request.inputs, request.rate, count=request.count)
             )
             measurement = describe(opened, acquired.facts)
-            _refuse_many(measurement, wanted)
+            _refuse_many(measurement, request)
             header = measurement.model_dump(mode="json")
             file = None if journal is None else stack.enter_context(Journal(Path(journal), header))
             stack.enter_context(stopped_by_signals(acquired.stop))
-            return _kept(acquired, measurement, Store(header, file), wanted, most_pulses, live)
+            return _kept(acquired, measurement, Store(header, file), request, most_pulses, live)
         except (daqmx.DaqError, daqmx.RpcError) as error:
             raise refusal_of(opened.name, error) from None
 
@@ -115,13 +115,13 @@ def _kept(
     acquired: Acquisition,
     measurement: Measurement,
     store: Store,
-    wanted: Wanted,
+    request: Request,
     most_pulses: int | None,
     live: bool,
 ) -> Recording:
     finder = None if measurement.pulses is None else PulseFinder(measurement, most_pulses)
-    most = None if finder is None and wanted.count is not None else measurement.most_samples
-    with shown_live(acquired, measurement.inputs, wanted.duration, live) as progress:
+    most = None if finder is None and request.count is not None else measurement.most_samples
+    with shown_live(acquired, measurement.inputs, request.duration, live) as progress:
         failure = keep_all(acquired, store, progress, finder, most)
     if failure is not None and not store.kept:
         raise failure
@@ -130,39 +130,39 @@ def _kept(
     return recording_in(store.content(), measurement.rig)
 
 
-def _refuse_many(measurement: Measurement, wanted: Wanted) -> None:
-    if measurement.pulses is None and (wanted.count or 0) > measurement.most_samples:
+def _refuse_many(measurement: Measurement, request: Request) -> None:
+    if measurement.pulses is None and (request.count or 0) > measurement.most_samples:
         raise UsageError(
             f"--rate, --duration: expected at most {measurement.most_samples} samples of each of "
-            f"{len(measurement.inputs)} inputs, as a recording takes, got {wanted.count}."
+            f"{len(measurement.inputs)} inputs, as a recording takes, got {request.count}."
         )
 
 
 def measure_into(
     options: Record | RecordSpikes,
-    wanted: Wanted,
+    request: Request,
     describe: Describe,
     *,
     in_pieces: bool = False,
     most_pulses: int | None = None,
 ) -> None:
-    """Measure into a file, with a journal beside it meanwhile, which is removed when the file is safely there.
+    """Measure into a file, with a journal beside it; the journal is removed once the file is complete.
 
-    Where only pieces are kept (`in_pieces`) nobody knows how many: the disk must have room for those of a minute.
-    UsageError before anything is measured: the file, its disk, or the measurement is not to be had. UsageError after
-    it: the file could not be written, and the journal is still there. RigError: the measurement ended early, and what
-    was measured is in the file.
+    If only pieces are kept (`in_pieces`), their number is unknown: the disk must have room for a minute of samples.
+    UsageError before the measurement: the file, its disk, or the measurement is not available. UsageError after it:
+    the file could not be written, and the journal is still there. RigError: the measurement ended early, and its
+    samples are in the file.
     """
     output = options.output
     refuse_outputs((), output, None)
     refuse_overwriting(output, options.force, lambda there: False)
     journal = output.with_suffix(ENDING)
     refuse_journal(journal)
-    seconds = UNKNOWN_DURATION if wanted.duration is None else wanted.duration
+    seconds = UNKNOWN_DURATION if request.duration is None else request.duration
     if in_pieces:
         seconds = min(seconds, UNKNOWN_DURATION)
-    refuse_full_disk(output.parent, 8.0 * len(wanted.inputs) * wanted.rate * seconds)
-    recording = measured(options.rig, wanted, describe, most_pulses=most_pulses, journal=journal, live=True)
+    refuse_full_disk(output.parent, 8.0 * len(request.inputs) * request.rate * seconds)
+    recording = measured(options.rig, request, describe, most_pulses=most_pulses, journal=journal, live=True)
     with stopped_by_signals(lambda: None):
         try:
             write_and_show(recording, output)

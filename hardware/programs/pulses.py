@@ -1,4 +1,4 @@
-"""Pulses in a stream of samples: which samples are kept, and what each pulse is at a first look."""
+"""Pulses in a stream of samples: the selection of samples, and a first estimate of each pulse."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ _LONG_AGO, _NEVER = -(2**60), 2**60
 
 
 class PulseFinder:
-    """Finds pulses as samples come, however these are cut into blocks.
+    """Finds pulses in arriving samples, independent of their division into blocks.
 
-    A pulse begins where the channel passes the threshold and is over where it has come back below a part of it
-    (`hysteresis`), so that noise does not split it. What passes the threshold within the dead time from its start, such
-    as the ringing of a load cell, belongs to it. Kept are all samples of pulses, those within `before` and `after`
-    them, and those of the dead time, each once. After `most` pulses it is `done`, once all of the last one is kept.
-    `starts` has the number of the first sample of each pulse beyond the threshold.
+    A pulse begins where the channel passes the threshold. It ends where the channel is back below a part of the
+    threshold (`hysteresis`), so that noise does not split it. A new crossing within the dead time from its start, such
+    as the ringing of a load cell, belongs to it. Kept samples are those of pulses, up to `before` and `after` them,
+    and in the dead time, each once.
+
+    After `most` pulses it is `done`, once all of the last one is kept. `starts` has the number of the first sample of
+    each pulse beyond the threshold.
     """
 
     def __init__(self, measurement: Measurement, most: int | None = None) -> None:
@@ -50,12 +52,12 @@ class PulseFinder:
 
     @property
     def up_for(self) -> int:
-        """Samples for which a pulse lasts that is not over; 0 where there is none."""
+        """Samples of an unfinished pulse so far; 0 without one."""
         return self._end - self._last_start if self._is_up else 0
 
     @property
     def none_found(self) -> str:
-        """What to say where there are no pulses."""
+        """The message if there are no pulses."""
         highest = np.sign(self._rule.threshold) * self._highest if self._end else 0.0
         return (
             f"{self._rule.channel}: expected a pulse beyond {self._rule.threshold:g} within "
@@ -63,7 +65,7 @@ class PulseFinder:
         )
 
     def feed(self, block: Block) -> list[Block]:
-        """Take samples in; return those which are now known to be kept."""
+        """Take samples; return the samples that are now known to be kept."""
         if self.done:
             return []
         numbers = np.arange(block.first, block.end, dtype=np.int64)
@@ -71,7 +73,7 @@ class PulseFinder:
         rises = numbers[up[1:] & ~up[:-1]]
         starts = self._new_starts(rises)
         kept = self._within(numbers, up[1:], starts)
-        count = self._wanted(numbers, kept, starts)
+        count = self._needed(numbers, kept, starts)
         self._end = block.first + count
         self._is_up = bool(up[count])
         self.starts += starts[starts < self._end].tolist()
@@ -81,25 +83,25 @@ class PulseFinder:
         return self._taken(int(np.searchsorted(self._numbers, self._end - undecided)))
 
     def finish(self) -> list[Block]:
-        """Return what is still to be kept when no more samples come."""
+        """Return the unfinished pulse at the end of the record."""
         return self._taken(len(self._numbers))
 
     def _up(self, numbers: Numbers, volts: Floats, was_up: bool) -> Mask:
-        """Return whether the channel was within a pulse, and which samples are, shape (1 + sample,)."""
+        """Return whether the channel was within a pulse, and a mask of samples within one, shape (1 + sample,)."""
         values = volts
         if self._calibration is not None:
             values = self._calibration.to_units(volts, numbers / self._rate + self._place * self._skew)
         height, level = np.sign(self._rule.threshold) * values, abs(self._rule.threshold)
         self._highest = max(self._highest, float(height.max()))
         is_over = height < self._rule.hysteresis * level
-        # between the two levels it stays what it was
-        says = np.concatenate([[was_up], np.where(height >= level, 1, np.where(is_over, 0, -1))])
-        last_said = np.maximum.accumulate(np.where(says >= 0, np.arange(len(says)), 0))
-        up: Mask = says[last_said] == 1
+        # between the two levels the state does not change
+        crossings = np.concatenate([[was_up], np.where(height >= level, 1, np.where(is_over, 0, -1))])
+        last_crossing = np.maximum.accumulate(np.where(crossings >= 0, np.arange(len(crossings)), 0))
+        up: Mask = crossings[last_crossing] == 1
         return up
 
     def _new_starts(self, rises: Numbers) -> Numbers:
-        """Return the rises that begin pulses of their own: those after the dead time of the one before."""
+        """Return the rises that begin new pulses: those after the dead time of the previous one."""
         found, last = [], self._last_start
         for rise in rises.tolist():
             if rise - last >= self._rule.dead:
@@ -108,15 +110,15 @@ class PulseFinder:
         return np.array(found, dtype=np.int64)
 
     def _within(self, numbers: Numbers, up: Mask, starts: Numbers) -> Mask:
-        """Return which samples are within pulses, after them, or in their dead time."""
+        """Return a mask of samples within pulses, shortly after them, or in their dead time."""
         last_up = np.maximum.accumulate(np.where(up, numbers, self._last_up))
         self._last_up = int(last_up[-1])
         start = np.append(self._last_start, starts)[np.searchsorted(starts, numbers, side="right")]
         kept: Mask = (numbers - last_up <= self._rule.after) | (numbers - start < self._rule.dead)
         return kept
 
-    def _wanted(self, numbers: Numbers, kept: Mask, starts: Numbers) -> int:
-        """Return how many of these samples are looked at: all but those after the last pulse that is wanted."""
+    def _needed(self, numbers: Numbers, kept: Mask, starts: Numbers) -> int:
+        """Return the number of samples to use: all up to the end of the last pulse in `most`."""
         missing = (self._most or len(self.starts) + len(starts) + 1) - len(self.starts)
         if missing > len(starts):
             return len(numbers)
@@ -126,7 +128,7 @@ class PulseFinder:
         return begin + int(over[0]) if self.done else len(numbers)
 
     def _append(self, numbers: Numbers, volts: Floats, kept: Mask, rises: Numbers) -> None:
-        """Add samples to those that are not decided yet, and keep those shortly before a rise."""
+        """Add samples to the undecided ones, and keep those shortly before a rise."""
         self._numbers = np.concatenate([self._numbers, numbers])
         self._volts = np.concatenate([self._volts, volts], axis=1)
         self._kept = np.concatenate([self._kept, kept])
@@ -134,7 +136,7 @@ class PulseFinder:
         self._kept |= coming - self._numbers <= self._rule.before
 
     def _taken(self, count: int) -> list[Block]:
-        """Return the kept ones of the first samples, and forget these."""
+        """Return the kept ones among the first samples, and drop these."""
         kept = np.flatnonzero(self._kept[:count])
         numbers, volts = self._numbers[kept], self._volts[:, kept]
         self._numbers, self._kept = self._numbers[count:], self._kept[count:]
@@ -151,8 +153,8 @@ def with_pulses(
 ) -> Recording:
     """Return the recording with an event train of its pulses: their instants, peaks and impulses.
 
-    A peak is the largest sample above the level before the pulse, an impulse the integral down to 5 % of it: a first
-    look. `vibroimpact spikes` measures both with their errors. `watched` samples were looked at.
+    A peak is the largest sample above the level before the pulse. An impulse is the integral down to 5 % of the peak.
+    Both are first estimates; `vibroimpact spikes` measures them with errors. `watched` samples were examined.
     """
     rule = measurement.pulses
     assert rule is not None
@@ -187,7 +189,7 @@ def with_pulses(
 
 
 def _starts(measurement: Measurement, blocks: Sequence[Block]) -> list[int]:
-    """Return where pulses begin among the samples that were kept: where they began when these came."""
+    """Return the starts of pulses among the kept samples, equal to those found during the measurement."""
     finder = PulseFinder(measurement)
     for block in blocks:
         finder.feed(block)
@@ -195,7 +197,7 @@ def _starts(measurement: Measurement, blocks: Sequence[Block]) -> list[int]:
 
 
 def _look(channel: Channel, rule: PulseRule, first: int, end: int) -> tuple[float, float]:
-    """Return peak and impulse of the pulse that begins at a row and ends before another, in SI units."""
+    """Return peak and impulse of the pulse from one row to before another, in SI units."""
     begin = max(first - rule.before, 0)
     sign, values, time = np.sign(rule.threshold), channel.si()[begin:end], channel.time[begin:end]
     before = values[: first - begin]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.hardware.operations.rig_record import Record
-from vibroimpact.hardware.programs.measuring import Describe, Wanted, measure_into, measured, wanted_of
+from vibroimpact.hardware.programs.measuring import Describe, Request, measure_into, measured, request_of
 from vibroimpact.hardware.rig.acquisition import Facts
 from vibroimpact.hardware.rig.measurement import Measurement, measurement_of
 from vibroimpact.hardware.rig.opening import Rig
@@ -28,29 +28,29 @@ def record(
     Parameters
     ----------
     rig : str, Rig or None
-        `virtual:RIG.toml`, `grpc://host:port` or `local`, or one that is open; None: the board of this machine.
+        `virtual:RIG.toml`, `grpc://host:port` or `local`, or an open rig; None: the board of this machine.
     channels : sequence of str
-        `NAME=TERMINAL[,RANGE]`, the range in V; 8 at most.
+        `NAME=TERMINAL[,RANGE]`, the range in V; at most 8.
     rate : float
         Samples per second and channel.
     duration : float or None
-        s; None: until Ctrl-C, which ends it with all that was measured.
+        s; None: until Ctrl-C, which ends it and keeps the samples so far.
     loopback : sequence of str
-        Likewise, of inputs to which an output is wired.
+        The same for inputs that an output is wired to.
     calibration : sequence of path
         Files of calibrations: their channels are in m or N, others in V.
     journal : path or None
-        File that has all of it meanwhile, and afterwards; None: none.
+        File that keeps all samples, during the measurement and after it; None: no file.
 
     Returns
     -------
     Recording
-        Its attribute `ended` says why it is shorter than asked for; empty: it is not.
+        Its attribute `ended` is the reason if it is shorter than requested; else empty.
 
     Raises
     ------
     UsageError, RigError
-        What is asked for cannot be had, or the rig failed before there were samples.
+        The request cannot be met, or the rig failed before there were samples.
 
     Examples
     --------
@@ -58,22 +58,22 @@ def record(
     >>> len(tip.values), tip.unit, tip.axis.rate
     (1000, 'V', 5000.0)
     """
-    wanted = wanted_of(channels, loopback, calibration, rate, duration)
-    return measured(rig, wanted, _describer(wanted), journal=journal)
+    request = request_of(channels, loopback, calibration, rate, duration)
+    return measured(rig, request, _describer(request), journal=journal)
 
 
 def record_channels(options: Record) -> None:
     """Record inputs of a rig into a file."""
-    wanted = wanted_of(
+    request = request_of(
         options.channel, options.loopback or (), options.calibration or (), options.rate, options.duration
     )
-    measure_into(options, wanted, _describer(wanted))
+    measure_into(options, request, _describer(request))
 
 
-def _describer(wanted: Wanted) -> Describe:
+def _describer(request: Request) -> Describe:
     def describe(rig: Rig, facts: Facts) -> Measurement:
         return measurement_of(
-            "record", rig, facts, wanted.inputs, wanted.calibrations, loopbacks=wanted.loopbacks
+            "record", rig, facts, request.inputs, request.calibrations, loopbacks=request.loopbacks
         )
 
     return describe

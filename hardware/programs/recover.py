@@ -1,4 +1,4 @@
-"""Make the recording of a measurement that died, from its journal."""
+"""Make the recording of an aborted measurement, from its journal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.hardware.rig.measurement import FEWEST_SAMPLES
 
 
 def recover(journal: str | os.PathLike[str]) -> Recording:
-    """Return the recording of all that is whole in a journal.
+    """Return the recording of all whole records of a journal.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def recover(journal: str | os.PathLike[str]) -> Recording:
     Raises
     ------
     UsageError
-        There is none, or a program is still writing it.
+        There is no journal, or a program is still writing it.
     DatasetError
         It is no journal, or has fewer than two samples.
     RigError

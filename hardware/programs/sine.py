@@ -19,7 +19,7 @@ from vibroimpact.hardware.rig.stopping import stopped_by_signals
 from vibroimpact.hardware.rig.waveforms import Sine
 
 LINE_SECONDS = 5.0
-"""How often a line is written where standard error is not a terminal, s."""
+"""Interval between lines if standard error is no terminal, s."""
 REFRESH_SECONDS = 0.2
 
 
@@ -38,12 +38,12 @@ def drive_sine(
 ) -> float:
     """Drive an output of a rig with a sine; it rises from 0 V and comes to rest at 0 V.
 
-    A guardian, a process of its own, brings it to rest where this one cannot.
+    A guardian, a process of its own, brings it to rest if this process cannot.
 
     Parameters
     ----------
     terminal : str
-        Such as `Dev1/ao0`.
+        Terminal, such as `Dev1/ao0`.
     frequency : float
         Hz, below half of the rate.
     amplitude : float
@@ -59,19 +59,19 @@ def drive_sine(
     rig : str, optional
         `virtual:RIG.toml`, `grpc://host:port` or `local`; else the board of this machine.
     progress : bool
-        Show how far it is.
+        Show the progress.
 
     Returns
     -------
     float
-        The time that was driven, s.
+        The driven time, s.
 
     Raises
     ------
     UsageError
-        The sine is none, is beyond the limits, or the rig lacks what is asked for: nothing was driven.
+        The sine is invalid or beyond the limits, or the rig lacks the output: nothing was driven.
     RigError
-        The rig or this machine failed; says what became of the output.
+        The rig or this machine failed; the message gives the state of the output.
     KeyboardInterrupt
         It was stopped by Ctrl-C and is at 0 V.
 
@@ -79,12 +79,12 @@ def drive_sine(
     --------
     >>> drive_sine("Dev1/ao0", 5.3, 1.0, duration=10.0, rig="virtual:oscillator.toml")          # doctest: +SKIP
     """
-    wanted = sine_of(frequency, amplitude, ramp, duration, rate)
+    waveform = sine_of(frequency, amplitude, ramp, duration, rate)
     limits = Limits(most_amplitude, most_slew)
-    wanted.refuse_beyond(limits)
-    said = say if progress else _unsaid
+    waveform.refuse_beyond(limits)
+    report = say if progress else _unsaid
     interrupted = []
-    with opened_rig(rig) as opened, Output(opened, terminal, rate, wanted, limits) as output:
+    with opened_rig(rig) as opened, Output(opened, terminal, rate, waveform, limits) as output:
 
         def stop() -> None:
             interrupted.append(True)
@@ -93,7 +93,7 @@ def drive_sine(
         with stopped_by_signals(stop):
             output.start()
             if output.has_driven:
-                said(
+                report(
                     f"{terminal} on {opened.name}: {frequency:g} Hz, {amplitude:g} V. Ctrl-C brings it to rest."
                 )
             with _shown() if progress else nullcontext(_unsaid) as show:
@@ -102,13 +102,13 @@ def drive_sine(
                     show(f"{terminal}: {output.generated / rate:.1f} s{stage}")
             output.wait()
         if interrupted:
-            said(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
+            report(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
             raise KeyboardInterrupt
     return output.generated / rate
 
 
 def drive_output(options: DriveSine) -> None:
-    """Drive an output with a sine, and show how far it is."""
+    """Drive an output with a sine, and show the progress."""
     drive_sine(
         options.output,
         options.frequency,
@@ -123,19 +123,19 @@ def drive_output(options: DriveSine) -> None:
 
 
 def sine_of(frequency: float, amplitude: float, ramp: float, duration: float | None, rate: float) -> Sine:
-    """Return the sine that is asked for; `duration` (s) is rounded to samples. A wrong one raises UsageError."""
+    """Return the requested sine; `duration` (s) is rounded to samples. UsageError: the request is invalid."""
     if duration is not None and not (duration > 0.0 and np.isfinite(duration * rate)):
         raise UsageError(f"--duration: expected a number > 0, s, got {duration!r}.")
     return Sine(frequency, amplitude, rate, ramp, None if duration is None else round(duration * rate))
 
 
 def _unsaid(text: str) -> None:
-    """Say nothing."""
+    """Print nothing."""
 
 
 @contextmanager
 def _shown() -> Iterator[Callable[[str], None]]:
-    """Show how far it is on standard error: a line that changes in a terminal, else one now and then."""
+    """Show the progress on standard error: a changing line in a terminal, else one line now and then."""
     if not sys.stderr.isatty():
         last = time.monotonic()
 

@@ -1,4 +1,4 @@
-"""From files of instruments to recordings."""
+"""Import of instruments' files as recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the columns of files to the parts of a recording: channels, event trains and single values."""
+"""The parts of a recording from the columns of files: channels, event trains and single values."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ _NO_EVENTS = Argument("events", False)
 
 @dataclass(slots=True)
 class Parts:
-    """What the recording is made of, growing from column to column; each by its name."""
+    """The parts of a recording so far, each by its name."""
 
     channels: dict[str, Channel] = field(default_factory=dict)
     events: dict[str, EventTrain] = field(default_factory=dict)
     scalars: dict[str, SingleValue] = field(default_factory=dict)
     remarks: dict[str, None] = field(default_factory=dict)
-    """In the order in which they were noticed, each once."""
+    """In the order of their discovery, each once."""
 
     def add(self, source: Source, title: str) -> None:
-        """Add the columns of one file, whose remarks begin with a title; empty for one file alone.
+        """Add the columns of one file; its remarks begin with `title`, which is empty for a single file.
 
-        A column that cannot be placed in time raises DatasetError with the name of the file.
+        DatasetError, with the name of the file: a column cannot be placed in time.
         """
         tables = source.raw.tables
         self.remark(source.raw.remarks, title)
@@ -54,7 +54,7 @@ class Parts:
                 self.remark(self._add_column(number, at, column, source, placements, rasters[at]), title)
 
     def remark(self, lines: Sequence[str], title: str = "") -> None:
-        """Add what was noticed, each line once."""
+        """Add remarks, each line once."""
         for line in lines:
             self.remarks.setdefault(
                 reworded(line, lambda text: shortened(f"{title}: {text}" if title else text))
@@ -69,7 +69,7 @@ class Parts:
         placements: dict[Any, Placement],
         in_raster: bool,
     ) -> list[str]:
-        """Add one column as what it is; return the remarks on it."""
+        """Add one column as a channel, an event train or a value; return the remarks on it."""
         settings, table = source.settings, source.raw.tables[at]
         clocks = (settings.rate, table.rate, column.interval, table.clock_of(column))
         in_raster = in_raster and any(clock is not None for clock in clocks)
@@ -92,8 +92,8 @@ class Parts:
             value = float(changed.values[0])
             beyond = column.overrange is not None and bool(column.overrange[0])
             self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
-            said = "which the file marks as overrange" if beyond else f"{value:g}"
-            return [*remarks, f"{name}: one value only, {said}: kept beside the channels"]
+            meaning = "which the file marks as overrange" if beyond else f"{value:g}"
+            return [*remarks, f"{name}: one value only, {meaning}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
         if key not in placements:
             trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
@@ -122,7 +122,7 @@ class Parts:
 
 
 def _length_remarks(table: Table) -> list[str]:
-    """Say where columns that were written together end at different rows, as those of a file that was cut off do."""
+    """Return remarks on columns of one table with different lengths, as in a file that was cut off."""
     lengths = sorted({len(column.values) for column in table.columns})
     if table.vectors or len(lengths) < 2:
         return []
@@ -133,13 +133,13 @@ def _length_remarks(table: Table) -> list[str]:
 
 
 def _described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
-    """Return a column with the unit, scale and offset that the settings give to column `number` (from 0); remarks."""
+    """Return a column with unit, scale and offset from the settings of column `number` (from 0), and remarks."""
     remarks: list[str] = []
-    unit, said = _picked(settings.unit, number), ""
+    unit, remark = _picked(settings.unit, number), ""
     if unit is None:
-        unit, said = meant_unit(column.label, column.unit)
-    if said:
-        remarks.append(message(f"{name}: {said} (", Argument("unit"), " if not)"))
+        unit, remark = meant_unit(column.label, column.unit)
+    if remark:
+        remarks.append(message(f"{name}: {remark} (", Argument("unit"), " if not)"))
     if not is_known_unit(unit):
         remarks.append(
             message(
@@ -167,14 +167,14 @@ def _described(name: str, column: Column, settings: ImportSettings, number: int)
 
 
 def _picked(values: Sequence[Any], number: int) -> Any:
-    """Return the value for a column; one value is for all of them."""
+    """Return the value for a column; a single value is for all of them."""
     if len(values) == 1:
         return values[0]
     return values[number] if number < len(values) else None
 
 
 def _is_event_train(column: Column, table: Table, settings: ImportSettings) -> bool:
-    """Whether a column is instants: as the user says, or where nothing gives it a time and it looks so."""
+    """Whether a column has instants of events: by the user's choice, or if it has no time and looks so."""
     if settings.events is not None:
         return settings.events
     if settings.rate is not None or table.clock_of(column) is not None:

@@ -1,4 +1,4 @@
-"""Make a channel of a column: its samples where they belong in time, its flags, and what is odd about it."""
+"""Make a channel of a column: its samples in time order, its flags, and remarks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _OFFSET_SHOWS = 3.0
 def channel_of(
     name: str, column: Column, placement: Placement, masked: Sequence[tuple[float, float]]
 ) -> tuple[Channel, list[str]]:
-    """Return the channel of a column, whose unit is known, and what was noticed.
+    """Return the channel of a column with a known unit, and remarks.
 
     Samples in the spans of time `masked` (s) are no measurement: they become missing.
     """
@@ -51,12 +51,14 @@ def _remarks(
     hidden: Flags,
     placement: Placement,
 ) -> list[str]:
-    """Say what is odd about the samples."""
+    """Return remarks on the samples."""
     remarks = []
     if np.any(clipped):
         levels = sorted({float(level) for level in values[clipped]})
-        said = " and ".join(f"{level:.6g}" for level in dict.fromkeys((levels[0], levels[-1])))
-        remarks.append(f"{name}: {int(clipped.sum())} samples are clipped, at {said} {column.unit}".rstrip())
+        clipped_at = " and ".join(f"{level:.6g}" for level in dict.fromkeys((levels[0], levels[-1])))
+        remarks.append(
+            f"{name}: {int(clipped.sum())} samples are clipped, at {clipped_at} {column.unit}".rstrip()
+        )
     if np.any(overrange):
         remarks.append(f"{name}: {int(overrange.sum())} samples are marked as overrange: NaN")
     if np.any(hidden):

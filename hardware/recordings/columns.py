@@ -1,4 +1,4 @@
-"""Which columns of a file become something, and which one has the instants, by what the user says."""
+"""The columns of a file to import, and their column of instants, by the user's choice."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ NO_COLUMN = "none"
 
 
 def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
-    """Return the tables of a file with the columns that the user wants, instants told apart and in s.
+    """Return the tables of a file with the selected columns, with instants set apart and in s.
 
-    Numbers of columns count from 1 through all columns of all tables, the instants with them where they stand. A
-    missing column that the user names, or doubtful instants, raise DatasetError.
+    Numbers of columns count from 1 through all columns of all tables, including instants at their place in the file.
+    DatasetError: a named column is missing, or the instants are doubtful.
     """
     tables = list(raw.tables)
     numbered = [column for table in tables for column in _in_file_order(table)]
@@ -29,49 +29,51 @@ def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
         tables = _with_time_column(tables, settings.time_column, numbered)
     if settings.columns:
         tables = _with_columns(tables, settings.columns, numbered)
-    return [_in_seconds(_beyond_doubt(table, settings)) for table in tables if table.columns]
+    return [_in_seconds(_with_clear_dates(table, settings)) for table in tables if table.columns]
 
 
-def _beyond_doubt(table: Table, settings: ImportSettings) -> Table:
-    """Return the table without instants that may be others, where a rate replaces them; else ask."""
-    if table.time is None or not table.time.doubt:
+def _with_clear_dates(table: Table, settings: ImportSettings) -> Table:
+    """Return the table without doubtful instants if a rate replaces them; else raise DatasetError."""
+    if table.time is None or not table.time.ambiguity:
         return table
     if settings.rate is not None:
         return replace(table, time=None)
     raise DatasetError(
         message(
             f"column of instants, {table.time.label!r}: expected dates that can be read in one way, got others: "
-            f"{table.time.doubt}. Give ",
+            f"{table.time.ambiguity}. Give ",
             *(Argument("dates", "day-first"), " or ", Argument("dates", "month-first"), "."),
         )
     )
 
 
 def _in_file_order(table: Table) -> list[Column]:
-    """Return the columns as they stand in the file, the instants among them."""
+    """Return the columns in the order of the file, including the instants."""
     columns = list(table.columns)
     if table.time is not None:
         columns.insert(table.time_place, table.time)
     return columns
 
 
-def _find(wanted: str | int, columns: Sequence[Column], key: str) -> Column:
-    """Return the column of a number or heading."""
+def _find(selector: str | int, columns: Sequence[Column], key: str) -> Column:
+    """Return the column with a number or heading."""
     labels = [column.label for column in columns]
-    if wanted in labels:
-        return columns[labels.index(str(wanted))]
-    number = int(wanted) if str(wanted).isascii() and str(wanted).isdecimal() else 0
+    if selector in labels:
+        return columns[labels.index(str(selector))]
+    number = int(selector) if str(selector).isascii() and str(selector).isdecimal() else 0
     if 1 <= number <= len(columns):
         return columns[number - 1]
-    hint = nearest(wanted, labels)
+    hint = nearest(selector, labels)
     raise DatasetError(
-        f"{key}: expected a heading or a number from 1 to {len(columns)}, got {str(wanted)[:60]!r}. {hint}"
+        f"{key}: expected a heading or a number from 1 to {len(columns)}, got {str(selector)[:60]!r}. {hint}"
     )
 
 
-def _with_time_column(tables: Sequence[Table], wanted: str | int, numbered: Sequence[Column]) -> list[Table]:
-    """Return the tables with another column as that of their instants, or with none."""
-    chosen = None if wanted == NO_COLUMN else _find(wanted, numbered, "time_column")
+def _with_time_column(
+    tables: Sequence[Table], selector: str | int, numbered: Sequence[Column]
+) -> list[Table]:
+    """Return the tables with another column of instants, or with none."""
+    chosen = None if selector == NO_COLUMN else _find(selector, numbered, "time_column")
     found = []
     for table in tables:
         columns = _in_file_order(table)
@@ -86,9 +88,9 @@ def _with_time_column(tables: Sequence[Table], wanted: str | int, numbered: Sequ
 
 
 def _with_columns(
-    tables: Sequence[Table], wanted: Sequence[str | int], numbered: Sequence[Column]
+    tables: Sequence[Table], selector: Sequence[str | int], numbered: Sequence[Column]
 ) -> list[Table]:
-    chosen = [_find(one, numbered, "columns") for one in wanted]
+    chosen = [_find(one, numbered, "columns") for one in selector]
     kept = []
     for table in tables:
         columns = [column for column in chosen if any(column is own for own in table.columns)]

@@ -1,4 +1,4 @@
-"""Columns that are instants of events, not samples: spikes of a neuron, bounces of a ball."""
+"""Columns of instants of events instead of samples: spikes of a neuron, bounces of a ball."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from vibroimpact.hardware.recordings.time_axis import Placement
 
 _FEWEST = 3
 _FEW_ONES = 0.2
-"""Share of ones up to which a column of 0 and 1 is one of events."""
+"""Largest share of ones for which a column of 0 and 1 has events."""
 _UNEVEN = 0.01
 """Standard deviation of the steps, in mean steps, above which ascending numbers are no clock."""
 
 
 def looks_like_events(column: Column) -> bool:
-    """Whether a column is clearly one of instants: ascending from row to row, unevenly, and of no other unit."""
+    """Whether a column clearly has instants of events: ascending from row to row, unevenly, and in no other unit."""
     values = column.values
     if len(values) < _FEWEST or column.interval is not None or column.overrange is not None:
         return False
@@ -37,13 +37,13 @@ def looks_like_events(column: Column) -> bool:
     return float(steps.std()) > max(_UNEVEN * float(steps.mean()), decimal_step(values))
 
 
-def is_raster(table: Table, wanted: bool | None = None) -> bool:
+def is_raster(table: Table, choice: bool | None = None) -> bool:
     """Whether the columns of a table hold only 0 and 1, as trials of a raster do, so that each 1 is an event.
 
-    `wanted` is what the user says: that the columns are events, or that none is. Where the user says nothing, the ones
-    must be few and stand alone: what stays at 1 is the level of a switch.
+    `choice` is the user's choice: all columns are events, or none is. Without a choice the ones must be few and
+    isolated: a column that stays at 1 is the level of a switch.
     """
-    if wanted is False or not table.columns:
+    if choice is False or not table.columns:
         return False
     ones = [column.values == 1.0 for column in table.columns]
     known = all(
@@ -51,7 +51,7 @@ def is_raster(table: Table, wanted: bool | None = None) -> bool:
     )
     if not known or not any(one.any() for one in ones):
         return False
-    return bool(wanted) or all(
+    return bool(choice) or all(
         float(np.mean(one)) <= _FEW_ONES and not np.any(one[1:] & one[:-1]) for one in ones if len(one)
     )
 
@@ -63,9 +63,9 @@ def raster_train(
     window: tuple[float, float] | None,
     masked: tuple[tuple[float, float], ...],
 ) -> EventTrain | None:
-    """Return the instants at which a column of 0 and 1 becomes 1; None where it never does.
+    """Return the instants at which a column of 0 and 1 becomes 1; None if it never does.
 
-    It was observed in the window (from, to, s), else as long as its axis, but for the parts that are masked, s.
+    The observation is the window (from, to, s), else its axis, without the masked parts, s.
     """
     axis = placement.axis
     on = (placement.row >= 0) & (column.values[placement.row] == 1.0)
@@ -92,10 +92,10 @@ def event_train(
     window: tuple[float, float] | None = None,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> tuple[EventTrain, list[str]]:
-    """Make an event train of a column of instants, s, and say what was noticed.
+    """Return an event train from a column of instants, s, and remarks.
 
-    It was observed in the window (from, to, s), but for the parts that are masked, s. No instants, or instants outside
-    the window, raise DatasetError.
+    The observation is the window (from, to, s), without the masked parts, s. DatasetError: there are no instants, or
+    some lie outside the window.
     """
     times, remarks = _ascending(name, column)
     if window is not None:
@@ -124,7 +124,7 @@ def event_train(
 
 
 def _ascending(name: str, column: Column) -> tuple[Floats, list[str]]:
-    """Return the instants in order."""
+    """Return the instants in order, and remarks."""
     known = column.values[np.isfinite(column.values)]
     if not len(known):
         raise DatasetError(f"{name}: expected instants of events, got none.")

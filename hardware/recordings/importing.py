@@ -1,4 +1,4 @@
-"""From files of any format to one recording."""
+"""Import of files of any format as one recording."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ def import_recording(
     settings: ImportSettings | Mapping[str, Any] | None = None,
     common: ImportSettings | None = None,
 ) -> Recording:
-    """Read files into one recording.
+    """Return files of any format as one recording.
 
     Parameters
     ----------
     files : path or sequence of path
-        Several files become one recording; each has a trigger, and so a time axis, of its own.
+        Several files become one recording; each has its own trigger, and so its own time axis.
     settings : ImportSettings, mapping or None
-        For all columns of all files together (the command line); it has the last word.
+        For all columns of all files together (the command line); it overrides the others.
     common : ImportSettings or None
-        For each file, in place of the settings file beside it.
+        For each file, in place of its own settings file.
 
     Returns
     -------
     Recording
-        With provenance, and in `attrs["remarks"]` a line for each thing that was noticed.
+        With provenance, and with remarks in `attrs["remarks"]`, a line for each.
 
     Raises
     ------
     DatasetError
-        A file is damaged, of no known format, or contradicts itself beyond repair; the message has its name.
+        A file is damaged, of an unknown format, or self-contradictory; the message has its name.
     UsageError
         The settings do not fit the files.
     """
@@ -78,7 +78,7 @@ def import_recording(
 
 
 def _passed_on(files: Sequence[Path], given: ImportSettings) -> Recording:
-    """Return a recording as it is; options would change what is imported already."""
+    """Return an existing recording unchanged; UsageError for options, which would change an imported recording."""
     if len(files) > 1:
         raise UsageError(
             f"{files[0]}: expected one recording, or files of other formats, got {len(files)} files."
@@ -109,10 +109,10 @@ def _of_the_whole(parts: Parts) -> list[str]:
 
 
 def _provenance(sources: Sequence[Source], parts: Parts) -> dict[str, Any]:
-    """Return where the recording comes from: names of files, not their folders."""
+    """Return the sources of a recording: names of files, without their folders."""
     attrs: dict[str, Any] = {}
     for source in sources:
-        attrs = attrs | source.raw.attrs | attrs  # of what several files say, the first one's
+        attrs = attrs | source.raw.attrs | attrs  # the first file's value wins
     settings = {
         source.path.name: source.settings.model_dump(exclude_unset=True, mode="json") for source in sources
     }

@@ -1,4 +1,4 @@
-"""Names of channels in a recording: short, lower case, each once."""
+"""Names of channels in a recording: short, lower case, unique."""
 
 from __future__ import annotations
 

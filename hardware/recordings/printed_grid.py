@@ -1,4 +1,4 @@
-"""The grid on which numbers were written: the last digit, or a coarser step below it."""
+"""The grid of written numbers: the last digit, or a coarser multiple of it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from vibroimpact.hardware.formats.table import Floats
 _MOST_DIGITS = 12
 _MOST_READ = 20_000
 _NEARLY_ALL = 0.9
-_DIGIT_LOST = 0.2
-"""Largest error of binary, in units of the last digit; 40 % of arbitrary numbers are as near to their digits."""
+_LARGEST_ROUNDING = 0.2
+"""Largest error of binary, in units of the last digit; 40 % of arbitrary numbers are as close to their digits."""
 
 
 def decimal_step(values: Floats) -> float:
-    """Return the power of ten that nearly all values are multiples of: the weight of their last digit.
+    """Return the power of ten of which nearly all values are multiples: the weight of their last digit.
 
-    It is 0 where they have more digits than can be told from rounding in binary.
+    It is 0 if they have more digits than binary rounding can separate.
 
     >>> decimal_step(np.array([0.05, 0.1, 0.151])), decimal_step(np.arange(5) / 3)
     (0.001, 0.0)
@@ -25,17 +25,17 @@ def decimal_step(values: Floats) -> float:
     read = finite[:: max(1, len(finite) // _MOST_READ)]
     if not len(read):
         return 0.0
-    # a clock's seconds since 1970 have lost some of their last digit in binary; whole numbers are on every grid
-    lost = float(np.spacing(np.abs(read).max())) / 2.0
-    if lost > _DIGIT_LOST:
+    # seconds since 1970 have lost some of their last digit in binary; whole numbers are on every grid
+    rounding = float(np.spacing(np.abs(read).max())) / 2.0
+    if rounding > _LARGEST_ROUNDING:
         return 0.0
     beyond = read - np.rint(read[0])
     for digits in range(_MOST_DIGITS + 1):
         scaled = beyond * 10.0**digits
         allowed = max(
-            1e-6, 1.01 * (lost + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
+            1e-6, 1.01 * (rounding + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
         )
-        if allowed > _DIGIT_LOST:
+        if allowed > _LARGEST_ROUNDING:
             return 0.0
         if float(np.mean(np.abs(scaled - np.rint(scaled)) <= allowed)) >= _NEARLY_ALL:
             return 10.0**-digits
@@ -43,16 +43,16 @@ def decimal_step(values: Floats) -> float:
 
 
 def digits_of(instants: Floats) -> float:
-    """Return how coarsely instants are written, s: the weight of their last digit, and what binary takes of it."""
+    """Return the coarseness of written instants, s: the weight of their last digit, plus the rounding of binary."""
     return decimal_step(instants) + float(np.spacing(np.abs(instants).max(initial=0.0)))
 
 
 def common_step(intervals: Floats, digits: float) -> float:
-    """Return the coarsest step that nearly all intervals (s) are multiples of, up to their digits; 0 where none is.
+    """Return the coarsest step of which nearly all intervals (s) are multiples, up to their digits; 0 without one.
 
-    Instants that were read off frames (of video, of blocks of audio) lie on such a step. The mean of exp(2 pi i d /
-    step) over the intervals d has modulus 1 for it. The largest such step is chosen, and refined by least squares, d =
-    step * whole number. `digits` is the weight of their last digit, s.
+    Instants read off frames (of video, of blocks of audio) lie on such a step. For it, the mean of exp(2 pi i d /
+    step) over the intervals d has modulus 1. The largest such step is chosen, and refined by least squares, d = step *
+    whole number. `digits` is the weight of their last digit, s.
 
     >>> frames = np.random.default_rng(1).integers(14, 22, 3000) * 1024 / 44100
     >>> round(common_step(np.round(frames, 3), 1e-3), 4)
@@ -66,7 +66,7 @@ def common_step(intervals: Floats, digits: float) -> float:
     values, weights = rounded[used] * digits, times[used] / times[used].sum()
     if len(values) < 3 or len(values) > _MOST_READ // 4:
         return 0.0
-    # a step needs five digits' weight to show, and some steps to an interval
+    # a step must have five times the last digit's weight, and an interval some steps
     frequencies = np.arange(2.0 / usual, 0.2 / digits, 0.05 / (3.0 * usual))[:_MOST_READ]
     coherence = np.concatenate(
         [

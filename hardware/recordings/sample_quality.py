@@ -1,4 +1,4 @@
-"""Mark samples that are no plain measurements: clipped, overrange, missing, of doubtful time."""
+"""Marks samples that are no plain measurements: clipped, overrange, missing, at doubtful times."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from vibroimpact.analysis.recording import Quality
 from vibroimpact.hardware.formats.table import Flags, Floats
 
 FEWEST_CLIPPED = 3
-"""Least number of equal samples at the extreme that is no chance."""
+"""Fewest equal samples at the extreme that are no chance."""
 _REST = 0.2
-"""Share of the samples above which a value is the level of rest, or a state of a switch, and no limit."""
+"""Share of the samples, above which a value is the level of rest, or a state of a switch, and no limit."""
 _SMOOTH_TOP = 6.0
-"""Largest fall of a smooth top beside its flat part, in steps of the converter; see `_falls_steeply`."""
+"""Largest fall of a smooth top next to its flat part, in steps of the converter; see `_falls_steeply`."""
 
 
 def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) -> Flags:
-    """Return which samples are at the limit of the measuring chain.
+    """Return a mask of the samples at the limit of the measuring chain.
 
-    A limit shows as its extreme value coming again and again, exactly, and more often than its neighbours in value,
-    where the signal arrives too steeply for a smooth top that the converter's steps make flat. `rails` are the limits
-    of the converter, where the file tells them: every sample there is clipped.
+    At a limit, the extreme value comes again and again, exactly, and more often than its neighbouring values. The
+    signal also arrives there too steeply for a smooth top that the converter's steps make flat. `rails` are the limits
+    of the converter, if the file gives them: every sample there is clipped.
 
     >>> t = np.linspace(0.0, 1.0, 500)
     >>> int(clipped_samples(np.clip(np.sin(40 * t) * np.exp(-t), -0.7, 2.0)).sum()) > 20
@@ -36,7 +36,7 @@ def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) ->
     if rails is not None:
         margin = 1e-9 * (rails[1] - rails[0])
         clipped |= (values <= rails[0] + margin) | (values >= rails[1] - margin)
-    # an extreme that does not come again is no limit; sorting millions of samples takes their size four times
+    # a single extreme is no limit; sorting millions of samples takes four times their memory
     if max(np.count_nonzero(finite == end) for end in (finite.min(), finite.max())) < FEWEST_CLIPPED:
         return clipped
     levels, counts = np.unique(finite, return_counts=True)
@@ -51,7 +51,7 @@ def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) ->
 
 
 def _repeats(counts: NDArray[np.intp], total: int) -> bool:
-    """Whether the extreme value comes more often than chance, and than the values next to it."""
+    """Whether the extreme value comes more often than by chance, and than its neighbouring values."""
     beside = counts[1 : max(4, len(counts) // 20)]
     return bool(
         counts[0] >= FEWEST_CLIPPED and counts[0] < _REST * total and counts[0] >= 2 * beside.max(initial=1)
@@ -61,8 +61,8 @@ def _repeats(counts: NDArray[np.intp], total: int) -> bool:
 def _falls_steeply(values: Floats, extreme: float, levels: Floats) -> bool:
     """Whether the signal leaves its extreme by more than a smooth top would.
 
-    A parabola that the step q of the converter makes flat over k >= 2 samples falls by at most
-    q (1 + 2/k)^2 + q <= 5 q from there to the next sample.
+    The step q of the converter makes a parabola flat over k >= 2 samples. From there to the next sample it falls by at
+    most q (1 + 2/k)^2 + q <= 5 q.
     """
     runs = np.flatnonzero(np.diff(np.concatenate([[False], values == extreme, [False]]))).reshape(-1, 2)
     ends = np.concatenate([runs[:, 0] - 1, runs[:, 1]])

@@ -1,4 +1,4 @@
-"""Tables that are parts of one: a file that was appended to, or whose clock begins again."""
+"""Tables that are parts of one: a file that was appended to, or whose clock restarts."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _FEWEST_ROWS = 3
 _LATE = 1.5
 """Distance of two parts, in intervals, above which the later one does not follow at once."""
 _BACK_BY = 3.0
-"""Step back of a clock, in intervals, above which it begins again; a smaller one is disorder."""
+"""Step back of a clock, in intervals, above which it restarts; a smaller step is disorder."""
 
 
 def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
-    """Join tables that continue each other in time, and say so; gaps between them are left to the time axis."""
+    """Return tables joined if they continue each other in time, and remarks; the time axis handles gaps."""
     result: list[Table] = []
     remarks: list[str] = []
     for table in tables:
@@ -33,7 +33,7 @@ def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
 
 
 def _joint_remark(before: Table, together: Table, title: str) -> str:
-    """Say how the later of two parts goes on."""
+    """Return the remark on the joint of two parts."""
     assert together.time is not None
     rows = len(before.columns[0].values)
     ends, begins = together.time.values[rows - 1 : rows + 1]
@@ -44,7 +44,7 @@ def _joint_remark(before: Table, together: Table, title: str) -> str:
 
 
 def _continued(before: Table, after: Table) -> Table | None:
-    """Return both tables as one where the second goes on later with the same columns; None otherwise."""
+    """Return both tables as one if the second continues the first later with the same columns, else None."""
     if [column.label for column in before.columns] != [column.label for column in after.columns]:
         return None
     if (
@@ -63,7 +63,7 @@ def _continued(before: Table, after: Table) -> Table | None:
 
 
 def _instants(table: Table) -> Floats | None:
-    """Return the instants of a table's rows, by its column or its header; None where its columns differ."""
+    """Return the instants of a table's rows, by its column or its header; None if its columns differ."""
     column = table.columns[0]
     if any(len(other.values) != len(column.values) or other.group != column.group for other in table.columns):
         return None
@@ -86,7 +86,7 @@ def _appended(one: Column, other: Column) -> Column:
 
 
 def split_at_restarts(table: Table) -> tuple[list[Table], list[str]]:
-    """Split a table where its clock begins again: several records in one file."""
+    """Return the parts of a table between restarts of its clock: several records in one file."""
     if table.time is None or len(table.time.values) < 2 * _FEWEST_ROWS or table.vectors:
         return [table], []
     time = table.time.values
@@ -102,7 +102,7 @@ def split_at_restarts(table: Table) -> tuple[list[Table], list[str]]:
         or min(end - begin for begin, end in pieces) < _FEWEST_ROWS
     ):
         return [table], []
-    # a clock that begins again begins where it began; a row in the wrong place does not
+    # a restarted clock begins at its first value; a misplaced row does not
     length = float(np.nanmax(time) - np.nanmin(time))
     if not np.all(np.abs(time[starts] - time[0]) <= 0.01 * length + 2.0 * usual):
         return [table], []

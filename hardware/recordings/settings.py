@@ -1,4 +1,4 @@
-"""What the user says of a file: options of `vibroimpact import`, or the same keys in a TOML file beside it."""
+"""The user's settings for a file: options of `vibroimpact import`, or the same keys in a TOML file beside it."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from vibroimpact.orchestrator.scene.problems import lines_of, problems_of
 
 
 def _listed(value: Any) -> Any:
-    """Let one value stand for a list of one."""
+    """Return one value as a list of one."""
     return [value] if isinstance(value, str | int | float) and not isinstance(value, bool) else value
 
 
 def _only(holds: Callable[[Any], bool]) -> AfterValidator:
-    """Return a validator that refuses values for which something does not hold."""
+    """Return a validator that refuses values for which a condition is false."""
 
     def check(value: Any) -> Any:
         if not holds(value):
@@ -50,10 +50,10 @@ _Span = Annotated[tuple[FiniteFloat, FiniteFloat], Field(strict=False)]
 
 
 class ImportSettings(BaseModel):
-    """What the user says of the columns; what is None or empty is found from the file.
+    """The user's settings for columns; None or empty values are found from the file.
 
-    `name`, `unit`, `scale` and `offset` go through the columns in order, without the column of instants; a single
-    unit, scale or offset holds for all of them. A value is `scale` times what the file has, plus `offset`.
+    `name`, `unit`, `scale` and `offset` list the columns in order, without the column of instants. A single unit,
+    scale or offset holds for all columns. A value is `scale` times the file's value, plus `offset`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -137,18 +137,18 @@ def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
 
 
 def settings_beside(path: Path) -> ImportSettings:
-    """Return the settings in the file `NAME.toml` beside a recording; where there is none, none."""
+    """Return the settings in the file `NAME.toml` beside a recording; empty without it."""
     beside = path.with_name(path.name + ".toml")
     return read_settings(beside) if os.path.isfile(beside) else ImportSettings()
 
 
 def read_settings(path: Path) -> ImportSettings:
-    """Read a settings file.
+    """Return the settings of a file.
 
     Raises
     ------
     UsageError
-        It cannot be read, is no TOML, or has wrong keys: all problems.
+        The file cannot be read, is no TOML, or has wrong keys; all problems are listed.
     """
     source = str(path)
     return checked(document_of(text_of(path, "a settings file"), source), source)

@@ -1,4 +1,4 @@
-"""The files of one import, each with what the user says of it."""
+"""The files of one import, each with the user's settings."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ _PER_COLUMN = frozenset({"name", "unit", "scale", "offset"})
 
 @dataclass(slots=True)
 class Source:
-    """One file: what was read of it, and what the user says of it."""
+    """One file: its raw content, and the user's settings."""
 
     path: Path
     settings: ImportSettings
-    """Its lists go through the columns of this file."""
+    """Their lists go through the columns of this file."""
     raw: RawFile
-    """With the columns that are wanted, instants in s."""
+    """With the selected columns, and instants in s."""
 
     @property
     def columns(self) -> int:
-        """Columns of data in all tables."""
+        """Number of data columns in all tables."""
         return sum(len(table.columns) for table in self.raw.tables)
 
 
 def read_source(path: Path, given: ImportSettings, common: ImportSettings | None = None) -> Source:
-    """Read one file and choose its columns.
+    """Return one file with its selected columns.
 
-    `given` are the settings of the command line, of which those for single columns are left to `spread`; `common` those
-    in place of the settings file beside the file. A file that cannot be read raises DatasetError with its name.
+    `given` are the settings of the command line; `spread` assigns those for single columns. `common` replaces the
+    settings file beside the file. DatasetError, with the file's name: the file cannot be read.
     """
     own = settings_beside(path) if common is None else common
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
@@ -66,15 +66,15 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
 
 
 def shortened(line: str) -> str:
-    """Return a line of a bearable length: names in files may have millions of characters."""
+    """Return a line of at most `_LONGEST_LINE` characters: names in files may have millions."""
     return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..."
 
 
 @contextmanager
 def naming(path: Path, besides: str = "") -> Iterator[None]:
-    """Let the lines of an error begin with the name of their file, and end with what else is wrong with it.
+    """Let the lines of an error begin with the name of their file, and end with its other damage.
 
-    The DatasetError is also that of a file that cannot be read, or is too large for the memory.
+    A DatasetError also replaces the error of an unreadable file, or of one too large for the memory.
     """
     try:
         yield
@@ -94,9 +94,9 @@ def naming(path: Path, besides: str = "") -> Iterator[None]:
 
 
 def spread(sources: Sequence[Source], given: ImportSettings) -> None:
-    """Hand what the command line says of the columns, in order, to the files that they are in.
+    """Distribute the command line's values for columns, in order, to the files of these columns.
 
-    Fewer columns than names, units, scales or offsets raise UsageError.
+    UsageError: there are fewer columns than names, units, scales or offsets.
     """
     edges = np.cumsum([0, *(source.columns for source in sources)]).tolist()
     for key in sorted(_PER_COLUMN & given.model_fields_set):

@@ -1,8 +1,8 @@
-"""Decide when the samples of a column were taken, from all that a file says of it, and say why.
+"""Decides the instants of a column's samples from all information in a file, and gives the reason.
 
-In order: the rate that the user gives; the column of instants, with the exact interval of the header where both
-agree and the instants are only printed with too few digits; the interval of the header. Where they contradict each
-other, the instants are used and the spread is kept as the uncertainty of the interval.
+Sources, in order: the rate that the user gives; the column of instants; the interval of the header. If instants and
+header agree, and the instants only lack digits, the header's exact interval is used. If they contradict each other,
+the instants are used, and the spread is the uncertainty of the interval.
 """
 
 from __future__ import annotations
@@ -23,38 +23,38 @@ from vibroimpact.hardware.recordings.printed_grid import digits_of
 _ROUNDED = 0.7
 """Largest residual, in units of the last digit, of a line through instants that are only rounded."""
 _FEW_HOLES = 0.1
-"""Share of missing samples up to which whole multiples of an interval are a grid with holes."""
+"""Largest share of missing samples for which whole multiples of an interval are a grid with holes."""
 _MOST_DOUBTFUL = 0.1
-"""Share of rows out of order or repeated above which the instants are refused."""
+"""Share of rows out of order or repeated, above which the instants are refused."""
 _MOST_FILLED = 10
-"""Ratio of samples to rows above which gaps are not filled: it is no gap but another kind of record."""
+"""Ratio of samples to rows, above which gaps are not filled: this is another kind of record."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where the rows of a column go in time."""
+    """The place of a column's rows in time."""
 
     axis: TimeAxis
     row: NDArray[np.intp]
-    """Row of the file that each sample has, shape (sample,); -1 for one that is missing there."""
+    """Row of the file for each sample, shape (sample,); -1 for a missing sample."""
     suspect: Flags
-    """Samples whose instant was doubtful, shape (sample,)."""
+    """Samples with a doubtful instant, shape (sample,)."""
     remarks: tuple[str, ...] = ()
 
     @property
     def missing(self) -> int:
-        """Samples that the file skips."""
+        """Number of samples that the file skips."""
         return int(np.sum(self.row < 0))
 
 
 def place(
     table: Table, column: Column, rate: float | None = None, start: float | None = None, trigger: str = ""
 ) -> Placement:
-    """Decide the instants of one column of a table, whose own column of instants, if it has one, is in s.
+    """Return the place of one column of a table in time; a column of instants, if there is one, is in s.
 
-    `rate` (samples per second) and `start` (instant of the first sample, s) are the user's, who knows better than the
-    file; `trigger` is what began the axis. DatasetError: nothing says when the samples were taken, or what says so is
-    in disorder.
+    `rate` (samples per second) and `start` (instant of the first sample, s) are the user's, and override the file.
+    `trigger` is the start event of the axis. DatasetError: nothing gives the instants of the samples, or the instants
+    are in disorder.
     """
     placement = _placed(table, column, rate)
     time = placement.axis.time
@@ -87,7 +87,7 @@ def _placed(table: Table, column: Column, rate: float | None) -> Placement:
 
 
 def _columns_tried(table: Table) -> str:
-    """Say which column was tried as instants, and which option takes it."""
+    """Return the column that was tried as instants, and the option that selects it, in words."""
     for number, column in enumerate(table.columns, 1):
         values = column.values[np.isfinite(column.values)]
         if len(values) > 1 and bool(np.all(np.diff(values) > 0.0)):
@@ -113,7 +113,7 @@ def _even(
 
 
 def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
-    """Place the rows by the rate of the user; gaps in the instants of the file stay gaps."""
+    """Place the rows by the user's rate; gaps in the instants of the file stay gaps."""
     interval, length = 1.0 / rate, len(column.values)
     begin, remarks = column.start, []
     gaps, count = None, np.arange(length)
@@ -135,7 +135,7 @@ def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
 
 
 def _pace_remarks(row: NDArray[np.intp], instants: Floats, interval: float) -> list[str]:
-    """Say where the instants of rows contradict an interval by more than their digits."""
+    """Return a remark if the instants of rows contradict an interval by more than their digits."""
     steps, rows = np.diff(instants), np.diff(row)
     usual = float(np.median(steps)) if len(steps) else 0.0
     inner = steps <= 1.5 * usual if usual > 0.0 else np.ones(len(steps), dtype=bool)
@@ -148,14 +148,14 @@ def _pace_remarks(row: NDArray[np.intp], instants: Floats, interval: float) -> l
 
 
 def _is_bearable(samples: int, rows: int) -> bool:
-    """Whether rows may be filled up to so many samples."""
+    """Whether rows may be filled up to this number of samples."""
     return samples <= min(MOST_SAMPLES, _MOST_FILLED * rows + 1000)
 
 
 def _on_grid(
     start: float, interval: float, count: NDArray[np.intp], source: str, remarks: Sequence[str]
 ) -> Placement:
-    """Place rows on an even grid, each at its count; what no row has is missing."""
+    """Place rows on an even grid, each at its count; samples without a row are missing."""
     placed = _even(start, interval, int(count[-1]) + 1 if len(count) else 0, source, remarks)
     row = np.full(len(placed.axis.time), -1, dtype=np.intp)
     row[count] = np.arange(len(count))
@@ -163,7 +163,7 @@ def _on_grid(
 
 
 def _comparable(table: Table, column: Column) -> list[float]:
-    """Return the intervals that the header gives to this column, and to those that were taken beside it."""
+    """Return the intervals in the header for this column, and for those recorded with it."""
     length = len(column.values)
     beside = [
         other.interval
@@ -191,7 +191,7 @@ def _by_instants(
 
 
 def _has_few_holes(instants: Floats) -> bool:
-    """Whether instants lie exactly on a grid of which few are missing: 0, 1, 3, 4 are no rounded 0, 1.3, 2.6, 3.9."""
+    """Whether instants lie exactly on a grid with few holes: 0, 1, 3, 4 is not a rounded 0, 1.3, 2.6, 3.9."""
     steps = np.diff(instants)
     usual = float(np.median(steps))
     if usual <= 0.0:
@@ -211,7 +211,7 @@ class _Line:
 
 
 def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
-    """Return the line through instants that are even up to their digits; None where they are not."""
+    """Return the line through instants that are even up to their digits; None for uneven ones."""
     if len(instants) < 2 or instants[-1] <= instants[0]:
         return None
     span = int(count[-1] - count[0])
@@ -223,7 +223,7 @@ def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
     digits = digits_of(instants)
     allowed = max(EVEN * interval, _ROUNDED * digits)
     worst = float(np.abs(residual).max())
-    # a straight line says nothing of two samples, or of rounded instants coarser than all that they cover
+    # two samples prove no line, nor do rounded instants coarser than their whole span
     is_exact = len(instants) > 2 and worst <= 1e-6 * interval
     if slope <= 0.0 or worst > allowed or (digits * 4.0 > span * interval and not is_exact):
         return None
@@ -237,7 +237,7 @@ def _by_line(
     line: _Line, instants: Floats, column: Column, declared: Sequence[float], length: int
 ) -> Placement:
     remarks = _line_remarks(line, instants, length)
-    # how far the printed digits can turn the line
+    # possible rotation of the line by the printed digits
     turn = line.digits / (line.interval * max(len(instants) - 1, 1))
     agreeing = [
         interval
@@ -247,13 +247,13 @@ def _by_line(
     if len(agreeing) < len(declared):
         spread = [line.interval, *declared]
         uncertainty = (max(spread) - min(spread)) / line.interval
-        said = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
+        intervals = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
         remarks.append(
-            f"the time axes conflict: {said} s an interval in the header, {line.interval:.6g} s in the column of "
+            f"the time axes conflict: {intervals} s an interval in the header, {line.interval:.6g} s in the column of "
             f"instants, which is used since it was written with the rows; all frequencies are uncertain by "
             f"{uncertainty:.1%}"
         )
-        source = f"the column of instants ({line.interval:.6g} s); the header says {said} s"
+        source = f"the column of instants ({line.interval:.6g} s); the header says {intervals} s"
         return _even(line.start, line.interval, length, source, remarks, uncertainty)
     if declared and line.is_rounded:
         own = column.interval if column.interval is not None else agreeing[0]
@@ -271,16 +271,16 @@ def _line_remarks(line: _Line, instants: Floats, length: int) -> list[str]:
         remarks.append(
             f"the instants are rounded to {line.digits:.0e} s and {line.interval:.6g} s apart: they are taken as even"
         )
-    gone = int(np.sum(~np.isfinite(instants)))
-    if gone:
-        remarks.append(f"{gone} rows have no instant; they are counted on")
+    missing = int(np.sum(~np.isfinite(instants)))
+    if missing:
+        remarks.append(f"{missing} rows have no instant; they are counted on")
     if length > len(instants):
         remarks.append(f"{length - len(instants)} rows after the last instant are counted on from it")
     return remarks
 
 
 def _uneven(instants: Floats, heading: str) -> Placement:
-    """Place rows by instants that are not even: gaps, jitter, repetitions, disorder."""
+    """Place rows by uneven instants: gaps, jitter, repetitions, disorder."""
     row, suspect, remarks = _in_order(
         instants, f"column of instants{f', {heading[:40]!r}' if heading else ''}"
     )
@@ -342,7 +342,7 @@ def _in_order(instants: Floats, title: str) -> tuple[NDArray[np.intp], Flags, li
 
 
 def _with_gaps(time: Floats) -> tuple[Gaps, _Line] | None:
-    """Return the gaps in instants that lie on an even grid otherwise, and that grid; None where they do not."""
+    """Return the gaps in instants on an otherwise even grid, and that grid; None without one."""
     count = np.arange(len(time))
     gaps = gaps_in(count, time)
     if gaps is None or not gaps.on_grid or not _is_bearable(len(time) + gaps.missing, len(time)):

@@ -1,4 +1,4 @@
-"""Instants that count from 1970, or days of a spreadsheet: a recording counts from its start."""
+"""Instants that count from 1970, or days of a spreadsheet, as seconds from the start of a recording."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _EARLIEST, _LATEST = 946_684_800.0, 4_102_444_800.0
 #: Days of a spreadsheet from 1982 to 2064; its day 0 is 1899-12-30.
 _FIRST_DAY, _LAST_DAY = 30_000.0, 60_000.0
 _DAY_ZERO, _DAY = np.datetime64("1899-12-30", "us"), 86_400.0
-#: Steps below which they are no seconds (50 kHz), and above which they are (10 Hz; 2.4 hours if they were days).
+#: Steps below which numbers are no seconds (50 kHz), and above which they are (10 Hz; 2.4 hours if they were days).
 _FASTEST, _SLOWEST = 2e-5, 0.1
-#: Distance of an interval from a round one, and digits that a person prints, both relative to it.
+#: Distance of an interval from a round one, and weight of digits that a person prints, both relative to the interval.
 _ROUND, _PRINTED = 1e-5, 1e-3
 _PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 
@@ -27,10 +27,10 @@ _PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanose
 def counted_from_start(
     tables: Sequence[Table], rate: float | None = None
 ) -> tuple[list[Table], list[str], dict[str, str]]:
-    """Let instants that count from 1970 count from the first of them; return tables, remarks and `source_date`.
+    """Return tables whose instants count from the first instead of 1970, with remarks and `source_date`.
 
-    Instants with a unit are in s; those without one are in the unit that their size tells.
-    Where the user gives a `rate`, none are days.
+    Instants with a unit are in s; without one, their size gives the unit.
+    With the user's `rate`, instants are never days.
     """
     tables, days = _in_seconds_of_days(tables) if rate is None else (tables, "")
     if days:
@@ -59,9 +59,9 @@ def counted_from_start(
 
 
 def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
-    """Return tables whose instants were days of a spreadsheet in s, and the date of the first; no date, if none were.
+    """Return tables with days of a spreadsheet converted to s, and the date of the first; an empty date without days.
 
-    Instants that may be days or seconds raise DatasetError.
+    DatasetError: instants may be days or seconds.
     """
     found = [table.time for table in tables if table.time is not None and _are_days(table.time)]
     if not found:
@@ -84,21 +84,21 @@ def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
 
 
 def _are_days(time: Column) -> bool:
-    """Whether instants without a unit are days of a spreadsheet: as seconds they would be odd, as days they are not.
+    """Whether instants without a unit are days of a spreadsheet: odd as seconds, but round as days.
 
-    Instants that may be either raise DatasetError.
+    DatasetError: they may be either.
     """
     known = time.values[np.isfinite(time.values)]
     if time.unit or time.dated or len(known) < 3 or known[0] < _FIRST_DAY or known[-1] > _LAST_DAY:
         return False
     step = float(np.median(np.diff(known)))
-    # seconds are printed with few digits; days have as many as there are
+    # seconds are printed with few digits, days with all digits
     if not 0.0 < step < _SLOWEST or decimal_step(known) >= _PRINTED * step:
         return False
-    lost = 2.0 * float(np.spacing(known[-1])) / step
-    if not _is_round(step * _DAY, lost):
+    rounding = 2.0 * float(np.spacing(known[-1])) / step
+    if not _is_round(step * _DAY, rounding):
         return False
-    if step > _FASTEST and _is_round(step, lost):
+    if step > _FASTEST and _is_round(step, rounding):
         raise DatasetError(
             message(
                 f"column of instants: expected seconds, got {known[0]:.6g} and on in steps of {step:.3g}: seconds, "
@@ -109,14 +109,14 @@ def _are_days(time: Column) -> bool:
     return True
 
 
-def _is_round(interval: float, lost: float) -> bool:
-    """Whether an interval, or its rate, is a whole number, of which binary has lost so much."""
+def _is_round(interval: float, rounding: float) -> bool:
+    """Whether an interval, or its rate, is a whole number, within the relative error `rounding` of binary."""
     larger = max(interval, 1.0 / interval)
-    return abs(larger - round(larger)) < (_ROUND + lost) * larger
+    return abs(larger - round(larger)) < (_ROUND + rounding) * larger
 
 
 def _parts_of(time: Column) -> float | None:
-    """Return how many of its units make a second, where instants count from 1970; None where they do not."""
+    """Return the number of its units in a second, if instants count from 1970, else None."""
     known = time.values[np.isfinite(time.values)]
     if not len(known):
         return None
@@ -129,7 +129,7 @@ def _parts_of(time: Column) -> float | None:
 def _since(table: Table, origin: float) -> Table:
     """Return a table whose instants count from an origin (s since 1970), if they counted from 1970.
 
-    What binary took of their last digits is put back or dropped.
+    Binary rounding of their last digits is repaired or dropped.
     """
     part = None if table.time is None else _parts_of(table.time)
     if table.time is None or part is None:

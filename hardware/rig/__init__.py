@@ -1,1 +1,1 @@
-"""What programs on a rig share: the rig that is meant, its inputs, its output."""
+"""Shared parts of programs on a rig: the opened rig, its inputs, its output."""

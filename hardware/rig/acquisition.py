@@ -1,9 +1,9 @@
-"""Acquire inputs without an end: one thread reads, a bounded queue keeps what the program has not taken yet.
+"""Acquire inputs without an end: one thread reads, and a bounded queue keeps the samples for the program.
 
-No sample is lost silently. Where the program takes too slowly, the queue is full and blocks are left out, by exactly
-known numbers of samples. Where the thread itself read too late, the device has overwritten samples and its task is
-over: it is started anew, and the clock of the computer says how long that took. An acquisition on a trigger is not
-started anew, since its trigger does not come again: it ends with what was read.
+No sample is lost silently. If the program takes too slowly, the queue is full and blocks are left out, by exactly
+known numbers of samples. If the thread itself reads too late, the device has overwritten samples and its task is over.
+The task is then started anew, and the clock of the computer gives the length of the gap. An acquisition on a trigger
+is not started anew, since its trigger does not come again: it ends with the samples so far.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from vibroimpact.hardware.rig.sessions import input_task
 Floats = NDArray[np.float64]
 
 SHORTEST_BLOCK, LONGEST_BLOCK = 0.05, 1.0
-"""Time of the samples of one read, s; only a rig that is faster than life, or a program that lags, has long blocks."""
+"""Duration of the samples of one read, s; only a rig faster than real time, or a slow program, has long blocks."""
 BLOCK_VALUES = 2**18
 """Most values of one read, of all inputs: 2 MiB."""
 BUFFER_SECONDS, BUFFER_VALUES = 10.0, 2**24
-"""What the device keeps for a thread that lags."""
+"""Size of the device's buffer for a late thread: seconds, and most values of all inputs."""
 QUEUE_BLOCKS = 64
 READ_TIMEOUT = 0.5
-"""Time of a read, s, after which it returns with what is there, so that a flag is heard."""
+"""Time of a read, s, after which it returns with the available samples, so that the stop flag is seen."""
 SILENCE = 60.0
-"""Time of a call, s, after which the rig counts as one that answers no more."""
+"""Time of a call, s, after which the rig counts as dead."""
 _END_SECONDS = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Samples that were read together.
+    """Samples of one read.
 
     Attributes
     ----------
     first : int
-        Number of the first sample on the clock of the device; where it is not the end of the block before, samples
-        are lost.
+        Number of the first sample on the clock of the device; samples are lost if it is not the end of the previous
+        block.
     volts : ndarray of float, shape (channel, sample)
     """
 
@@ -66,13 +66,13 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that were lost.
+    """Lost samples.
 
     Attributes
     ----------
     first, samples : int
     doubt : float
-        s by which the length may be wrong; 0: it is exact.
+        Possible error of the length, s; 0: it is exact.
     reason : str
     """
 
@@ -89,19 +89,19 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What the device says of an acquisition.
+    """The device's data on an acquisition.
 
     Attributes
     ----------
     rate : float
-        Hz, as the device makes it of what was asked for.
+        Actual rate of the device, Hz.
     skew : float
-        Time from the sample of an input to that of the next one, s.
+        Time from the sample of an input to the sample of the next input, s.
     device, product : str
     steps : tuple of (float, float, float)
-        Of each input: ends of its range and step of its converter, V.
+        Ends of the range and step of the converter of each input, V.
     started_at : str
-        UTC; of an acquisition on a trigger, since when it waits. Empty before.
+        UTC; for an acquisition on a trigger, the start of the wait. Empty before.
     """
 
     rate: float
@@ -124,21 +124,21 @@ class Acquisition:
     count : int or None
         Samples of each input; None: until it is stopped.
     trigger : str
-        Terminal that starts it, such as `/Dev1/ao/StartTrigger`; empty: at once.
+        Terminal that starts it, such as `/Dev1/ao/StartTrigger`; empty: immediate start.
 
     Attributes
     ----------
     rig : Rig
     facts : Facts
-        From `__enter__` on.
+        Available after `__enter__`.
     gaps : list of Gap
-        The last one may grow until a block after it has come.
+        The last gap may grow until a later block has come.
     lateness : Lateness
 
     Raises
     ------
     UsageError
-        There is no input, or rate or count are none.
+        There is no input, or rate or count is invalid.
     DaqError, RpcError
         The rig refuses an input, the rate or the trigger; `opened_rig` makes one line of it.
 
@@ -161,7 +161,7 @@ class Acquisition:
             raise UsageError(f"--rate: expected a number > 0, got {rate:g}.")
         if count is not None and count < 1:
             raise UsageError(f"samples: expected 1 or more, got {count}.")
-        self.rig, self._inputs, self._asked = rig, tuple(inputs), rate
+        self.rig, self._inputs, self._requested_rate = rig, tuple(inputs), rate
         self._count, self._trigger = count, trigger
         self.gaps: list[Gap] = []
         self._waiting: deque[Block] = deque()
@@ -190,9 +190,9 @@ class Acquisition:
             task.ai_channels.add_ai_voltage_chan(
                 each.terminal, each.name, min_val=-each.highest, max_val=each.highest
             )
-        most = min(BUFFER_SECONDS * self._asked, BUFFER_VALUES / len(self._inputs))
+        most = min(BUFFER_SECONDS * self._requested_rate, BUFFER_VALUES / len(self._inputs))
         task.timing.cfg_samp_clk_timing(
-            self._asked,
+            self._requested_rate,
             sample_mode=constants.AcquisitionType.CONTINUOUS,
             samps_per_chan=max(2, round(most)),
         )
@@ -215,7 +215,7 @@ class Acquisition:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the task; a rig that answers no more is left alone after 5 s."""
+        """End the task; a dead rig is left alone after 5 s."""
         self.stop()
         with self._changed:
             self._waiting.clear()
@@ -223,7 +223,7 @@ class Acquisition:
         if self._thread.ident is not None:
             self._thread.join(_END_SECONDS)
         if not self._thread.is_alive():
-            with suppress(daqmx.DaqError, daqmx.RpcError):  # what went wrong was raised before
+            with suppress(daqmx.DaqError, daqmx.RpcError):  # the failure was raised before
                 self._task.close()
 
     def start(self) -> None:
@@ -234,23 +234,23 @@ class Acquisition:
         self._thread.start()
 
     def stop(self) -> None:
-        """Set the flag on which it ends, after the read that is under way; a signal handler may call it."""
+        """Set the stop flag: the acquisition ends after the present read. A signal handler may call it."""
         self._stopping.set()
 
     @property
     def queue_fill(self) -> float:
-        """How full the queue is, 0 to 1."""
+        """Fill level of the queue, 0 to 1."""
         return len(self._waiting) / QUEUE_BLOCKS
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the blocks, until all samples are there, it is stopped, or it fails.
+        """Yield the blocks, until all samples have come, it is stopped, or it fails.
 
         Raises
         ------
         DaqError, RpcError
-            What went wrong, after all blocks that were read before.
+            The failure, after all blocks that were read before.
         RigError
-            The rig does not answer any more.
+            The rig is dead.
         """
         while True:
             with self._changed:
@@ -269,7 +269,7 @@ class Acquisition:
         if self._called and time.monotonic() - self._called > SILENCE:
             raise RigError(f"{self.rig.name}: expected an answer within {SILENCE:g} s, got none.")
 
-    # ---- in the thread that reads ----
+    # ---- in the reader thread ----
 
     def _run(self) -> None:
         try:
@@ -294,14 +294,14 @@ class Acquisition:
                 self.lateness.arrived(self._next + volts.shape[1], now)
                 self._keep(Block(self._next, volts))
                 lasted = volts.shape[1] / rate
-                # what is there at once is read in longer blocks: a call costs as much as thousands of samples
+                # a backlog is read in longer blocks: a call costs as much as thousands of samples
                 size = min(2 * size, longest) if now - began < 0.2 * lasted else max(size // 2, shortest)
 
     def _left(self, size: int) -> int:
         return size if self._count is None else min(size, self._count - self._next)
 
     def _read(self, count: int) -> Floats:
-        """Return the samples that there are within the time of a read, at most so many; shape (channel, sample)."""
+        """Return the samples that come within the time of a read, at most `count`, shape (channel, sample)."""
         volts = np.empty((len(self._inputs), count))
         self._called = time.monotonic()
         try:
@@ -309,16 +309,16 @@ class Acquisition:
             self._reader.read_many_sample(volts, count, timeout)
         except daqmx.DaqError as error:
             if error.error_code == daqmx.DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE and not self._trigger:
-                self._start_anew()
+                self._restart()
                 return volts[:, :0]
             if error.error_code != daqmx.DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE:
                 raise
             return volts[:, : int(getattr(error, "samps_per_chan_read", 0) or 0)]
         return volts
 
-    def _start_anew(self) -> None:
-        """Start the task again after samples were overwritten, and find where it is by the clock of the computer."""
-        with suppress(daqmx.DaqError):  # it says once more that it had failed
+    def _restart(self) -> None:
+        """Start the task again after samples were overwritten, and find its position by the clock of the computer."""
+        with suppress(daqmx.DaqError):  # the task repeats its failure
             self._task.stop()
         before = time.monotonic()
         self._task.start()
@@ -330,7 +330,7 @@ class Acquisition:
         self._lost(first, after - before + doubt, "read too late, started anew")
 
     def _keep(self, block: Block) -> None:
-        """Put a block into the queue; where that is full, wait as long as the device keeps what follows."""
+        """Put a block into the queue; if the queue is full, wait as long as the device keeps the next samples."""
         while True:
             with self._changed:
                 if len(self._waiting) < QUEUE_BLOCKS:
@@ -345,7 +345,7 @@ class Acquisition:
                 return
 
     def _lost(self, first: int, doubt: float, reason: str) -> None:
-        """Go on with a later sample; what is before it is a gap, or the rest of one."""
+        """Continue with a later sample; the samples before it are a gap, or extend the last gap."""
         last = self.gaps[-1] if self.gaps else None
         if last is not None and last.end == self._next and last.reason == reason and not doubt:
             self.gaps[-1] = replace(last, samples=first - last.first)

@@ -1,4 +1,4 @@
-"""Calibrations: what turns the volts of a channel into m or N, how and when that was measured."""
+"""Calibrations: the conversion from the volts of a channel to m or N, with method and date."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def _as_text(value: Any) -> Any:
-    """Let a date of TOML stand for its text."""
+    """Return a date of TOML as text."""
     return value.isoformat() if isinstance(value, date | datetime) else value
 
 
@@ -37,17 +37,17 @@ class Calibration(BaseModel):
     Attributes
     ----------
     unit : str
-        Of the value, such as N or mm.
+        Unit of the value, such as N or mm.
     sensitivity : float
         V per unit; negative where the wires are swapped.
     offset : float
-        What the channel reads at 0 when the recording begins, V.
+        Reading of the channel at value 0 at the start of the recording, V.
     drift : float
-        By which that changes, V/s.
+        Change of the offset, V/s.
     how, when : str
-        How and when it was measured.
+        Method and date of the measurement.
     terminal : str
-        Where the sensor is wired to; empty: anywhere.
+        Terminal of the sensor; empty: any.
 
     Examples
     --------
@@ -76,11 +76,11 @@ class Calibration(BaseModel):
 
     @property
     def cf_unit(self) -> str:
-        """The unit as recordings have it."""
+        """The unit in the form of recordings."""
         return measured_unit(self.unit).cf
 
     def to_units(self, volts: Floats, time: Floats) -> Floats:
-        """Return values in `unit` of volts that were measured at instants (s from the start)."""
+        """Return values in `unit` from volts measured at instants (s from the start)."""
         return (volts - self.offset - self.drift * time) / self.sensitivity
 
     def to_volts(self, values: Floats, time: Floats) -> Floats:
@@ -88,7 +88,7 @@ class Calibration(BaseModel):
         return self.sensitivity * values + self.offset + self.drift * time
 
     def attributes(self) -> dict[str, Any]:
-        """Return what a channel of a recording says of it, so that the volts can be had again."""
+        """Return the attributes of a calibrated channel, from which the volts can be restored."""
         return {
             "source_unit": "V",
             "calibrated_unit": self.unit,
@@ -108,12 +108,12 @@ def read_calibrations(paths: Iterable[Path], inputs: Sequence[Input]) -> dict[st
     ----------
     paths : iterable of Path
     inputs : sequence of Input
-        Those of the program: a calibration of any other is refused.
+        Inputs of the program: a calibration of any other channel is refused.
 
     Raises
     ------
     UsageError
-        A file cannot be read or is wrong, of another channel or another terminal: all problems of it.
+        A file cannot be read or is wrong, or is for another channel or terminal; all its problems are listed.
     """
     found: dict[str, Calibration] = {}
     known = {each.name: each for each in inputs}

@@ -1,4 +1,4 @@
-"""The samples that go out: a waveform until it ends or is stopped, then down to 0 from the sample that is next."""
+"""The output samples: a waveform until it ends or is stopped, then down to 0 from the next sample."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from vibroimpact.hardware.rig.limits import Fall, Floats, Limits
 from vibroimpact.hardware.rig.waveforms import Waveform, envelope
 
 FADE = 0.2
-"""Time in which a waveform that is stopped fades, s, where the slew lets it."""
+"""Fade time of a stopped waveform, s, if the slew allows it."""
 
 
 class Course:
-    """What an output puts out from its first sample until it is at rest, at a rate in Hz.
+    """The samples of an output from the first until it is at rest, at a rate in Hz.
 
-    A waveform that is stopped fades. One that ends elsewhere than at 0 V, or that gives what the limits refuse, is left
-    where it was: from there the voltage falls to 0. After that all samples are 0. `next` is the number of the next
-    sample, `last` the sample before it, V. All samples are 0 from the number `rest` on (None: not known yet); `failure`
-    is why the waveform was left.
+    A stopped waveform fades. A waveform that does not end at 0 V, or that passes the limits, is left at its last
+    voltage, which falls to 0. All later samples are 0. `next` is the number of the next sample, `last` the sample
+    before it, V. `rest` is the number from which all samples are 0 (None: not known yet). `failure` is the reason for
+    leaving the waveform.
     """
 
     def __init__(self, waveform: Waveform, limits: Limits, rate: float) -> None:
@@ -32,7 +32,7 @@ class Course:
         self._fall: tuple[int, Fall] | None = None
 
     def stop(self) -> None:
-        """Let the waveform fade from the next sample on."""
+        """Fade the waveform from the next sample on."""
         if self._fade_from is None and self._fall is None and self.rest is None:
             self._fade_from = self.next
 
@@ -61,7 +61,7 @@ class Course:
             return np.empty(0)
         try:
             return self._of_waveform(min(count, left))
-        except Exception as error:  # a waveform may be anybody's: the output comes to rest, then it is raised
+        except Exception as error:  # a waveform may be foreign code: its error is raised at rest
             self.failure = error
             self._begin_to_fall()
             return np.empty(0)
@@ -75,8 +75,8 @@ class Course:
         if volts.shape != (count,):
             raise UsageError(f"output: expected a waveform of {count} samples, got shape {volts.shape}.")
         if self._fade_from is not None:
-            gone = np.arange(self.next + 1, self.next + count + 1, dtype=np.float64) - self._fade_from
-            volts = volts * (1.0 - envelope(gone, self._fade_samples))
+            elapsed = np.arange(self.next + 1, self.next + count + 1, dtype=np.float64) - self._fade_from
+            volts = volts * (1.0 - envelope(elapsed, self._fade_samples))
             volts = _followed(volts, self.last, self._limits.slew / self._rate)
         self._limits.check(volts, self.last, self._rate, self.next)
         return volts
@@ -96,7 +96,7 @@ class Course:
 
 
 def _followed(targets: Floats, last: float, step: float) -> Floats:
-    """Return the samples that follow targets by steps that are no larger than `step`."""
+    """Return samples that follow targets with steps no larger than `step`."""
     if (np.abs(np.diff(targets, prepend=last)) <= step).all():
         return targets
     followed = np.empty(targets.shape)

@@ -1,9 +1,9 @@
-"""The guardian of an output: a process that brings it to rest when the program that drives cannot.
+"""The guardian of an output: a process that brings it to rest when the driving program cannot.
 
-It is started before the output and ends with it. When the program dies, or shows no life for 2 s and is ended, the
-guardian goes on with the program's own task, from the sample that is really next: it attaches to it by its name. Where
-the driver is in the program, no other process can attach: then it waits until the driver has freed the device, and
-comes down from the sample that should have been out last.
+It is started before the output and ends with it. A program that shows no life for 2 s is ended. When the program is
+dead, the guardian continues the program's own task, from the true next sample: it attaches to the task by its name. If
+the driver runs inside the program, no other process can attach. The guardian then waits until the driver has freed the
+device, and comes down from the last sample that should have been out.
 """
 
 from __future__ import annotations
@@ -25,37 +25,37 @@ from vibroimpact.hardware.rig.memory import SharedSamples
 from vibroimpact.hardware.rig.stream import STARVED, OutputStream, add_output, bring_to_rest
 
 HANG_SECONDS = 2.0
-"""Time without a sign of life after which a program counts as hanging, s."""
+"""Time without a sign of life, above which a program counts as hanging, s."""
 LOOK = 0.05
-"""Time between two looks at the program, s; its end is heard at once."""
+"""Interval between two checks of the program, s; its end is noticed at once."""
 CALL_SECONDS = 5.0
 PROBE_SECONDS = 1.0
 FREE_SECONDS = 3.0
-"""Time in which the driver of a program that has ended frees the device."""
+"""Time in which the driver of a dead program frees the device, s."""
 _QUIET = 0.03
-"""Time without a new sample after which no write of the dead program is under way, s."""
+"""Time without a new sample, above which the dead program's last write is over, s."""
 _IGNORED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 class Watch:
-    """Looks at the program that drives."""
+    """Watches the driving program."""
 
     def __init__(self, order: Order, memory: SharedSamples, answers: Callable[[], bool]) -> None:
         self._order, self._memory, self._answers = order, memory, answers
         self._heard = b""
 
     def until_needed(self) -> str:
-        """Return why the guardian is needed; empty: the output is at rest."""
+        """Return the reason for which the guardian is needed; empty if the output is at rest."""
         beat, since, looked = -1, 0.0, time.monotonic()
         while True:
-            said = self._said(LOOK)
-            if said is not None:
-                return said
+            reason = self._program_end(LOOK)
+            if reason is not None:
+                return reason
             now = time.monotonic()
             late, looked = now - looked > 0.5 * HANG_SECONDS, now
             if (
                 self._memory.beat != beat or late or not self._memory.driving
-            ):  # `late`: this process hung itself
+            ):  # `late`: this process itself was late
                 beat, since = self._memory.beat, now
             elif now - since > HANG_SECONDS:
                 if self._answers():
@@ -63,8 +63,8 @@ class Watch:
                     return f"showed no life for {HANG_SECONDS:g} s and was ended"
                 since = now
 
-    def _said(self, seconds: float) -> str | None:
-        """Return what the program's end or its word makes of it; None: it goes on."""
+    def _program_end(self, seconds: float) -> str | None:
+        """Return the meaning of the program's end or message; None if it continues."""
         if os.getppid() != self._order.program:
             return "has ended"
         if not select.select([0], [], [], seconds)[0]:
@@ -77,7 +77,7 @@ class Watch:
         return "" if REST in words else TAKE_OVER if TAKE_OVER in words else None
 
     def end_program(self) -> None:
-        """End the program, which may be stopped, and wait until it has."""
+        """End the program, which may be suspended, and wait for its end."""
         if os.getppid() != self._order.program:
             return
         os.kill(self._order.program, signal.SIGKILL)
@@ -120,7 +120,7 @@ class Rescue:
         return bool(self._memory.driving)
 
     def come_to_rest(self) -> None:
-        """Bring the output to 0 V, where it was driven; DaqError, RpcError, RigError where that fails."""
+        """Bring a driven output to 0 V; DaqError, RpcError, RigError if that fails."""
         if self._order.attach:
             self._by_attaching()
         elif self._memory.driving:
@@ -144,7 +144,7 @@ class Rescue:
             task.close()
 
     def _take_over(self, task: Any) -> None:
-        """Go on with the task of the program, from the sample that is next."""
+        """Continue the program's task from the next sample."""
         order, memory = self._order, self._memory
         written = self._settled(task)
         held = memory.sample(written - 1)
@@ -161,7 +161,7 @@ class Rescue:
             bring_to_rest(task, order.rate, self._limits, memory, held)
 
     def _settled(self, task: Any) -> int:
-        """Return how many samples the task has, when no write of the dead program is under way any more."""
+        """Return the number of samples of the task, once the dead program's last write is over."""
         position, since = -1, time.monotonic()
         while True:
             now, before = time.monotonic(), position
@@ -196,7 +196,7 @@ class Rescue:
 
 
 def _order() -> Order | None:
-    """Return what the program asks for; None: it has ended before."""
+    """Return the program's order; None if the program has ended before."""
     text = b""
     while not text.endswith(b"\n"):
         part = os.read(0, 1)
@@ -210,7 +210,7 @@ def _answer(text: str) -> None:
     try:
         os.write(1, f"{text}\n".encode())
     except OSError:
-        return  # the program has gone
+        return  # the program is gone
 
 
 def guard() -> int:
@@ -240,7 +240,7 @@ def guard() -> int:
 
 
 def _rescued(order: Order, rescue: Rescue, why: str) -> int:
-    """Bring the output to rest and say how that went: to the program, or, where it has ended, to its terminal."""
+    """Bring the output to rest and report it to the program or, if that has ended, to its terminal."""
     driven = rescue.is_needed
     try:
         rescue.come_to_rest()
@@ -262,4 +262,4 @@ def _rescued(order: Order, rescue: Rescue, why: str) -> int:
 
 
 if __name__ == "__main__":
-    os._exit(guard())  # at once: the program waits for it, and there is nothing to tidy up
+    os._exit(guard())  # immediately: the program waits for it, and nothing needs cleaning up

@@ -1,4 +1,4 @@
-"""The inputs of a rig that a program is asked for."""
+"""The requested inputs of a rig."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Input:
     Attributes
     ----------
     name : str
-        Of the channel that it becomes.
+        Name of its channel.
     terminal : str
-        Of the device, such as `Dev1/ai0`.
+        Terminal of the device, such as `Dev1/ai0`.
     highest : float
-        Range, V, to both sides of 0.
+        Range on both sides of 0, V.
     """
 
     name: str
@@ -33,12 +33,12 @@ class Input:
 
 
 def inputs_of(texts: Sequence[str]) -> list[Input]:
-    """Return the inputs that texts `NAME=TERMINAL[,RANGE]` ask for.
+    """Return the inputs in texts `NAME=TERMINAL[,RANGE]`.
 
     Raises
     ------
     UsageError
-        A text is none, a name is there twice, or there are more than 8.
+        A text has another form, a name occurs twice, or there are more than 8.
     """
     found: list[Input] = []
     for text in texts:

@@ -1,12 +1,12 @@
-"""Journals: what a program measures, appended to a file as it comes, so that no death of the program loses it.
+"""Journals: measured samples, appended to a file as they come, so that no death of the program loses them.
 
-A journal is a line that says what it is, and records. A record is a head (kind, bytes of its content, number of its
-first sample, checksum) and its content: samples as doubles, channel by channel, or JSON. Numbers are little-endian. The
-header of the journal comes first, in two equal records. It can be cut anywhere: each whole record before the cut is
-read again. Version 1 had its header as a line of JSON without a checksum; it is still read.
+A journal is a title line and records. A record is a head and its content. The head has kind, length of the content in
+bytes, number of the first sample and checksum. The content is samples as doubles, channel by channel, or JSON. Numbers
+are little-endian. The header of the journal comes first, in two equal records. A journal can be cut anywhere: each
+whole record before the cut is read. Version 1 had its header as a line of JSON without a checksum; it is still read.
 
-Whoever made a journal may have meant harm. So the bytes that are looked at for damaged records, the notes and the
-pieces of samples are limited; whole records of samples are not.
+The author of a journal may be hostile. Bytes searched in damaged records, notes and pieces of samples are therefore
+limited; whole records of samples are not.
 """
 
 from __future__ import annotations
@@ -38,63 +38,63 @@ TITLE = _KIND + b"2\n"
 _TITLE_OF_LINE = _KIND + b"1\n"
 ENDING = ".journal"
 MARGIN = 64 * 2**20
-"""Bytes that a disk must have left."""
+"""Free bytes that a disk must keep."""
 SYNC_SECONDS = 1.0
 SLOW_DISK = 1.0
-"""Time of a write, s, from which on the disk is said to be slow."""
+"""Time of a write, s, above which the disk counts as slow."""
 AS_RECORDING = 1.2
-"""Size of a recording, relative to that of its journal, at most."""
+"""Largest size of a recording, relative to the size of its journal."""
 _HEAD = struct.Struct("<4sIQI")
 _HEADER, _SAMPLES, _NOTE = b"HEAD", b"SAMP", b"NOTE"
 _LONGEST_HEADER = 2**20
 LAST_SAMPLE = 2**52
-"""Largest number of a sample: its instant is still told from that of the next one."""
+"""Largest number of a sample: the instants of larger numbers are not distinct."""
 _MOST_LOOKED = 2**31
-"""Bytes of damaged records that are looked at, checksums and searches together; the rest of the file counts as lost.
+"""Most bytes searched in damaged records, checksums and searches together; the rest of the file counts as lost.
 
-A journal in which every record of the longest recording (0.8 GB) is damaged needs less; 2 GiB take 3 s of processor.
+A journal with every record of the longest recording (0.8 GB) damaged needs less; 2 GiB take 3 s of processor.
 """
 _MOST_LOOKED_FOR_HEADER = 2**25
-"""Bytes of damaged records that are looked at before the header is found."""
+"""Most bytes searched in damaged records before the header is found."""
 _COST_OF_TRIAL = 4096
-"""Bytes that the look at a head counts for, whatever it promises: 2 us."""
+"""Bytes charged for the trial of one head, whatever its length: 2 µs."""
 _STRETCH = 2**24
-"""Bytes that are searched or summed at once."""
+"""Bytes searched or summed at once."""
 _KEPT_PAGES = 2**27
-"""Bytes that were read above which their pages are given back to the system."""
+"""Bytes read, above which their pages are returned to the system."""
 _LONGEST_NOTE = 2**16
 _MOST_NOTES, _MOST_NOTE_BYTES = 500_000, 2**24
-"""Notes of a journal, and their bytes, above which it is refused: hours of a rig that loses every block have fewer."""
+"""Most notes of a journal, and most bytes of notes: hours of a rig that loses every block have fewer."""
 _MOST_PIECES = 2**21
-"""Blocks that are kept apart, with samples missing between them, above which a journal is refused."""
+"""Most separate blocks of a journal, with samples missing between them."""
 _FEW_PIECES = 2**17
-"""Blocks above which those that follow each other without a gap are joined."""
+"""Number of blocks, above which adjacent blocks are joined."""
 _WATCHED = {"watched"}
-"""Keys of a note that takes the place of the same note before it."""
+"""Keys of a note that replaces the previous note of these keys."""
 
 
 class Journal:
-    """A file that grows; a context manager, which closes it and leaves it there if it has samples.
+    """A growing file; a context manager, which closes it and keeps it if it has samples.
 
     Parameters
     ----------
     path : Path
     header : mapping
-        Of JSON values.
+        Values in JSON.
 
     Attributes
     ----------
     written : int
         Bytes.
     slowest : float
-        Longest time of a write with what forces it to the disk, s.
+        Longest time of a write with its sync, s.
 
     Raises
     ------
     UsageError
-        There is a journal of this name, which may be all that is left of another measurement.
+        A journal of this name exists; it may be all that is left of another measurement.
     OSError
-        It cannot be written, also of `append`, `note` and `sync`.
+        It cannot be written; also from `append`, `note` and `sync`.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
@@ -114,7 +114,7 @@ class Journal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file; one without samples is removed."""
+        """Close the file; a file without samples is removed."""
         self._file.close()
         if not self._has_samples:
             self.path.unlink(missing_ok=True)
@@ -126,7 +126,7 @@ class Journal:
         self._append(_record(_SAMPLES, block.first, volts.tobytes()))
 
     def note(self, **values: Any) -> None:
-        """Append JSON values: a gap, the end, what else is to be known."""
+        """Append JSON values: a gap, the end, or other facts."""
         self._append(_record(_NOTE, 0, json.dumps(values, allow_nan=False).encode()))
 
     def _append(self, record: bytes) -> None:
@@ -143,12 +143,12 @@ class Journal:
         self.written += len(content)
 
     def sync(self) -> None:
-        """Force what was appended to the disk; about once a second it is done without being asked for."""
+        """Force the appended data to the disk; this also happens about once a second."""
         os.fsync(self._file.fileno())
         self._synced = time.monotonic()
 
     def is_short_of_room(self) -> bool:
-        """Whether the disk has hardly room for the recording that is to be made of the journal."""
+        """Whether the disk is nearly too full for the recording of the journal."""
         free = shutil.disk_usage(self.path.parent).free
         return free < AS_RECORDING * self.written + MARGIN / 4
 
@@ -159,7 +159,7 @@ def _record(kind: bytes, first: int, content: bytes) -> bytes:
 
 
 def refuse_journal(path: Path) -> None:
-    """Refuse a name that a journal has, which may be all that is left of another measurement.
+    """Raise UsageError if a journal of this name exists: it may be all that is left of another measurement.
 
     Raises
     ------
@@ -173,24 +173,24 @@ def refuse_journal(path: Path) -> None:
 
 
 def refuse_full_disk(folder: Path, bytes_needed: float) -> None:
-    """Refuse a folder on whose disk a journal of so many bytes and the recording of it have no room.
+    """Raise UsageError unless the disk of a folder has room for a journal of this size and its recording.
 
     Raises
     ------
     UsageError
     """
     free = shutil.disk_usage(folder).free
-    wanted = (1.0 + AS_RECORDING) * bytes_needed + MARGIN
-    if free < wanted:
+    required = (1.0 + AS_RECORDING) * bytes_needed + MARGIN
+    if free < required:
         raise UsageError(
-            f"{folder}: expected {wanted / 2**20:.0f} MiB of free space for the journal and the recording, "
+            f"{folder}: expected {required / 2**20:.0f} MiB of free space for the journal and the recording, "
             f"got {free / 2**20:.0f}. Choose another disk, a lower rate or a shorter duration."
         )
 
 
 @dataclass(frozen=True, slots=True)
 class JournalContent:
-    """What a journal holds.
+    """Content of a journal.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class JournalContent:
         In order; their volts are views of the file.
     notes : list of dict
     lost_bytes : int
-        Of records that are damaged or cut off.
+        Bytes of records that are damaged or cut off.
     """
 
     header: dict[str, Any]
@@ -209,13 +209,13 @@ class JournalContent:
 
 
 def read_journal(path: Path, channels_in: str = "inputs", *, ended: bool = True) -> JournalContent:
-    """Read what there is of a journal; records that are damaged or cut off are left out.
+    """Read the whole records of a journal; damaged or cut records are left out.
 
     Parameters
     ----------
     path : Path
     channels_in : str
-        Key of the header whose value has an item for each channel.
+        Key of the header whose value has one item per channel.
     ended : bool
         Refuse a journal that a program is still writing.
 
@@ -256,7 +256,7 @@ def _mapped(path: Path, ended: bool) -> mmap.mmap | bytes:
 
 
 def _refuse_locked(path: Path) -> None:
-    with path.open("rb") as file:  # of its own: what maps a file into memory keeps its locks
+    with path.open("rb") as file:  # a separate handle: a file mapped into memory keeps its locks
         try:
             try_lock(file.fileno())
         except OSError:
@@ -267,7 +267,7 @@ def _refuse_locked(path: Path) -> None:
 
 
 def _header(content: Any, path: Path) -> tuple[dict[str, Any], int, int]:
-    """Return the header, the bytes of title and header that are whole, and where the records after them begin."""
+    """Return the header, the whole bytes of title and header, and the start of the records after them."""
     title = content[: len(TITLE)]
     if title == TITLE:
         begin, end, place = _checked_header(content)
@@ -294,7 +294,7 @@ def _header(content: Any, path: Path) -> tuple[dict[str, Any], int, int]:
 
 
 def _checked_header(content: Any) -> tuple[int, int, int]:
-    """Return begin and end of the first whole copy of the header, and the end of the last one that follows it."""
+    """Return begin and end of the first whole copy of the header, and the end of the last copy."""
     start = content[: len(TITLE) + 2 * (_HEAD.size + _LONGEST_HEADER)]
     for _, _, begin, end in _records(start, len(TITLE), (_HEADER,), _MOST_LOOKED_FOR_HEADER):
         copy = start[begin - _HEAD.size : end]
@@ -307,7 +307,7 @@ def _records(
 ) -> Iterator[tuple[bytes, int, int, int]]:
     """Yield kind, first sample, begin and end of the content of each whole record of some kinds.
 
-    Of damaged ones `left` bytes are looked at.
+    Damaged records are searched up to `left` bytes.
     """
     heads, given_back = _Heads(content, kinds), 0
     while left > 0 and place + _HEAD.size <= len(content):
@@ -328,7 +328,7 @@ def _records(
 
 
 def _checksum(content: Any, place: int, begin: int, end: int) -> int:
-    """Return the checksum of a record, with the memory of one stretch of it."""
+    """Return the checksum of a record, with memory for one stretch of it."""
     seen = memoryview(content)
     found = zlib.crc32(seen[place : begin - 4])
     for start in range(begin, end, _STRETCH):
@@ -340,21 +340,21 @@ def _checksum(content: Any, place: int, begin: int, end: int) -> int:
 
 
 def _give_back(content: Any, start: int, stop: int) -> None:
-    """Let the system have the pages of a file that were read; they come back where they are needed."""
+    """Return the read pages of a file to the system; they are loaded again if needed."""
     if isinstance(content, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
         page = start - start % mmap.PAGESIZE
         content.madvise(mmap.MADV_DONTNEED, page, min(stop, len(content)) - page)
 
 
 class _Heads:
-    """Finds the places at which a record may begin; each stretch of the file is searched once for each kind."""
+    """Finds possible starts of records; each stretch of the file is searched once for each kind."""
 
     def __init__(self, content: Any, kinds: tuple[bytes, ...]) -> None:
         self._content = content
         self._following = dict.fromkeys(kinds, -1)
 
     def after(self, place: int, most: int) -> int:
-        """Return the next such place after `place`, or `most`, or the end of the file."""
+        """Return the next possible start after `place`, or `most`, or the end of the file."""
         most = min(most, len(self._content))
         for kind, known in self._following.items():
             if known <= place:
@@ -362,7 +362,7 @@ class _Heads:
         return min(most, *self._following.values())
 
     def _found(self, kind: bytes, place: int, most: int) -> int:
-        """Return the next place of a kind; where there is none before `most`, that of the end of the search."""
+        """Return the next place of a kind; without one before `most`, the end of the search."""
         for start in range(place, most, _STRETCH):
             found: int = self._content.find(kind, start, start + _STRETCH + len(kind) - 1)
             if found >= 0:
@@ -379,7 +379,7 @@ class _Notes:
         self._path, self._bytes = path, 0
 
     def take(self, content: bytes) -> bool:
-        """Keep a note; return whether it is one."""
+        """Keep a note; return whether it is valid."""
         if len(content) > _LONGEST_NOTE:
             return False
         try:
@@ -412,14 +412,14 @@ def _is_note(note: Any) -> bool:
 
 
 class _Pieces:
-    """The samples of a journal; where there are many blocks, those without a gap between them are joined."""
+    """The samples of a journal; with many blocks, adjacent ones are joined."""
 
     def __init__(self, path: Path) -> None:
         self.all: list[Block] = []
         self._path, self._most, self._values = path, _FEW_PIECES, 0
 
     def take(self, content: Any, first: int, begin: int, end: int, channels: int) -> bool:
-        """Keep the samples of a record; return whether they go with the header and with what came before."""
+        """Keep the samples of a record; return whether they fit the header and the earlier samples."""
         count, rest = divmod(end - begin, 8 * channels)
         if rest or not count or first > LAST_SAMPLE or (self.all and first < self.all[-1].end):
             return False

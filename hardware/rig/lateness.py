@@ -1,23 +1,23 @@
-"""When samples reach the program, by the clock of the computer."""
+"""Arrival times of samples in the program, by the clock of the computer."""
 
 from __future__ import annotations
 
 import numpy as np
 
 _KEPT = 2**14
-"""Arrivals of which the median is taken: of the last quarter of an hour."""
+"""Number of arrivals for the median: the last quarter of an hour."""
 _DRIFT = 1e-4
-"""Relative difference of two clocks that is no lateness."""
+"""Relative difference of two clocks that is not lateness."""
 _SETTLED = 0.5
-"""Time after the start, s, from which on the pace of a rig can be told."""
+"""Time after the start, s, from which the pace of a rig is measured."""
 _REAL_TIME = 0.2
-"""Relative difference of paces up to which a rig goes in real time."""
+"""Relative difference of paces, below which a rig runs in real time."""
 
 
 class Lateness:
-    """How much later than the promptest of all blocks the others came, at a rate in samples per second.
+    """Delay of each block behind the promptest one, at a rate in samples per second.
 
-    It counts in the time of the computer; of a virtual rig that is faster than life it is of no interest.
+    It uses the computer's time; for a virtual rig faster than real time it has no meaning.
 
     >>> late = Lateness(100.0)
     >>> late.begin(5.0)
@@ -35,12 +35,12 @@ class Lateness:
         self._end, self._pace = 0, 0.0
 
     def begin(self, now: float) -> None:
-        """Say when (s) the acquisition was started."""
+        """Note the start of the acquisition, s."""
         self._began = self._last = now
         self._floor = np.inf
 
     def arrived(self, end: int, now: float) -> None:
-        """Say that a block came, of which the number after the last sample is `end`."""
+        """Note the arrival (s) of a block; `end` is the number after its last sample."""
         since = now - end / self._rate
         self._floor = min(since, self._floor + _DRIFT * (now - self._last))
         self._last, self._end = now, end
@@ -53,15 +53,15 @@ class Lateness:
 
     @property
     def median(self) -> float:
-        """Of the lateness of the last blocks, s."""
+        """Median lateness of the last blocks, s."""
         kept = self._values[: min(self._count, _KEPT)]
         return float(np.median(kept)) if len(kept) else 0.0
 
     def sample_at(self, now: float) -> tuple[int, float]:
-        """Return which sample is taken at an instant (s), and the doubt about it, s."""
+        """Return the number of the sample at an instant (s), and its uncertainty, s."""
         if not self._count:
             return round((now - self._began) * self._rate), now - self._began
-        if self._pace and abs(self._pace - 1.0) > _REAL_TIME:  # a virtual rig at a speed of its own
+        if self._pace and abs(self._pace - 1.0) > _REAL_TIME:  # a virtual rig with a speed of its own
             passed = (now - self._last) * self._pace
             return self._end + round(passed * self._rate), _REAL_TIME * passed
         return round((now - self._floor) * self._rate), self.median

@@ -1,4 +1,4 @@
-"""What an output may do at most: the one place for the limits of amplitude and slew."""
+"""Limits of an output: the one place for amplitude and slew."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Floats = NDArray[np.float64]
 MOST_AMPLITUDE, MOST_SLEW = 5.0, 2000.0
 """Default limits, V and V/s: 5 V at 63 Hz."""
 LEAST_FALL, LONGEST_FALL = 0.05, 60.0
-"""Time from any voltage down to 0, s."""
+"""Shortest and longest time from any voltage down to 0, s."""
 _ROUNDING = 1e-9
-"""Relative excess over a limit that rounding explains."""
+"""Relative excess over a limit that rounding may cause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +27,14 @@ class Limits:
     Attributes
     ----------
     amplitude : float
-        V, to both sides of 0.
+        Voltage on both sides of 0, V.
     slew : float
-        V/s, from one sample to the next.
+        Slew from one sample to the next, V/s.
 
     Raises
     ------
     UsageError
-        One is no number > 0, or the slew takes more than 60 s from the amplitude to 0.
+        A limit is no number > 0, or the slew takes more than 60 s from the amplitude to 0.
 
     Examples
     --------
@@ -45,7 +45,7 @@ class Limits:
     slew: float = MOST_SLEW
 
     def __post_init__(self) -> None:
-        """Refuse what is no limit."""
+        """Raise UsageError unless both limits are valid."""
         for name, value, unit in (("amplitude", self.amplitude, "V"), ("slew", self.slew, "V/s")):
             if not 0.0 < value < math.inf:
                 raise UsageError(f"limits: {name}: expected a number > 0, {unit}, got {value!r}.")
@@ -78,7 +78,7 @@ class Limits:
             )
 
     def fall(self, volts: float, rate: float) -> Fall:
-        """Return the way from a voltage down to 0, within the slew and smooth."""
+        """Return a smooth fall from a voltage to 0, within the slew."""
         return Fall(volts, math.ceil(self._seconds(abs(volts)) * rate) if volts else 1)
 
     def _seconds(self, volts: float) -> float:
@@ -87,7 +87,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Fall:
-    """A half cosine from a voltage (V), which is not in it, to 0, its last sample.
+    """A half cosine from a voltage (V), which it does not include, to 0, its last sample.
 
     >>> Fall(2.0, 4).volts(0, 4).round(3).tolist()
     [1.707, 1.0, 0.293, 0.0]

@@ -1,4 +1,4 @@
-"""The line that says how a measurement goes, while it goes."""
+"""The line that shows the progress of a measurement."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from vibroimpact.hardware.rig.measurement import MeasuredInput, clips
 
 REFRESHES_PER_SECOND = 4.0
 LINE_SECONDS = 10.0
-"""Between two lines where standard error is no terminal."""
+"""Time between two lines if standard error is no terminal, s."""
 
 
 class Levels:
-    """Levels of inputs since they were last told, and samples at the ends of ranges since the beginning."""
+    """Levels of inputs since the last report, and samples at the ends of ranges since the beginning."""
 
     def __init__(self, inputs: Sequence[MeasuredInput]) -> None:
         self._inputs = tuple(inputs)
@@ -34,7 +34,7 @@ class Levels:
         self._high = np.full(len(self._inputs), -np.inf)
 
     def saw(self, volts: NDArray[np.float64]) -> None:
-        """Take in samples, shape (channel, sample)."""
+        """Take samples, shape (channel, sample)."""
         self._low = np.minimum(self._low, volts.min(axis=1))
         self._high = np.maximum(self._high, volts.max(axis=1))
         for place, each in enumerate(self._inputs):
@@ -45,18 +45,18 @@ class Levels:
                 self.clipped[place] += int(clips(each, volts[place]).sum())
 
     def text(self) -> str:
-        """Return the levels in V, and begin anew."""
+        """Return the levels in V, and start anew."""
         parts = []
         for place, each in enumerate(self._inputs):
             if self._low[place] <= self._high[place]:
-                said = f"{each.name} {self._low[place]:.3g} to {self._high[place]:.3g} V"
-                parts.append(said + (f" ({self.clipped[place]} CLIPPED)" if self.clipped[place] else ""))
+                text = f"{each.name} {self._low[place]:.3g} to {self._high[place]:.3g} V"
+                parts.append(text + (f" ({self.clipped[place]} CLIPPED)" if self.clipped[place] else ""))
         self._forget()
         return ", ".join(parts)
 
 
 class Progress:
-    """Says how far a measurement is.
+    """Shows the progress of a measurement.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Progress:
     duration : float or None
         s.
     show : callable
-        Takes a line.
+        Receives a line.
     every : float
         Time between two lines, s.
     """
@@ -83,7 +83,7 @@ class Progress:
         self._levels = Levels(inputs)
 
     def saw(self, block: Block, more: str = "") -> None:
-        """Take in a block; `more` is what else is said."""
+        """Take a block; `more` is text to add."""
         self._levels.saw(block.volts)
         now = time.monotonic()
         if now - self._last >= self._every:
@@ -91,7 +91,7 @@ class Progress:
             self._show(self.line(block.end, more))
 
     def line(self, end: int, more: str = "") -> str:
-        """Return the line after so many samples."""
+        """Return the line after `end` samples."""
         acquired = self._acquired
         whole = f" of {self._duration:g}" if self._duration is not None else ""
         late = acquired.lateness
@@ -109,10 +109,10 @@ class Progress:
 
 @contextmanager
 def shown_live(
-    acquired: Acquisition, inputs: Sequence[MeasuredInput], duration: float | None, wanted: bool = True
+    acquired: Acquisition, inputs: Sequence[MeasuredInput], duration: float | None, shown: bool = True
 ) -> Iterator[Progress]:
-    """Show how a measurement goes on standard error: a line that changes in a terminal, else one from time to time."""
-    if not wanted:
+    """Show a measurement on standard error: a changing line in a terminal, else one line from time to time."""
+    if not shown:
         yield Progress(acquired, inputs, duration, lambda line: None, np.inf)
     elif not sys.stderr.isatty():
         yield Progress(acquired, inputs, duration, note, LINE_SECONDS)

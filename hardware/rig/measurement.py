@@ -1,4 +1,4 @@
-"""What a measurement is, as the header of its journal says it, and the recording that is made of it."""
+"""A measurement, as in the header of its journal, and its recording."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ Flags = NDArray[np.uint8]
 
 _FROZEN = ConfigDict(extra="forbid", frozen=True)
 FEWEST_SAMPLES = 2
-"""Of a recording."""
+"""Fewest samples of a recording."""
 MOST_FILLED, FILLED_ANYHOW = 10, 1_000_000
-"""Rows for each sample, and rows in any case, up to which lost samples are filled with NaN; above, their ends are."""
+"""Rows per kept sample, plus a constant, up to which lost samples are rows of NaN; above, only gaps' ends are."""
 
 
 class MeasuredInput(BaseModel):
-    """An input of a measurement: what was asked for, and range and step (V) of its converter."""
+    """An input of a measurement: its request, and range and step (V) of its converter."""
 
     model_config = _FROZEN
 
@@ -46,19 +46,19 @@ class MeasuredInput(BaseModel):
 
 
 class PulseRule(BaseModel):
-    """When samples are kept of a measurement of which only pulses are.
+    """Rule for keeping samples, for a measurement of pulses alone.
 
     Attributes
     ----------
     channel : str
     threshold : float
-        In the unit of the channel; negative: pulses below it.
+        In the unit of the channel; negative for pulses below it.
     hysteresis : float
-        Part of the threshold below which a pulse is over.
+        Part of the threshold, below which a pulse is over.
     before, after : int
-        Samples that are kept of before and after a pulse.
+        Samples kept before and after a pulse.
     dead : int
-        Samples from its start within which what passes the threshold again belongs to it.
+        Samples after its start, in which a new crossing of the threshold belongs to the same pulse.
     """
 
     model_config = _FROZEN
@@ -98,17 +98,17 @@ class Measurement(BaseModel):
 
     @property
     def source(self) -> str:
-        """The device, in words."""
+        """Device and product, as text."""
         return f"{self.device}, {self.product}"
 
     @property
     def most_samples(self) -> int:
-        """Samples of each input that a file of recordings takes: values, flags of an eighth of their size, instants."""
+        """Most samples of each input in a recording's file: values, flags of an eighth of their size, instants."""
         inputs = len(self.inputs)
         return int(MOST_VALUES / (1.125 * inputs + (inputs if self.skew else 1)))
 
     def place_of(self, name: str) -> int:
-        """Return which input a channel is."""
+        """Return the index of a channel among the inputs."""
         return [each.name for each in self.inputs].index(name)
 
 
@@ -121,7 +121,7 @@ def measurement_of(
     loopbacks: Iterable[str] = (),
     pulses: PulseRule | None = None,
 ) -> Measurement:
-    """Return what a measurement is that is about to begin."""
+    """Return the description of a measurement that is about to begin."""
     back = set(loopbacks)
     measured = tuple(
         MeasuredInput(
@@ -149,12 +149,12 @@ def measurement_of(
 
 
 def measurement_in(header: Mapping[str, Any], source: str) -> Measurement:
-    """Return the measurement that the header of a journal describes.
+    """Return the measurement in the header of a journal.
 
     Raises
     ------
     DatasetError
-        It describes none.
+        The header describes no measurement.
     """
     try:
         return Measurement.model_validate_json(json.dumps(dict(header)))
@@ -173,7 +173,7 @@ def recording_of(
     started_at: str,
     remarks: Iterable[str] = (),
 ) -> Recording:
-    """Return the recording of samples that were kept.
+    """Return the recording of kept samples.
 
     Parameters
     ----------
@@ -181,11 +181,11 @@ def recording_of(
     blocks : sequence of Block
         In order.
     gaps : sequence of Gap
-        Samples that were lost; of all others that are not there nobody asked.
+        Lost samples; other missing samples were not requested.
     started_at : str
         UTC.
     remarks : iterable of str
-        What else a reader must know.
+        Further remarks for the reader.
 
     Raises
     ------
@@ -207,12 +207,12 @@ def recording_of(
         volts[:, place : place + block.volts.shape[1]] = block.volts
     channels = _channels(measurement, numbers, volts, started_at)
     quiet = [] if measurement.pulses is not None else _quiet(measurement, volts)
-    said = [*_clipped(channels), *quiet, *_lost(measurement, gaps, filled), *remarks]
-    return Recording(channels, attrs=_attributes(measurement, gaps, started_at, said))
+    all_remarks = [*_clipped(channels), *quiet, *_lost(measurement, gaps, filled), *remarks]
+    return Recording(channels, attrs=_attributes(measurement, gaps, started_at, all_remarks))
 
 
 def rows_of(blocks: Sequence[Block], gaps: Sequence[Gap]) -> NDArray[np.int64]:
-    """Return the numbers of the samples that are there, and of the first and the last one of each gap."""
+    """Return the numbers of the available samples, and of the first and the last sample of each gap."""
     ends = [np.array([gap.first, gap.end - 1]) for gap in gaps if gap.samples]
     rows = [np.arange(block.first, block.end) for block in blocks]
     return np.unique(np.concatenate([*rows, *ends])).astype(np.int64)
@@ -243,7 +243,7 @@ def _channels(
 
 
 def quality_of(measured: MeasuredInput, volts: Floats) -> Flags:
-    """Return the flags of samples: clipped at the first and the last step of the converter, missing where NaN."""
+    """Return the flags of samples: clipped at the first and the last step of the converter, missing for NaN."""
     clipped = clips(measured, volts)
     flags: Flags = np.where(clipped, np.uint8(Quality.clipped), np.uint8(0))
     flags[np.isnan(volts)] = np.uint8(Quality.missing)
@@ -251,7 +251,7 @@ def quality_of(measured: MeasuredInput, volts: Floats) -> Flags:
 
 
 def clips(measured: MeasuredInput, volts: Floats) -> NDArray[np.bool_]:
-    """Return which samples are at an end of the range."""
+    """Return a mask of the samples at an end of the range."""
     found: NDArray[np.bool_] = (volts <= measured.low + 0.5 * measured.step) | (
         volts >= measured.high - 1.5 * measured.step
     )
@@ -267,7 +267,7 @@ def _clipped(channels: Mapping[str, Channel]) -> list[str]:
 
 
 def _quiet(measurement: Measurement, volts: Floats) -> list[str]:
-    """Return a line for each channel that shows nothing above its noise."""
+    """Return a remark for each channel without a signal above its noise."""
     lines = (
         quiet_remark(each.name, row, each.step, each.role == "loopback")
         for each, row in zip(measurement.inputs, volts, strict=True)
@@ -280,7 +280,7 @@ def _samples(count: int) -> str:
 
 
 def _lost(measurement: Measurement, gaps: Sequence[Gap], filled: bool) -> list[str]:
-    """Return a line for each reason for which samples were lost."""
+    """Return a remark for each reason of lost samples."""
     lines = []
     for reason in dict.fromkeys(gap.reason for gap in gaps):
         some = [gap for gap in gaps if gap.reason == reason]

@@ -1,7 +1,7 @@
-"""What is known of an output, in memory that outlives the program that drives: its last samples and how far it is.
+"""The state of an output, in memory that outlives the driving program: its last samples and its progress.
 
-One process writes. Another one, the guardian, reads after the writer has died, so that order is all that counts:
-samples are there before they are announced, and announced before they are sent.
+One process writes. Another process, the guardian, reads after the writer has died, so only the order matters. Samples
+are in the memory before they are announced, and announced before they are sent.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _FIELDS = ("beat", "driving", "announced", "written", "generated", "generated_at
 
 
 class SharedSamples:
-    """The last samples of an output, by number, at most `capacity`; OSError where there is no room.
+    """The last samples of an output, by number, at most `capacity`; OSError without room for them.
 
-    The descriptor is that of the memory of another process; None: new memory, which is gone when no process holds it.
+    `descriptor` is the memory of another process; None: new memory, which vanishes with its last process.
     """
 
     beat: int
@@ -45,13 +45,13 @@ class SharedSamples:
         self._ring = np.frombuffer(self._map, dtype=np.float64, offset=8 * len(_FIELDS))
 
     def __getattr__(self, name: str) -> int:
-        """Return a number that is shared."""
+        """Return a shared number."""
         if name not in _FIELDS:
             raise AttributeError(name)
         return int(self.__dict__["_numbers"][_FIELDS.index(name)])
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Change a number that is shared."""
+        """Change a shared number."""
         if name in _FIELDS:
             self.__dict__["_numbers"][_FIELDS.index(name)] = value
         else:
@@ -63,7 +63,7 @@ class SharedSamples:
         self.announced = first + volts.size
 
     def progress(self, written: int, generated: int | None = None) -> None:
-        """Note how far the output is, and that the writer lives."""
+        """Note the progress of the output, and that the writer lives."""
         self.written = written
         if generated is not None:
             self.generated, self.generated_at = generated, time.monotonic_ns()
@@ -74,14 +74,14 @@ class SharedSamples:
         return float(self._ring[number % self._ring.size]) if number >= 0 else 0.0
 
     def close(self) -> None:
-        """Let go of the memory."""
+        """Close the memory."""
         self.__dict__["_numbers"] = self._ring = np.zeros(len(_FIELDS))
         self._map.close()
         os.close(self.descriptor)
 
 
 def _new_memory(size: int) -> int:
-    """Return a descriptor of memory that has no name; its room is taken now, not when it is first used."""
+    """Return a descriptor of nameless memory; its pages are allocated now, not at first use."""
     if hasattr(os, "memfd_create"):
         descriptor = os.memfd_create("vibroimpact-output")
     else:

@@ -1,4 +1,4 @@
-"""Which rig a program runs on: the board of this machine, one that is served, or a virtual one of its own."""
+"""The rig of a program: the board of this machine, a served rig, or a virtual one of its own."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ THREE_WAYS = (
     "--rig virtual:RIG.toml starts a virtual rig, --rig grpc://host:port uses one that is served or NI's gRPC device "
     "server, --rig local uses the board of this machine, whose driver is NI-DAQmx"
 )
-ASKED_WRONGLY = (
+USAGE_ERRORS = (
     daqmx.DAQmxErrors.INVALID_DEVICE_ID,
     daqmx.DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
     daqmx.DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
     daqmx.DAQmxErrors.CHAN_ALREADY_IN_TASK,
 )
-"""What a rig says of a device, a channel, a range or a rate that it does not have, and of a channel given twice."""
+"""Errors of a rig for a missing device, channel, range or rate, and for a channel given twice."""
 
 
 HELD = (
     ". A program that died leaves its task on the device: end the program that holds it, or reset the device "
     "(nidaqmx.system.Device.reset_device, NI MAX)"
 )
-"""What is said where another task holds an input or output."""
+"""Hint for an input or output that another task holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """A rig that is open.
+    """An open rig.
 
     Attributes
     ----------
     name : str
-        As `--rig` says it.
+        As in `--rig`.
     channel : grpc.Channel or None
         None: the driver of this machine.
     address : str
@@ -52,7 +52,7 @@ class Rig:
     address: str = ""
 
     def options(self, session: str = "") -> Any:
-        """Return what a task of NI's client needs to be made on this rig; another program attaches to a named one."""
+        """Return the options for a task of NI's client on this rig; another program can attach to a named session."""
         if self.channel is None:
             return None
         return daqmx.nidaqmx.GrpcSessionOptions(self.channel, session)
@@ -65,12 +65,12 @@ class Rig:
 
 @contextmanager
 def opened_rig(choice: str | None) -> Iterator[Rig]:
-    """Open a rig for as long as the block lasts; what its client refuses becomes one error.
+    """Open a rig for the duration of the block; a refusal of its client becomes one error.
 
     Raises
     ------
     UsageError
-        There is no such rig, no driver, or what is asked for is not there.
+        There is no such rig, no driver, or the requested part does not exist.
     RigError
         The rig refuses another call.
     """
@@ -82,13 +82,13 @@ def opened_rig(choice: str | None) -> Iterator[Rig]:
 
 
 def refusal_of(choice: str | None, error: Exception) -> VibroimpactError:
-    """Return what is said of what a rig refused, in one line."""
+    """Return the error for a refusal of a rig, in one line."""
     if isinstance(error, VibroimpactError):
         return error
     if isinstance(error, daqmx.DaqNotFoundError):
         return UsageError(f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}.")
     if isinstance(error, daqmx.DaqError):
-        kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
+        kind = UsageError if error.error_code in USAGE_ERRORS else RigError
         held = error.error_code == daqmx.DAQmxErrors.PAL_RESOURCE_RESERVED
         return kind(f"{choice or 'local'}: {_one_line(error)}{HELD if held else ''}")
     return RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.")

@@ -1,8 +1,8 @@
-"""Drive an analog output: one thread owns its task, and it comes to rest whatever happens.
+"""Drive an analog output: one thread owns its task, and it always comes to rest.
 
-The buffer of the device holds 0.3 s: so long after `stop` the voltage begins to fade, from the sample that is really
-next. It regenerates nothing, so that a program that stops writing leaves a constant voltage at worst, not a drive.
-A guardian (`guardian.py`) does what this process cannot do any more.
+The buffer of the device holds 0.3 s: so long after `stop` the voltage begins to fade, from the true next sample. It
+regenerates no sample: if a program stops writing, a constant voltage remains at worst. A guardian (`guardian.py`)
+takes over when this process no longer can.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from vibroimpact.hardware.rig.stream import STARVED, OutputStream, add_output, b
 from vibroimpact.hardware.rig.waveforms import Waveform
 
 SHUTDOWN = 10.0
-"""Time from a stop to rest, s, besides fade and fall; then the guardian takes over."""
+"""Time from a stop to rest, s, besides fade and fall; later the guardian takes over."""
 CALL_SECONDS = 10.0
-"""Time of a call, s, after which the server counts as one that answers no more."""
+"""Time of a call, s, after which the server counts as dead."""
 NOBODY_KNOWS = "Nobody knows what it puts out: switch the amplifier off"
 LEAST_RATE = 100.0
-"""Hz, below which a buffer, which has 16 samples at least, holds more than 0.3 s."""
+"""Lowest rate, Hz; below it a buffer, which has at least 16 samples, holds more than 0.3 s."""
 _RATE_ROUNDING = 1e-9
 
 
@@ -42,7 +42,7 @@ def start_trigger(terminal: str) -> str:
     Raises
     ------
     UsageError
-        The output is none.
+        The terminal is no output.
 
     Examples
     --------
@@ -56,36 +56,36 @@ def start_trigger(terminal: str) -> str:
 
 
 class Output:
-    """An output that drives; a context manager, whose end stops it.
+    """A driving output; a context manager, whose end stops it.
 
     Parameters
     ----------
     rig : Rig
     terminal : str
-        Such as `Dev1/ao0`.
+        Terminal, such as `Dev1/ao0`.
     rate : float
-        Samples per second; the clock of the device has to reach it exactly.
+        Samples per second; the clock of the device must reach it exactly.
     waveform : Waveform
     limits : Limits
     guarded : bool
-        A guardian is there before the output starts.
+        A guardian is ready before the output starts.
     attach : bool or None
-        Whether the guardian can attach to the task; None: where there is a server.
+        Whether the guardian can attach to the task; None: only with a server.
     arm : callable, optional
         Called when all is ready, just before the output starts: it arms the inputs on `trigger`.
 
     Attributes
     ----------
     trigger : str
-        Terminal of its start: inputs armed on it sample at the same instants, number by number. An input that is wired
-        to the output sees at each instant the voltage of the number before, which is just being replaced.
+        Terminal of its start: inputs armed on it sample at the same instants, number by number. An input wired to the
+        output reads at each instant the voltage of the previous number, which is just being replaced.
     generated : int
         Samples that are out.
 
     Raises
     ------
     UsageError
-        The terminal is none, or the rate is too low to come to rest soon.
+        The terminal is no output, or the rate is too low to come to rest soon.
 
     Examples
     --------
@@ -124,7 +124,7 @@ class Output:
         self._failure: BaseException | None = None
         self._guardian: Guardian | None = None
         self._stream: OutputStream | None = None
-        # it outlives the main thread, and sees to it that the output comes to rest
+        # it outlives the main thread, and ensures that the output comes to rest
         self._thread = threading.Thread(target=self._run, name="rig output", daemon=False)
 
     def __enter__(self) -> Output:
@@ -134,7 +134,7 @@ class Output:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Bring it to rest; what goes wrong with that is raised even where something else did before."""
+        """Bring it to rest; a failure of this is raised even after another error."""
         self.stop()
         if self._thread.ident is not None and not self._over.is_set():
             self.wait()
@@ -142,7 +142,7 @@ class Output:
             self._raise_failure()
 
     def start(self) -> None:
-        """Fill the buffer, see that the guardian is there, and start; inputs on `trigger` are armed before.
+        """Fill the buffer, wait for the guardian, and start; inputs on `trigger` are armed before.
 
         Raises
         ------
@@ -156,16 +156,16 @@ class Output:
             self._raise_failure()
 
     def stop(self) -> None:
-        """Set the flag on which it fades, falls to 0 and ends; a signal handler may call it."""
+        """Set the stop flag: the output fades, falls to 0 and ends. A signal handler may call it."""
         self._stopping = True
 
     def poll(self, seconds: float) -> bool:
-        """Wait so long for its end; return whether it is over.
+        """Wait up to `seconds` for its end; return whether it is over.
 
         Raises
         ------
         RigError
-            It was stopped and did not come to rest in time; says what its guardian made of that.
+            It was stopped and did not come to rest in time; the message has the guardian's result.
         """
         if self._over.wait(seconds):
             return True
@@ -182,12 +182,12 @@ class Output:
         Parameters
         ----------
         deadline : float or None
-            s, after which the guardian takes over. None: none until it is stopped; then 10 s, the fade and the fall.
+            s, after which the guardian takes over. None: none until a stop; then 10 s, the fade and the fall.
 
         Raises
         ------
         UsageError, RigError, DaqError
-            What went wrong, when it is at rest, or what nobody could do about it.
+            The failure, after the output is at rest, or the reason why it is not.
         """
         end = None if deadline is None else time.monotonic() + deadline
         while not self.poll(0.1 if end is None else min(max(end - time.monotonic(), 0.0), 0.1)):
@@ -198,7 +198,7 @@ class Output:
 
     @property
     def has_driven(self) -> bool:
-        """Whether it was started; one that is stopped before that drives nothing."""
+        """Whether it was started; an output stopped earlier drives nothing."""
         return self._started
 
     @property
@@ -207,13 +207,13 @@ class Output:
         return SHUTDOWN + FADE + fall
 
     def _raise_failure(self) -> None:
-        """Raise what went wrong, once."""
+        """Raise the failure, once."""
         failure, self._failure = self._failure, None
         if failure is not None:
             raise failure
 
     def _hand_over(self, why: str) -> None:
-        """Leave the output to the guardian, and say what it made of it."""
+        """Leave the output to the guardian, and report its result."""
         if self._stream is not None:
             self._stream.abandon()
         raise RigError(f"{self._terminal} {why}{self._taken_over()}.")
@@ -257,7 +257,7 @@ class Output:
             except BaseException:
                 with suppress(
                     daqmx.DaqError, daqmx.RpcError, ValueError
-                ):  # the first error says what matters
+                ):  # the first error is the relevant one
                     task.close()
                 raise
             task.close()
@@ -313,7 +313,7 @@ class Output:
             if error.error_code != STARVED:
                 raise self._lost(error) from None
             self._recover(stream, memory)
-        except Exception as error:  # the guardian tries what this thread cannot do any more
+        except Exception as error:  # the guardian tries the steps that this thread no longer can
             raise self._lost(error) from None
         memory.driving = 0
         if self._is_unguarded:
@@ -323,10 +323,10 @@ class Output:
 
     @property
     def _is_unguarded(self) -> bool:
-        return self._guardian is not None and self._guardian.is_gone
+        return self._guardian is not None and self._guardian.has_ended
 
     def _follow(self, course: Course, stream: OutputStream) -> None:
-        """Send what the course gives until it is at rest."""
+        """Send the samples of the course until it is at rest."""
         main = threading.main_thread()
         while course.rest is None or stream.generated < course.rest:
             if self._stopping or self._is_unguarded or not main.is_alive():
@@ -336,7 +336,7 @@ class Output:
         stream.stop()
 
     def _recover(self, stream: OutputStream, memory: SharedSamples) -> None:
-        """Bring an output that ran empty, and holds what was out last, to rest."""
+        """Bring a starved output, which holds its last sample, to rest."""
         held, number = stream.held(), stream.written
         stream.stop()
         try:

@@ -1,4 +1,4 @@
-"""Whether a channel shows anything above its noise: a drive that never came looks like a sound recording otherwise."""
+"""Whether a channel has a signal above its noise: a missing drive else looks like a sound recording."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.robust import robust_sigma
 
 _FEWEST = 20
-# Mean squared difference of neighbours over twice the variance is 1 for white noise, with this many standard errors of
-# 1 / sqrt(samples): a signal that is sampled well is far below 1.
+# Distance from 1, in standard errors of 1 / sqrt(samples), of the mean squared difference of neighbours over twice the
+# variance. The ratio is 1 for white noise, and far below 1 for a well-sampled signal.
 _BEYOND = 4.0
-# Largest deviation from the median, in standard deviations of the noise, above which a sample is a pulse: white noise
-# of 10^8 samples, as many as a recording takes, ends at 5.7.
+# Largest deviation from the median, in standard deviations of the noise, above which a sample is a pulse. White noise
+# of 10^8 samples, the most of a recording, ends at 5.7.
 _PULSE = 7.0
-# Steps of the converter within which a channel stands still.
+# Steps of the converter, within which a channel stands still.
 _STILL = 2.0
 
 
 def noise_of(volts: NDArray[np.float64], step: float) -> float | None:
-    """Return the noise of a channel that shows nothing else, V; None where there is a signal, or too few samples.
+    """Return the noise of a channel without a signal, V; None for a channel with a signal, or with too few samples.
 
-    Missing samples are NaN; `step` is that of the converter, V.
+    Missing samples are NaN; `step` is the converter's, V.
 
     >>> time = np.arange(2000.0)
     >>> noise_of(np.sin(0.1 * time), 1e-4) is None
@@ -45,9 +45,9 @@ def noise_of(volts: NDArray[np.float64], step: float) -> float | None:
 
 
 def quiet_remark(name: str, volts: NDArray[np.float64], step: float, is_loopback: bool) -> str:
-    """Return what is said of a channel that shows nothing above its noise; empty where it shows something.
+    """Return the remark on a channel without a signal above its noise; empty for a channel with a signal.
 
-    `step` is that of the converter, V; an output is wired to a loopback.
+    `step` is the converter's, V; an output is wired to a loopback.
     """
     noise = noise_of(volts, step)
     if noise is None:

@@ -1,6 +1,6 @@
 """The task of the inputs on a server, which outlives a program that was killed.
 
-A server keeps a task, and with it the inputs, until somebody clears it. So the task of an acquisition has a name by
+A server keeps a task, and with it the inputs, until it is cleared. The task of an acquisition therefore has a name, by
 which the next program finds it. If nobody reads from it any more, its program is dead, and it is cleared.
 """
 
@@ -14,13 +14,13 @@ from vibroimpact.hardware import daqmx
 from vibroimpact.hardware.rig.opening import Rig
 
 LOOK_SECONDS = 2.0
-"""Time, s, in which a program that lives has read from its task."""
+"""Time, s, in which a living program reads from its task."""
 _LOOKS = 20
 
 
 def input_task(rig: Rig, device: str) -> Any:
-    """Return a new task for inputs of a device; raise RigError if another program is reading them."""
-    if rig.channel is None:  # the driver frees what a dead program had
+    """Return a new task for inputs of a device; RigError if another program is reading them."""
+    if rig.channel is None:  # the driver frees the tasks of a dead program
         return daqmx.nidaqmx.Task()
     name = f"vibroimpact-inputs-{device}"
     try:
@@ -46,7 +46,7 @@ def _task(rig: Rig, name: str, behaviour: str) -> Any:
 
 
 def _is_read(task: Any) -> bool:
-    """Whether a program reads from a task; inputs that wait for a trigger are armed just before it comes."""
+    """Whether a program reads from a task; waiting inputs are armed just before their trigger comes."""
     try:
         position = task.in_stream.curr_read_pos
         for _ in range(_LOOKS):
@@ -54,5 +54,5 @@ def _is_read(task: Any) -> bool:
             if task.in_stream.curr_read_pos != position:
                 return True
         return False
-    except daqmx.DaqError:  # it has failed meanwhile, as one does that nobody reads
+    except daqmx.DaqError:  # it has failed meanwhile, as a task without a reader does
         return False

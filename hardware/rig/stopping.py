@@ -14,7 +14,7 @@ from typing import Any
 def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
     """Let the first Ctrl-C, or SIGTERM, only call `stop`, which sets a flag; a second Ctrl-C interrupts.
 
-    In a thread that is not the main one, which hears no signals, nothing changes; nor where Ctrl-C is ignored.
+    Nothing changes in a thread other than the main one, which receives no signals, or if Ctrl-C is ignored.
 
     Examples
     --------

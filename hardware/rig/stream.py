@@ -1,4 +1,4 @@
-"""Samples into an output task: piece by piece, each checked, none regenerated."""
+"""Samples into an output task: in pieces, each checked, none regenerated."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vibroimpact.hardware.rig.limits import Fall, Floats, Limits
 from vibroimpact.hardware.rig.memory import SharedSamples
 
 BUFFER_SECONDS = 0.3
-"""Of samples that wait in the buffer: so long does it take until a stop reaches the terminal."""
+"""Duration of the samples in a full buffer, s: the delay from a stop to the terminal."""
 PIECES = 8
 """Parts in which a buffer is written."""
 WRITE_TIMEOUT = 0.25
-"""Time of a write, s, after which it returns with what it wrote, so that the writer shows that it lives."""
+"""Time of a write, s, after which it returns with its written samples, so that the writer shows that it lives."""
 SILENCE = 15.0
-"""Time without a sample that moves, s, after which an output counts as stuck; a rig faster than life waits 5 s."""
+"""Time without a moving sample, s, after which an output counts as stuck; a rig faster than real time waits 5 s."""
 
 _TRIES = 5
 
@@ -44,10 +44,10 @@ def add_output(task: Any, terminal: str, rate: float, limits: Limits) -> None:
 
 
 class OutputStream:
-    """The samples that go into an output task, by number, at a rate in Hz.
+    """The samples of an output task, by number, at a rate in Hz.
 
-    The memory is told of each sample before it is sent. `written` samples are in the task already, the last of which,
-    or what the output holds, is `last`, V; `generated` are out, as the device says.
+    The memory receives each sample before it is sent. `written` samples are in the task already. `last` is the last of
+    them, or the held voltage, V. `generated` samples are out, by the device's count.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class OutputStream:
     def send(self, volts: Floats) -> None:
         """Send samples, shape (sample,); return when the buffer has them.
 
-        Samples beyond the limits raise UsageError, and none is sent. DaqError, RpcError: the rig refuses them, and
-        `written` counts those that it took. RigError: no sample moved for 15 s.
+        UsageError: samples are beyond the limits, and none is sent. DaqError, RpcError: the rig refuses them;
+        `written` counts the accepted ones. RigError: no sample moved for 15 s.
         """
         self._limits.check(volts, self._last, self.rate, self.written)
         self._memory.announce(self.written, volts)
@@ -85,7 +85,7 @@ class OutputStream:
         self._ask()
 
     def abandon(self) -> None:
-        """Let no more samples be sent: another process drives."""
+        """Send no more samples: another process drives."""
         self._abandoned = True
 
     def _write(self, volts: Floats) -> int:
@@ -112,12 +112,12 @@ class OutputStream:
         self.task.start()
 
     def stop(self) -> None:
-        """Stop the task, whose output holds the last sample that was out; one that has starved says so once more."""
+        """Stop the task, whose output holds the last sample that was out; a starved task repeats its error."""
         with suppress(daqmx.DaqError):
             self.task.stop()
 
     def held(self) -> float:
-        """Return what the output of a task that has ended by itself holds, V: the last sample that was out."""
+        """Return the voltage that the output of an ended task holds, V: the last sample that was out."""
         with suppress(daqmx.DaqError):
             self._ask()
             return self._memory.sample(min(self.generated, self.written) - 1)
@@ -126,7 +126,7 @@ class OutputStream:
     def finish(self, fall: Fall, *, start: bool = False) -> None:
         """Send a fall, then zeros until its end is out, and stop; `start`: the task does not run yet.
 
-        Errors are those of `send`.
+        Errors are as in `send`.
         """
         begin = self.written
         if start:
@@ -139,7 +139,7 @@ class OutputStream:
 
 
 def bring_to_rest(task: Any, rate: float, limits: Limits, memory: SharedSamples, held: float) -> None:
-    """Bring the output of a task that does not run from the voltage that it holds to 0.
+    """Bring the output of an idle task from its held voltage to 0.
 
     DaqError, RpcError, RigError: the rig refuses it, or this machine is too slow for it again and again.
     """

@@ -13,16 +13,16 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.hardware.rig.limits import Floats, Limits
 
 _TURN = 2**64
-"""Steps of a phase: an unsigned integer of 64 bits goes round by itself."""
+"""Steps of a phase: an unsigned integer of 64 bits wraps by itself."""
 _GROUP = 1024
 
 
 class Waveform(Protocol):
-    """What an output puts out: it begins and ends near 0 V, and gives the same for the same sample always."""
+    """The samples of an output: near 0 V at both ends, and always equal for equal numbers."""
 
     @property
     def samples(self) -> int | None:
-        """How many there are; None: until it is stopped."""
+        """Number of samples; None: until it is stopped."""
 
     def volts(self, first: int, count: int) -> Floats:
         """Return samples from the number `first` on, V, shape (count,)."""
@@ -38,10 +38,10 @@ def envelope(numbers: Floats, length: int) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Sine:
-    """A sine that rises over `ramp`, and falls over it where it has an end.
+    """A sine that rises over `ramp`, and falls over it before its end, if it has one.
 
-    Its phase is counted in whole steps of 2**-64 of a turn from an exact fraction, so that it is as exact after days as
-    at the start.
+    Its phase is counted in whole steps of 2**-64 of a turn, from an exact fraction. It is as exact after days as at
+    the start.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Sine:
     _turns: Fraction = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse what is no sine."""
+        """Raise UsageError unless the parameters describe a sine."""
         if not 0.0 < self.rate < math.inf:
             raise UsageError(f"--rate: expected a number > 0, Hz, got {self.rate!r}.")
         if not 0.0 < self.frequency < 0.5 * self.rate:
@@ -104,7 +104,7 @@ class Sine:
         return self.amplitude * (2.0 * math.pi * self.frequency + ramp)
 
     def refuse_beyond(self, limits: Limits) -> None:
-        """Refuse a sine that would pass limits, before anything is driven.
+        """Raise UsageError for a sine that would pass limits, before anything is driven.
 
         Raises
         ------

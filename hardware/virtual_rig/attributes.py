@@ -1,4 +1,4 @@
-"""Attributes that the virtual rig models, by NI's numbers; every other one is refused."""
+"""Attributes that the virtual rig models, by NI's numbers; all others are refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.hardware.virtual_rig.tasks import (
 )
 
 VERSION = (24, 5, 0)
-"""Of the driver whose behaviour is modelled."""
+"""Version of the modelled driver."""
 
 _VOLTAGE = constants.UsageTypeAI.VOLTAGE.value
 _VOLTS = constants.VoltageUnits.VOLTS.value
@@ -30,7 +30,7 @@ _BITS = constants.ResolutionType.BITS.value
 OVERWRITE = constants.OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value
 DO_NOT_OVERWRITE = constants.OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES.value
 _PHYSICAL_CHANNEL = 0x18F5
-# bits of the set of terminal configurations of an input or output
+# bits of the terminal configurations of an input or output
 _RSE, _NRSE, _DIFFERENTIAL = 1, 2, 4
 
 
@@ -49,7 +49,7 @@ SYSTEM: dict[int, Callable[[Board], Any]] = {
     0x1923: lambda board: VERSION[1],
     0x2F22: lambda board: VERSION[2],
     0x193B: lambda board: board.name,
-    # saved channels, scales and tasks: there are none
+    # saved channels, scales and tasks: none
     0x1265: lambda board: "",
     0x1266: lambda board: "",
     0x1267: lambda board: "",
@@ -60,7 +60,7 @@ DEVICE: dict[int, Callable[[Board], Any]] = {
     0x22CA: lambda board: True,  # is simulated
     0x231E: lambda board: terminals(board, "ai"),
     0x231F: lambda board: terminals(board, "ao"),
-    # digital lines and ports, counters: there are none
+    # digital lines, ports and counters: none
     **{number: lambda board: "" for number in (0x2320, 0x2321, 0x2322, 0x2323, 0x2324, 0x2325)},
     0x298C: lambda board: board.profile.highest_rate(1),
     0x298D: lambda board: board.profile.conversion_rate,
@@ -101,7 +101,7 @@ READ: dict[int, Callable[[Task], Any]] = {
     0x1823: lambda task: _names(task),
     0x1221: lambda task: task.position,
     0x192A: lambda task: task.count,
-    0x1215: lambda task: False,  # read what is there rather than all of a finite task
+    0x1215: lambda task: False,  # read available samples, not all of a finite task
     0x190A: lambda task: task.relative,
     0x190B: lambda task: task.offset,
     0x1211: lambda task: OVERWRITE if task.overwrites else DO_NOT_OVERWRITE,
@@ -116,8 +116,8 @@ WRITE: dict[int, Callable[[Task], Any]] = {
 }
 BUFFER: dict[int, Callable[[Task], Any]] = {
     0x186C: lambda task: task.default_buffer() if task.kind == INPUT and task.clock else 0,
-    0x186D: lambda task: task.asked_buffer or task.length,
-    0x230A: lambda task: 0,  # samples on the board: none, all are in the buffer
+    0x186D: lambda task: task.requested_buffer or task.length,
+    0x230A: lambda task: 0,  # onboard samples: none, all are in the buffer
     0x230B: lambda task: 0,
 }
 ANY_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
@@ -134,7 +134,7 @@ PHYSICAL: dict[tuple[str, int], Callable[[Board], Any]] = {
 INPUT_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
     0x0695: lambda task, channel: _VOLTAGE,
     0x1094: lambda task, channel: _VOLTS,
-    # what was asked for, widened to what the device measures
+    # the requested range, widened to a range of the device
     0x17DD: lambda task, channel: channel.device_range,
     0x17DE: lambda task, channel: -channel.device_range,
     0x1097: lambda task, channel: channel.wiring,
@@ -160,7 +160,7 @@ OF_TASKS = {"Task": TASK, "Timing": TIMING, "Trig": TRIGGER, "Read": READ, "Writ
 
 
 def physical_name(task: Task, channel: Channel) -> str:
-    """Return the input or output that a channel is."""
+    """Return the name of the input or output of a channel."""
     if channel.output is not None:
         return f"{task.device}/_ao{channel.output}_vs_aognd"
     return f"{task.device}/{_word(task)}{channel.number}"
@@ -175,14 +175,14 @@ def _names(task: Task) -> str:
 
 
 def default_count(task: Task) -> int:
-    """Return how many samples per channel a read takes that does not say it."""
+    """Return the number of samples per channel of a read that does not give one."""
     if task.clock is None:
         return 1
     return task.clock.samples if task.clock.mode == FINITE else task.available
 
 
 def unknown(group: str, number: int) -> Refusal:
-    """Return what refuses an attribute that is not modelled."""
+    """Return the refusal of an attribute that is not modelled."""
     return Refusal(
         DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"attribute 0x{number:04X} of {group.lower()}"
     )
@@ -215,7 +215,7 @@ def of_physical_channel(board: Board, name: str, number: int) -> Any:
 
 
 def of_task(group: str, task: Task, number: int) -> Any:
-    """Return an attribute of a task: of its timing, trigger, reads, writes or buffers."""
+    """Return an attribute of a task: its timing, trigger, reads, writes or buffers."""
     if group == "Task" and number == 0x230E:
         return task.device if task.channels else ""
     if number not in OF_TASKS[group]:
@@ -226,17 +226,17 @@ def of_task(group: str, task: Task, number: int) -> Any:
 
 
 def channels_of(task: Task, names: str) -> list[Channel]:
-    """Return the channels of a list of names; all, where there is none."""
-    asked = expanded(names)
+    """Return the channels named in a list; all channels for an empty list."""
+    requested = expanded(names)
     known = {channel.name.lower(): channel for channel in task.channels}
-    lost = [name for name in asked if name.lower() not in known]
-    if lost or not task.channels:
-        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, ", ".join(lost)[:60])
-    return [known[name.lower()] for name in asked] or task.channels
+    unknown_names = [name for name in requested if name.lower() not in known]
+    if unknown_names or not task.channels:
+        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, ", ".join(unknown_names)[:60])
+    return [known[name.lower()] for name in requested] or task.channels
 
 
 def of_channel(task: Task, names: str, number: int) -> Any:
-    """Return an attribute of a channel; where several are named, or none, all of them must have the same."""
+    """Return an attribute of a channel; of several named channels, or of all, the value must be the same."""
     table = ANY_CHANNEL | (INPUT_CHANNEL if task.kind == INPUT else OUTPUT_CHANNEL)
     chosen = channels_of(task, names)
     if number not in table:

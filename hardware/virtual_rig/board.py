@@ -1,4 +1,4 @@
-"""The virtual device: tasks on one time base, the plant between their samples."""
+"""The virtual device: tasks on one time base, and the plant that advances between their samples."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from vibroimpact.hardware.virtual_rig.terminals import Terminals
 from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
 MOST_ON_DEMAND = 1_000
-"""Samples per channel of a call without a sample clock: it holds the rig meanwhile."""
+"""Maximum samples per channel of a call without a sample clock, which holds the rig meanwhile."""
 MOST_AT_ONCE = 20_000
-"""Samples of one advance, so that a call never waits for long."""
+"""Maximum samples of one advance, so that no call waits for long."""
 PERIOD = 0.004
-"""Between two advances while a clock runs, s."""
+"""Interval between two advances while a clock runs, s."""
 
 
 class Board:
-    """A device with its tasks; all that touches it is done under its lock.
+    """A device with its tasks; every access is made under its lock.
 
-    `pace` is where its time should be, `analog` its outputs and inputs; its time was 0 at `served_at`, s since 1970.
+    `pace` gives the time that it should have reached, `analog` its outputs and inputs. Its time was 0 at `served_at`,
+    s since 1970.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -47,7 +48,7 @@ class Board:
         self.analog = Sampling(settings, self.profile, self.plant)
         lock = threading.RLock()
         self.changed = threading.Condition(lock)
-        self._work = threading.Condition(lock)  # wakes the clock, which calls that wait do not
+        self._work = threading.Condition(lock)  # wakes the clock; waiting calls do not
         self.served_at = time.time()
         self.pace = Pace(settings.rig.speed)
         self._closed = False
@@ -58,7 +59,7 @@ class Board:
     # ---- time ----
 
     def set_pace(self, *, lockstep: bool | None = None, speed: float | None = None) -> None:
-        """Change how the time of the rig goes."""
+        """Change the pace of the rig."""
         with self.changed:
             self.catch_up()
             self.pace.lockstep = self.pace.lockstep if lockstep is None else lockstep
@@ -71,11 +72,11 @@ class Board:
         self._work.notify_all()
 
     def _due(self) -> int:
-        """Return the tick where the time of the rig should be."""
+        """Return the tick that the rig should have reached."""
         return self.pace.due(self.plant.now, self.tasks.values())
 
     def catch_up(self) -> None:
-        """Let the plant go on to where the time of the rig is."""
+        """Advance the plant to the present time of the rig."""
         if self._lost is not None:
             raise self._lost
         due = self._due()
@@ -84,14 +85,14 @@ class Board:
             self.changed.notify_all()
 
     def let_go(self, seconds: float) -> None:
-        """Let time go on in lockstep, as if a call waited for it."""
+        """Let time advance in lockstep, as if a call waited for it."""
         with self.changed:
-            self.pace.wanted = max(self.pace.wanted, self.plant.now + round(seconds / TICK))
+            self.pace.requested = max(self.pace.requested, self.plant.now + round(seconds / TICK))
             self.catch_up()
-            self.pace.wanted = self.plant.now
+            self.pace.requested = self.plant.now
 
     def _chunk(self) -> int:
-        """Return ticks of one advance."""
+        """Return the ticks of one advance."""
         rate = sum(task.rate * len(task.channels) for task in self.tasks.values() if task.ticking)
         steps = rate + self.plant.fineness / 10.0
         return NEVER if rate == 0.0 else max(int(MOST_AT_ONCE / steps / TICK), 1000)
@@ -104,7 +105,7 @@ class Board:
                     return
                 busy = any(task.ticking for task in self.tasks.values())
                 if busy and not self.pace.lockstep:
-                    with suppress(Refusal):  # the tasks have it
+                    with suppress(Refusal):  # the tasks hold the failure
                         self._one_chunk()
                 self._work.wait(PERIOD if busy and not self.pace.lockstep else None)
 
@@ -115,11 +116,11 @@ class Board:
             self.changed.notify_all()
         self.pace.give_up(self.plant.now, due)
 
-    def wait_for(self, holds: Callable[[], bool], wanted: Callable[[], int], timeout: float) -> bool:
-        """Wait until something holds, at most so long (s; < 0: for ever); return whether it does.
+    def wait_for(self, holds: Callable[[], bool], requested: Callable[[], int], timeout: float) -> bool:
+        """Wait until a condition holds, for at most `timeout` (s; < 0: no limit); return whether it holds.
 
-        In lockstep time goes to the `wanted` tick, where it is expected to hold. A rig slower than life gives the
-        program's timeout more.
+        In lockstep, time advances to the `requested` tick, at which the condition is expected to hold. A rig slower
+        than real time extends the program's timeout accordingly.
         """
         wall = timeout / min(self.pace.speed, 1.0) if not self.pace.lockstep else timeout
         end = np.inf if timeout < 0 else time.monotonic() + wall
@@ -130,7 +131,7 @@ class Board:
                     raise Refusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, self.name)
                 if self.pace.lockstep:
                     before = self.plant.now
-                    self.pace.wanted = max(self.pace.wanted, wanted())
+                    self.pace.requested = max(self.pace.requested, requested())
                     self.catch_up()
                     if self.plant.now > before:
                         continue
@@ -143,7 +144,7 @@ class Board:
     # ---- samples ----
 
     def advance(self, target: int) -> None:
-        """Let tasks and plant go on to a tick."""
+        """Advance tasks and plant to a tick."""
         running = [task for task in self.tasks.values() if task.ticking]
         try:
             starved = self.analog.advance(running, target)
@@ -153,7 +154,7 @@ class Board:
             self._end(task, task.name in starved)
 
     def _end(self, task: Task, starved: bool) -> None:
-        """End a task that has all of its samples, or has lost some."""
+        """End a task that has all of its samples, or has lost samples."""
         if task.needed is not None and task.count >= task.needed:
             task.finish()
         elif starved:
@@ -164,7 +165,7 @@ class Board:
             self._terminals.end_followers(task)
 
     def lose(self, why: str) -> Refusal:
-        """Let the device be gone, and with it all of its tasks; return what is said of it."""
+        """Make the device inaccessible and fail all its tasks; return the error that later calls raise."""
         with self.changed:
             self._lost = Refusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, why)
             for task in self.tasks.values():
@@ -174,7 +175,7 @@ class Board:
         return self._lost
 
     def read_now(self, task: Task, count: int) -> NDArray[np.int16]:
-        """Return samples of a task without a clock, one conversion after the other; shape (channel, sample)."""
+        """Return samples of a task without a clock, converted one after the other; shape (channel, sample)."""
         self._refuse_many(count)
         self.catch_up()
         step = round(1.0 / self.profile.conversion_rate / TICK)
@@ -182,19 +183,19 @@ class Board:
         for number in range(count):
             if number:
                 self.advance(self.plant.now + step)
-                self.pace.wanted = max(self.pace.wanted, self.plant.now)
+                self.pace.requested = max(self.pace.requested, self.plant.now)
             codes[:, number] = self.analog.now(task.channels)
         return codes
 
     def put_now(self, task: Task, samples: Floats) -> None:
-        """Let outputs of a task without a clock have values, shape (channel, sample), one after the other."""
+        """Apply output values of a task without a clock, shape (channel, sample), one after the other."""
         self._refuse_many(samples.shape[1])
         self.catch_up()
         step = round(1.0 / self.profile.output_rate / TICK)
         for number in range(samples.shape[1]):
             if number:
                 self.advance(self.plant.now + step)
-                self.pace.wanted = max(self.pace.wanted, self.plant.now)
+                self.pace.requested = max(self.pace.requested, self.plant.now)
             self.analog.held[[channel.number for channel in task.channels]] = samples[:, number]
 
     @staticmethod
@@ -208,11 +209,11 @@ class Board:
     # ---- faults ----
 
     def overrun(self) -> int:
-        """Let inputs that run have lost samples, as if they were read too late; return how many did."""
+        """Make running inputs lose samples, as if they were read too late; return the number of inputs."""
         return self._fail(INPUT, DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE)
 
     def starve(self) -> int:
-        """Let outputs without regeneration that run have run empty; return how many did."""
+        """Make running outputs without regeneration run empty; return the number of outputs."""
         return self._fail(OUTPUT, DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES)
 
     def _fail(self, kind: int, error: DAQmxErrors) -> int:
@@ -230,7 +231,7 @@ class Board:
             return len(found)
 
     def set_clock_error(self, error: float) -> None:
-        """Let the input clock go wrong by so many ppm from its next edge on."""
+        """Set the error of the input clock, ppm, from its next edge on."""
         with self.changed:
             self.catch_up()
             self.analog.inputs.clock_error = error
@@ -240,13 +241,13 @@ class Board:
                     self._terminals.retune_followers(task)
 
     def mend(self) -> None:
-        """Take all faults away; a device that is gone stays so."""
+        """Clear all faults; a device that was lost stays lost."""
         with self.changed:
             self.analog.inputs.mend()
             self.set_clock_error(self.analog.inputs.clock_error)
 
     def _true_rate(self, task: Task) -> float:
-        """Return the rate that the clock of a task has, Hz."""
+        """Return the true rate of a task's clock, Hz."""
         assert task.clock is not None
         error = self.analog.inputs.clock_error if task.kind == INPUT else 0.0
         return task.clock_rate * (1.0 + 1e-6 * error)
@@ -254,8 +255,8 @@ class Board:
     # ---- states of tasks ----
 
     def reserve(self, task: Task) -> None:
-        """Reserve what a task needs."""
-        verify(task)  # channels may have come after the clock
+        """Reserve the resources of a task."""
+        verify(task)  # channels may have been added after the clock
         mine = self._resources(task)
         for other in self.tasks.values():
             if other is not task and other.state is not State.verified and mine & self._resources(other):
@@ -285,7 +286,7 @@ class Board:
             self._wake()
 
     def pulse(self, terminal: str) -> int:
-        """Put an edge on a terminal; return how many tasks it has started."""
+        """Put an edge on a terminal; return the number of tasks started."""
         with self.changed:
             self.catch_up()
             started = self._terminals.pulse(terminal, self.plant.now)
@@ -295,8 +296,8 @@ class Board:
     def stop(self, task: Task) -> int:
         """Stop a task; an output holds its last value.
 
-        The status returned is a warning where a finite task is not done. A task that had failed before raises its
-        Refusal once more.
+        The status returned is a warning where a finite task is not done. A task that has failed before raises its
+        Refusal again.
         """
         with self.changed:
             self.catch_up()
@@ -308,7 +309,7 @@ class Board:
             return STOPPED_BEFORE_DONE if early else 0
 
     def abort(self, task: Task) -> None:
-        """Stop a task whatever it failed with; an output holds its last value."""
+        """Stop a task regardless of its failure; an output holds its last value."""
         with self.changed:
             self.catch_up()
             self._terminals.end_followers(task)
@@ -317,7 +318,7 @@ class Board:
             self.changed.notify_all()
 
     def reset(self) -> None:
-        """Give back all that tasks hold; outputs go to 0. What a task has failed with is forgotten."""
+        """Release all resources of tasks and forget their failures; outputs go to 0."""
         with self.changed:
             for task in self.tasks.values():
                 task.kept = False
@@ -325,7 +326,7 @@ class Board:
             self.analog.held[:] = 0.0
 
     def remove(self, task: Task) -> None:
-        """Forget a task; those who listen to it hear no more."""
+        """Delete a task and end its event streams."""
         with self.changed:
             with suppress(Refusal):
                 self.abort(task)

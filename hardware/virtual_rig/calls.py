@@ -1,4 +1,4 @@
-"""The calls of NI's service that the virtual rig answers, by the names that they have in the protocol."""
+"""The calls of NI's service that the virtual rig answers, by their names in the protocol."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Calls(Reads, Writes, Listening):
         self._unnamed = 0
 
     def answer(self, method: str) -> Call | None:
-        """Return what answers a method; None where it is not modelled."""
+        """Return the function that answers a method; None for a method that is not modelled."""
         found = _ATTRIBUTE.fullmatch(method)
         if found is not None:
             verb, group, kind = found.groups()
@@ -61,7 +61,7 @@ class Calls(Reads, Writes, Listening):
     # ---- sessions ----
 
     def do_create_task(self, request: Any, response: Any) -> None:
-        """Make a task, or attach to one that is there."""
+        """Make a task, or attach to an existing one."""
         name, behaviour = request.session_name, request.initialization_behavior
         with self._board.changed:
             there = bool(name) and name in self._board.tasks
@@ -78,7 +78,7 @@ class Calls(Reads, Writes, Listening):
             response.new_session_initialized = not there
 
     def do_clear_task(self, request: Any, response: Any) -> None:
-        """Forget a task."""
+        """Delete a task."""
         self._board.remove(self._task(request))
 
     def do_start_task(self, request: Any, response: Any) -> None:
@@ -92,7 +92,7 @@ class Calls(Reads, Writes, Listening):
         response.status = self._board.stop(self._task(request))
 
     def do_task_control(self, request: Any, response: Any) -> None:
-        """Start, stop, reserve or give back a task."""
+        """Start, stop, reserve or release a task."""
         task, action = self._task(request), request.action_raw or request.action
         modes = constants.TaskMode
         with self._board.changed:
@@ -113,7 +113,7 @@ class Calls(Reads, Writes, Listening):
                 raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"action {action} of a task")
 
     def do_is_task_done(self, request: Any, response: Any) -> None:
-        """Say whether a task is done."""
+        """Return whether a task is done."""
         task = self._task(request)
         with self._board.changed:
             self._board.catch_up()
@@ -125,10 +125,10 @@ class Calls(Reads, Writes, Listening):
         """Wait until a task is done."""
         task = self._task(request)
 
-        def wanted() -> int:
+        def last_edge() -> int:
             return self._board.plant.now if task.needed is None else self._tick_of(task, task.needed - 1)
 
-        if not self._wait_for(lambda: task.is_over, wanted, self._timeout(request.time_to_wait)):
+        if not self._wait_for(lambda: task.is_over, last_edge, self._timeout(request.time_to_wait)):
             raise Refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE, task.name)
         if task.failure is not None:
             raise task.failure
@@ -211,7 +211,7 @@ class Calls(Reads, Writes, Listening):
             task.set_buffer(request.num_samps_per_chan)
 
     def do_cfg_dig_edge_start_trig(self, request: Any, response: Any) -> None:
-        """Let a task wait for an edge."""
+        """Set a digital edge as start trigger."""
         task = self._task(request)
         with self._board.changed:
             task.refuse_running()
@@ -222,7 +222,7 @@ class Calls(Reads, Writes, Listening):
                 raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "a trigger from no terminal")
 
     def do_disable_start_trig(self, request: Any, response: Any) -> None:
-        """Let a task wait for no edge."""
+        """Remove the start trigger."""
         task = self._task(request)
         task.refuse_running()
         task.trigger = ""
@@ -239,20 +239,20 @@ class Calls(Reads, Writes, Listening):
         self._board.reset()
 
     def do_self_test_device(self, request: Any, response: Any) -> None:
-        """Say that the device is there."""
+        """Confirm that the device is there."""
         self._refuse_other_device(request.device_name)
 
     def do_get_error_string(self, request: Any, response: Any) -> None:
-        """Say what a code means; nothing, where there is no such code: the client then says so."""
+        """Return the text of a code; an unknown code has none, as the client then reports."""
         text = text_of(request.error_code)
         response.error_string = text and f"{text}."
 
     def do_load_task(self, request: Any, response: Any) -> None:
-        """Refuse to load a task: none is saved."""
+        """Refuse to load a task: no task is saved."""
         raise Refusal(DAQmxErrors.TASK_NOT_IN_DATA_NEIGHBORHOOD, repr(request.session_name[:60]))
 
     def do_add_global_chans_to_task(self, request: Any, response: Any) -> None:
-        """Refuse to add saved channels: there are none."""
+        """Refuse to add saved channels: no channel is saved."""
         raise Refusal(DAQmxErrors.INVALID_GLOBAL_CHAN, repr(request.channel_names[:60]))
 
     def _attribute(self, verb: str, group: str, kind: str, request: Any, response: Any) -> None:
@@ -318,5 +318,5 @@ def _put(response: Any, value: Any, kind: str) -> None:
 
 
 def _is_of(kind: str, value: Any) -> bool:
-    """Say whether a value goes into a message of a kind, as the protocol calls them."""
+    """Return whether a value goes into a message of the given kind of the protocol."""
     return isinstance(value, _KINDS.get(kind, ())) and (kind not in _HIGHEST or value < _HIGHEST[kind])

@@ -1,4 +1,4 @@
-"""Attributes that a program can change, and how: by NI's numbers; every other one is refused."""
+"""Attributes that a program can change, by NI's numbers; all others are refused."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _CLOCK_FIELDS = {0x1344: "rate", 0x1300: "mode", 0x1310: "samples", 0x1852: "sou
 
 
 _WHILE_RUNNING = {("Read", 0x190A), ("Read", 0x190B)}
-"""Where a read begins may be said before each."""
+"""Attributes that may change while a task runs: the origin and offset of a read."""
 
 
 def change(group: str, task: Task, number: int, value: Any) -> None:
@@ -48,8 +48,8 @@ def change(group: str, task: Task, number: int, value: Any) -> None:
         raise Refusal(DAQmxErrors.SPECIFIED_ATTR_NOT_VALID, f"0x{number:04X} as {type(value).__name__}")
     if group == "Timing" and number in _CLOCK_FIELDS:
         task.refuse_empty()
-        asked: Any = terminal(task.device, value) if number == 0x1852 else value
-        fields: dict[str, Any] = {_CLOCK_FIELDS[number]: asked}
+        requested: Any = terminal(task.device, value) if number == 0x1852 else value
+        fields: dict[str, Any] = {_CLOCK_FIELDS[number]: requested}
         task.timing = replace(task.timing, **fields)
     elif group == "Timing" and number == 0x1347 and value in (ON_DEMAND, SAMPLE_CLOCK):
         task.refuse_empty()
@@ -107,14 +107,14 @@ _DEFAULTS: dict[tuple[str, int], Any] = {
 
 
 def reset(group: str, task: Task, number: int) -> None:
-    """Give an attribute of a task its default again."""
+    """Reset an attribute of a task to its default."""
     if (group, number) not in _DEFAULTS:
         raise unknown(group, number)
     change(group, task, number, _DEFAULTS[group, number])
 
 
 def change_channel(board: Board, task: Task, names: str, number: int, value: Any) -> None:
-    """Change an attribute of channels: the range of the device, the voltages that are expected, the wiring."""
+    """Change an attribute of channels: the device range, the expected voltages, the terminal configuration."""
     task.refuse_running()
     changes = _OF_INPUTS if task.kind == INPUT else _OF_OUTPUTS
     if number not in changes:
@@ -144,8 +144,8 @@ def _output_ends_at(board: Board, channel: Channel, edge: float) -> None:
     _one_of((board.profile.output_range,), edge)
 
 
-def _wire(board: Board, channel: Channel, asked: int) -> None:
-    channel.wiring = wiring(asked)
+def _wire(board: Board, channel: Channel, requested: int) -> None:
+    channel.wiring = wiring(requested)
 
 
 def _count_in_bits(board: Board, channel: Channel, unit: int) -> None:
@@ -178,7 +178,7 @@ def _one_of(ranges: tuple[float, ...], edge: float) -> float:
 
 
 def input_range(board: Board, low: float, high: float) -> float:
-    """Return the range of the device for inputs from `low` to `high`, V."""
+    """Return the device range for inputs from `low` to `high`, V."""
     chosen = board.profile.input_range(low, high)
     if not low < high or chosen is None:
         raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
@@ -186,17 +186,17 @@ def input_range(board: Board, low: float, high: float) -> float:
 
 
 def refuse_output_range(board: Board, low: float, high: float) -> None:
-    """Refuse voltages that the outputs of the device do not have."""
+    """Raise Refusal for voltages outside the output range of the device."""
     widest = board.profile.output_range
     if not -widest <= low < high <= widest:
         raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
 
 
-def wiring(asked: int) -> int:
-    """Return a terminal configuration; the plant is the same behind each."""
+def wiring(requested: int) -> int:
+    """Return a terminal configuration; the plant is the same for all of them."""
     modes = constants.TerminalConfiguration
-    if asked == modes.DEFAULT.value:
-        asked = modes.DIFF.value
-    if asked in (modes.DIFF.value, modes.RSE.value, modes.NRSE.value):
-        return asked
-    raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"terminal configuration {asked}")
+    if requested == modes.DEFAULT.value:
+        requested = modes.DIFF.value
+    if requested in (modes.DIFF.value, modes.RSE.value, modes.NRSE.value):
+        return requested
+    raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"terminal configuration {requested}")

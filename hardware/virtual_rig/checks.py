@@ -1,4 +1,4 @@
-"""What is wrong with the settings of a task: found when it is verified, as by NI's driver, not where it is set."""
+"""Checks of the settings of a task, made when it is verified, as by NI's driver, not when a value is set."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.tasks import CONTINUOUS, FINITE, Clock, Task
 
 LONGEST = 4e9
-"""A finite task that lasts longer is refused, s: its last tick is still a number."""
+"""Maximum duration of a finite task, s; the last tick still fits into its integer."""
 LOWEST_RATE = 0.01
-"""Of a sample clock, Hz: that of a board ends at its timebase over 2**32."""
+"""Minimum rate of a sample clock, Hz; a board's minimum is its timebase over 2**32."""
 _SAMPLE_CLOCKS = ("ai/SampleClock", "ao/SampleClock")
 
 
 def verify(task: Task) -> None:
-    """Refuse what the device does not have."""
+    """Raise Refusal for settings that the device does not support."""
     task.refuse_empty()
     if task.clock is not None:
         _verify_clock(task, task.clock)
@@ -52,7 +52,7 @@ def _verify_trigger(task: Task) -> None:
 
 
 def refuse_outside_clock(task: Task) -> None:
-    """Refuse to start on a clock that would come in through a terminal: nothing drives one."""
+    """Refuse to start on a clock from an external terminal: nothing drives one."""
     source = task.timing.source if task.clocked else ""
     if source and not is_signal(task.device, source, *_SAMPLE_CLOCKS):
         raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"a clock from {source}")

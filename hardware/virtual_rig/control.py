@@ -1,4 +1,5 @@
-"""The second service of a virtual rig, for tests and teaching: its time, its terminals, the truth of its plant."""
+"""The control service of a virtual rig, for tests and teaching: its time, its terminals, the true state of its
+plant."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ FASTEST = 1000.0
 
 
 def encoded(values: dict[str, Any]) -> bytes:
-    """Return values as a message."""
+    """Return values encoded as a message."""
     return json.dumps(values).encode()
 
 
@@ -33,9 +34,9 @@ def decoded(message: bytes) -> dict[str, Any]:
     return values
 
 
-def _number(asked: dict[str, Any], name: str, low: float, high: float) -> float:
-    """Return a number of a message that lies between two others, the second included."""
-    value = asked.get(name)
+def _number(request: dict[str, Any], name: str, low: float, high: float) -> float:
+    """Return a number of a message that is > `low` and <= `high`."""
+    value = request.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low < value <= high:
         raise ValueError(f"{name}: expected a number > {low:g} and <= {high:g}, got {repr(value)[:60]}")
     return float(value)
@@ -48,7 +49,7 @@ class Controls:
     ----------
     board : Board
     vanish : callable
-        Ends the server, as if its machine were gone.
+        Ends the server, as if its machine had failed.
     """
 
     def __init__(self, board: Board, vanish: Callable[[], None]) -> None:
@@ -69,8 +70,8 @@ class Controls:
             "Vanish": self.vanish,
         }
 
-    def state(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Return where the time of the rig is, and which tasks there are."""
+    def state(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Return the time of the rig, its pace and its tasks."""
         board = self._board
         with board.changed:
             tasks = {task.name: task.state.value for task in board.tasks.values()}
@@ -85,80 +86,80 @@ class Controls:
                 "faults": board.analog.inputs.faults(board.name),
             }
 
-    def pace(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def pace(self, request: dict[str, Any]) -> dict[str, Any]:
         """Change lockstep or speed."""
-        lockstep = asked.get("lockstep")
+        lockstep = request.get("lockstep")
         if lockstep not in (None, True, False):
             raise ValueError(f"lockstep: expected true or false, got {lockstep!r}")
-        speed = None if asked.get("speed") is None else _number(asked, "speed", 0.0, FASTEST)
+        speed = None if request.get("speed") is None else _number(request, "speed", 0.0, FASTEST)
         self._board.set_pace(lockstep=lockstep, speed=speed)
         return self.state({})
 
-    def advance(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let the time of the rig go on, in lockstep; it stops before a buffer runs empty or over."""
-        self._board.let_go(_number(asked, "seconds", 0.0, 1e6))
+    def advance(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Let the time of the rig advance in lockstep; it stops before a buffer runs empty or overflows."""
+        self._board.let_go(_number(request, "seconds", 0.0, 1e6))
         return self.state({})
 
-    def pulse(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def pulse(self, request: dict[str, Any]) -> dict[str, Any]:
         """Put an edge on a terminal."""
-        return {"started": self._board.pulse(str(asked.get("terminal", "")))}
+        return {"started": self._board.pulse(str(request.get("terminal", "")))}
 
-    def lose(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let the device be gone, as if its cable were pulled out."""
+    def lose(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Make the device inaccessible, as if its cable were pulled out."""
         self._board.lose(self._board.name)
         return {}
 
     # ---- faults ----
 
-    def overrun(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let the inputs that run have lost samples: the next read says so."""
+    def overrun(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Make the running inputs lose samples: the next read raises the error."""
         return {"failed": self._board.overrun()}
 
-    def starve(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let the outputs that run without regeneration have run empty."""
+    def starve(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Make the running outputs without regeneration run empty."""
         return {"failed": self._board.starve()}
 
-    def stick(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let an input keep a voltage: the next that it sees, or a given one."""
-        number = self._input(asked)
-        volts = None if asked.get("volts") is None else _number(asked, "volts", -1e3, 1e3)
+    def stick(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Make an input keep a voltage: the next sampled value, or a given one."""
+        number = self._input(request)
+        volts = None if request.get("volts") is None else _number(request, "volts", -1e3, 1e3)
         with self._board.changed:
             self._board.catch_up()
             self._board.analog.inputs.stuck[number] = volts
         return self.state({})
 
-    def clip(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let an input end at a voltage, to both sides of 0."""
-        number, volts = self._input(asked), _number(asked, "volts", 0.0, 1e3)
+    def clip(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Make an input saturate at a voltage of either sign."""
+        number, volts = self._input(request), _number(request, "volts", 0.0, 1e3)
         with self._board.changed:
             self._board.catch_up()
             self._board.analog.inputs.clipped[number] = volts
         return self.state({})
 
-    def clock_error(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Let the input clock go wrong."""
-        self._board.set_clock_error(_number(asked, "ppm", -WORST_CLOCK, WORST_CLOCK))
+    def clock_error(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Set the error of the input clock."""
+        self._board.set_clock_error(_number(request, "ppm", -WORST_CLOCK, WORST_CLOCK))
         return self.state({})
 
-    def mend(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Take stuck inputs, clipping and the error of the clock away."""
+    def mend(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Clear stuck inputs, clipping and the error of the clock."""
         self._board.mend()
         return self.state({})
 
-    def vanish(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def vanish(self, request: dict[str, Any]) -> dict[str, Any]:
         """End the server in the middle of all calls."""
         self._vanish()
         return {}
 
-    def _input(self, asked: dict[str, Any]) -> int:
-        terminal, device = str(asked.get("terminal", "")), self._board.name
+    def _input(self, request: dict[str, Any]) -> int:
+        terminal, device = str(request.get("terminal", "")), self._board.name
         names = [f"{device}/ai{number}" for number in range(self._board.profile.inputs)]
         if terminal not in names:
             raise ValueError(f"terminal: expected {names[0]} to {names[-1]}, got {terminal[:60]!r}")
         return names.index(terminal)
 
-    def truth(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Return the state of the plant now, SI units, and the voltages of the outputs."""
+    def truth(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Return the present state of the plant, SI units, and the voltages of the outputs."""
         board = self._board
         with board.changed:
             board.catch_up()
@@ -200,53 +201,53 @@ class RigControl:
         return self._call("State")
 
     def pace(self, *, lockstep: bool | None = None, speed: float | None = None) -> dict[str, Any]:
-        """Change how the time of the rig goes; return its state."""
+        """Change the pace of the rig; return its state."""
         return self._call("Pace", lockstep=lockstep, speed=speed)
 
     def advance(self, seconds: float) -> dict[str, Any]:
-        """Let time go on in lockstep, by at most so many seconds; return the state."""
+        """Let time advance in lockstep by at most the given number of seconds; return the state."""
         return self._call("Advance", seconds=seconds)
 
     def pulse(self, terminal: str) -> int:
-        """Put an edge on a terminal such as `/Dev1/PFI0`; return how many tasks it has started."""
+        """Put an edge on a terminal such as `/Dev1/PFI0`; return the number of tasks started."""
         return int(self._call("Pulse", terminal=terminal)["started"])
 
     def lose(self) -> None:
-        """Let the device be gone until the rig is served anew."""
+        """Make the device inaccessible until the rig is served anew."""
         self._call("Lose")
 
     def overrun(self) -> int:
-        """Let the inputs that run have lost samples (-200279 at the next read); return how many did."""
+        """Make the running inputs lose samples (-200279 at the next read); return the number of tasks."""
         return int(self._call("Overrun")["failed"])
 
     def starve(self) -> int:
-        """Let the outputs that run without regeneration have run empty (-200290); return how many did."""
+        """Make the running outputs without regeneration run empty (-200290); return the number of tasks."""
         return int(self._call("Starve")["failed"])
 
     def stick(self, terminal: str, volts: float | None = None) -> None:
-        """Let an input such as `Dev1/ai0` keep a voltage: what it sees next, or a given one."""
+        """Make an input such as `Dev1/ai0` keep a voltage: the next sampled value, or a given one."""
         self._call("Stick", terminal=terminal, volts=volts)
 
     def clip(self, terminal: str, volts: float) -> None:
-        """Let an input end at a voltage, to both sides of 0, below its range."""
+        """Make an input saturate at a voltage of either sign, below its range."""
         self._call("Clip", terminal=terminal, volts=volts)
 
     def set_clock_error(self, ppm: float) -> None:
-        """Let the input clock run too fast by so many ppm of true time, which the output clock keeps."""
+        """Set the error of the input clock, ppm of true time, which the output clock keeps; > 0: too fast."""
         self._call("ClockError", ppm=ppm)
 
     def mend(self) -> None:
-        """Take stuck inputs and clipping away; the clock error is that of the rig file again."""
+        """Clear stuck inputs and clipping; the clock error returns to that of the rig file."""
         self._call("Mend")
 
     def vanish(self) -> None:
-        """Let the server be gone, in the middle of all calls."""
-        with suppress(UsageError):  # it may take its answer with it
+        """End the server in the middle of all calls."""
+        with suppress(UsageError):  # the server may end before it answers
             self._call("Vanish")
 
     def truth(self) -> dict[str, Any]:
-        """Return the plant now: displacement (m), velocity (m/s), forces (N) of stops, exciter, on a wired load cell.
+        """Return the present plant: displacement (m), velocity (m/s), forces (N) of stops, exciter, a wired load cell.
 
-        `outputs` are in V; of a recording the channels are there, in V or their units.
+        `outputs` are in V; a recording gives its channels, in V or in their units.
         """
         return self._call("Truth")

@@ -1,4 +1,4 @@
-"""The analog inputs of a device: voltages on their wires become codes of the converter."""
+"""The analog inputs of a device, which convert voltages to codes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from vibroimpact.hardware.virtual_rig.tasks import Channel
 
 
 class Inputs:
-    """Converts voltages with the noise on their wires, and has the faults that a test gives it.
+    """Converts voltages with the noise on their wires, and holds the faults set by a test.
 
-    `noise` is the rms at an input, V, by its number; an input that is not there has none. It depends on the seed, on
-    the number of the input and on how many samples that has taken before.
+    `noise` is the rms at an input, V, by the number of the input; an input without entry has no noise. The noise
+    depends on the seed, on the number of the input and on the number of samples taken before.
     """
 
     def __init__(
@@ -26,14 +26,14 @@ class Inputs:
         self._taken: dict[int, int] = {}
         self._usual_error = clock_error
         self.stuck: dict[int, float | None] = {}
-        """V that an input keeps, by its number; None: what it converts next."""
+        """Voltage that a stuck input keeps, V, by its number; None: the next sampled value."""
         self.clipped: dict[int, float] = {}
-        """V, to both sides of 0, at which an input ends."""
+        """Voltage of either sign at which an input saturates, V, by its number."""
         self.clock_error = clock_error
-        """Of the input clock against true time, which the output clock keeps, ppm."""
+        """Error of the input clock against true time, which the output clock keeps, ppm."""
 
     def mend(self) -> None:
-        """Take all faults away."""
+        """Clear all faults."""
         self.stuck.clear()
         self.clipped.clear()
         self.clock_error = self._usual_error
@@ -62,7 +62,7 @@ class Inputs:
         return volts + rms * gaussian(self._seed, number, first, volts.size)
 
     def faults(self, device: str) -> Mapping[str, object]:
-        """Return the faults, as the control service says them."""
+        """Return the faults, as the control service reports them."""
         return {
             "stuck": {f"{device}/ai{number}": volts for number, volts in self.stuck.items()},
             "clipped": {f"{device}/ai{number}": volts for number, volts in self.clipped.items()},

@@ -1,4 +1,4 @@
-"""Events that programs listen to: every so many samples, and the end of a task."""
+"""Events that programs listen to: every n samples, and the end of a task."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.hardware.virtual_rig.tasks import INPUT, EventStream
 
 _ACQUIRED = constants.EveryNSamplesEventType.ACQUIRED_INTO_BUFFER.value
 _GENERATED = constants.EveryNSamplesEventType.TRANSFERRED_FROM_BUFFER.value
-# refused of each direction: the event of the other, a second listener
+# refusals of each direction: the other direction's event, a second listener
 _OF_INPUTS = (
     DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_EVENT_NOT_SUPPORTED_BY_DEVICE,
     DAQmxErrors.EVERY_N_SAMPS_ACQ_INTO_BUFFER_EVENT_ALREADY_REGISTERED,
@@ -27,7 +27,7 @@ class Listening(Answers):
     """Answers the calls that register and unregister events."""
 
     def listen(self, method: str, request: Any) -> tuple[EventStream, Callable[[int], Any]]:
-        """Register a listener; return its stream, and what makes a message of what it hears."""
+        """Register a listener; return its stream and the function that makes a message of an event."""
         task = self._task(request)
         make = message_class(METHODS[method].output_type)
         with self._board.changed:
@@ -50,14 +50,14 @@ class Listening(Answers):
             return task.every, lambda count: make(every_n_samples_event_type_raw=kind, n_samples=count)
 
     def do_unregister_every_n_samples_event(self, request: Any, response: Any) -> None:
-        """End a listener."""
+        """Remove a listener."""
         task = self._task(request)
         if task.every is not None:
             task.every.heard.put(None)
             task.every = None
 
     def do_unregister_done_event(self, request: Any, response: Any) -> None:
-        """End a listener."""
+        """Remove a listener."""
         task = self._task(request)
         if task.ended is not None:
             task.ended.heard.put(None)

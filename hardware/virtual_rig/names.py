@@ -8,7 +8,7 @@ from vibroimpact.hardware.daqmx import DAQmxErrors
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
 
 MOST_NAMES = 1000
-"""Channels of one list."""
+"""Maximum channels of one list."""
 PFI_LINES = 16
 
 _RANGE = re.compile(r"(?P<stem>.*?)(?P<first>\d{1,6}):(?:(?P<again>.*\D)?(?P<last>\d{1,6}))", re.S)
@@ -43,7 +43,7 @@ def _of_range(part: str) -> list[str]:
 
 
 def given_names(text: str, count: int) -> list[str]:
-    """Return the names that a program gives to channels: one for all is numbered.
+    """Return the names that a program gives to channels; a single name is numbered for several channels.
 
     >>> given_names("tip", 3)
     ['tip0', 'tip1', 'tip2']
@@ -57,7 +57,7 @@ def given_names(text: str, count: int) -> list[str]:
 
 
 def terminal(device: str, text: str) -> str:
-    """Return the whole name of a terminal; empty for the clock of the task's own.
+    """Return the full name of a terminal; empty for the task's own clock.
 
     >>> terminal("Dev1", "PFI0")
     '/Dev1/PFI0'
@@ -69,10 +69,10 @@ def terminal(device: str, text: str) -> str:
 
 
 def is_signal(device: str, name: str, *signals: str) -> bool:
-    """Say whether a terminal is one of some signals of the device, such as `ao/SampleClock`."""
+    """Return whether a terminal is one of the given signals of the device, such as `ao/SampleClock`."""
     return name.lower() in {f"/{device}/{signal}".lower() for signal in signals}
 
 
 def is_terminal(device: str, name: str, *signals: str) -> bool:
-    """Say whether a terminal is one of some signals, or a PFI line of the device."""
+    """Return whether a terminal is one of the given signals, or a PFI line of the device."""
     return is_signal(device, name, *signals, *(f"PFI{number}" for number in range(PFI_LINES)))

@@ -1,4 +1,4 @@
-"""Where the time of a rig should be: as in life, slower or faster, or in lockstep with its programs."""
+"""The target time of a rig: as in real time, slower or faster, or in lockstep with its programs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from vibroimpact.hardware.virtual_rig.plant import TICK
 from vibroimpact.hardware.virtual_rig.tasks import Task
 
 FAR_BEHIND = 0.1
-"""Lateness from which on the time of the rig is no longer caught up with, s."""
+"""Lateness above which the time of the rig is no longer made up, s."""
 PATIENCE = 5.0
-"""How long a faster rig waits for a program that does nothing, s of the wall; less than a read of NI's client waits."""
+"""Maximum wait of a faster rig for an idle program, s of the wall; a read of NI's client waits longer."""
 
 
 class Pace:
@@ -20,23 +20,23 @@ class Pace:
     Parameters
     ----------
     speed : float
-        Seconds of the rig in a second.
+        Seconds of the rig in a second of real time.
 
     Attributes
     ----------
     lockstep : bool
-        Time goes on only while a call waits for it, and never so far that a buffer runs empty or over.
+        Time advances only while a call waits for it, and stops before a buffer runs empty or overflows.
     speed : float
-        Above 1 time waits too before a buffer runs empty or over, at most `patience` for a program that does nothing:
-        then its buffer does.
+        Above 1, time also stops before a buffer runs empty or overflows. For an idle program it waits at most
+        `patience`; then the buffer runs empty or overflows.
     patience : float
-        s of the wall.
+        Maximum wait for an idle program, s of the wall.
     slipped : float
-        Seconds by which the time of the rig was late and is not caught up with.
-    wanted : int
-        Tick up to which waiting calls want time to go, in lockstep.
+        Total time by which the rig was late and that is not made up, s.
+    requested : int
+        Tick up to which waiting calls request time, in lockstep.
     waits_for : str
-        The task for which time waits; empty: it does not wait.
+        The task for which time waits; empty: time does not wait.
     """
 
     def __init__(self, speed: float) -> None:
@@ -46,21 +46,21 @@ class Pace:
         self.go_on_from(0)
 
     def go_on_from(self, now: int) -> None:
-        """Let time go on from a tick, now."""
+        """Let time continue from a tick, now."""
         self._begin, self._origin = time.monotonic(), now
-        self.wanted, self.waits_for = now, ""
+        self.requested, self.waits_for = now, ""
 
     def due(self, now: int, tasks: Collection[Task]) -> int:
-        """Return the tick where time should be, which is `now` or less where it should stand."""
+        """Return the tick that time should have reached; `now` or less where time should not advance."""
         if self.lockstep:
-            return min([self.wanted, *(task.limit for task in tasks if task.ticking)])
+            return min([self.requested, *(task.limit for task in tasks if task.ticking)])
         due = self._origin + int((time.monotonic() - self._begin) * self.speed / TICK)
         if self.speed <= 1.0:
             return due
         limit, self.waits_for = self._limit(now, due, tasks)
         if limit is None:
             return due
-        # what passes while time waits is not made up for
+        # time that passes during a wait is not made up
         self._begin, self._origin = time.monotonic(), limit
         return limit
 
@@ -84,7 +84,7 @@ class Pace:
         return found
 
     def give_up(self, now: int, due: int) -> None:
-        """Count what the rig is late, where that is too much to be caught up with."""
+        """Add the lateness of the rig to `slipped` where it is too large to be made up."""
         late = (due - now) * TICK / self.speed
         if late > FAR_BEHIND and not self.lockstep:
             self.slipped += late

@@ -1,4 +1,4 @@
-"""The plant of a virtual rig: what an output drives and what inputs see."""
+"""The plant of a virtual rig, driven by an output and measured by inputs."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ticks = NDArray[np.int64]
 TICK = 1e-9
-"""Unit of all instants of a rig, s: whole numbers of it are equal or not, with no rounding in between."""
+"""Unit of all instants of a rig, s; integer ticks compare exactly, without rounding."""
 
 
 class Plant(Protocol):
-    """What goes on for as long as a rig is served."""
+    """A simulated or recorded plant that runs for as long as a rig is served."""
 
     now: int
     """The time reached, in ticks."""
     seed: int
-    """Of the noise on its signals."""
+    """Seed of the noise on its signals."""
     fineness: float
-    """Steps that it makes in a second by itself, where that is sampled."""
+    """Steps that it makes by itself in a second of its time."""
 
     @property
     def state(self) -> dict[str, float]:
-        """What inputs could see now, by the name of the signal."""
+        """The present values of the signals for inputs, by name."""
 
     def truth(self, volts: float) -> dict[str, float]:
-        """Return what the control service says of it, where a voltage drives it."""
+        """Return the values that the control service reports, with the given voltage at the exciter."""
 
     def noise_of(self, signal: str) -> float:
-        """Return the rms of the noise on a signal, V; the empty one is the voltage of an output."""
+        """Return the rms of the noise on a signal, V; the empty name stands for the voltage of an output."""
 
     def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
-        """Go on to instants, a voltage held before each; return what inputs could see there, by the name of the signal.
+        """Advance to instants, with a voltage held before each; return the signals there, by name.
 
-        Instants are ticks, ascending, after `now`; volts are of the output that drives it, until each instant. All have
+        Instants are ticks, ascending, after `now`; volts are those of the driving output until each instant. All have
         shape (sample,).
         """
 
-    def begin_anew(self, tick: int) -> None:
-        """Hear that an input task has its first edge at a tick."""
+    def restart(self, tick: int) -> None:
+        """Note that an input task has its first edge at a tick."""
 
     def close(self) -> None:
-        """Free what it holds."""
+        """Release its resources."""

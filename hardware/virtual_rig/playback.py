@@ -1,4 +1,4 @@
-"""A recording as the plant of a virtual rig: what was measured once is on the inputs again."""
+"""A recording as the plant of a virtual rig: its channels are played back on the inputs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from vibroimpact.hardware.virtual_rig.wiring import Wire
 from vibroimpact.orchestrator.scene.problems import nearest
 
 _GAP = 1.5
-"""Intervals of an even axis from which on two samples have a gap between them."""
+"""Minimum distance of two samples that counts as a gap, intervals of an even axis."""
 
 
 class Track:
-    """A channel of a recording as a function of time: straight from sample to sample, held over gaps and at the ends.
+    """A channel of a recording as a function of time: linear between samples, held over gaps and at the ends.
 
     Playback begins at the channel's time `begin`, s; the factor is V for a unit of the channel, or 1.
 
@@ -55,7 +55,7 @@ class Track:
 
 
 class Playback:
-    """A recording on the inputs of a device; it begins with the first edge of each input task, and holds its end.
+    """A recording on the inputs of a device; it begins at the first edge of each input task, and holds its end.
 
     The time reached is `now`, in ticks. A file that is no recording raises DatasetError. An input wired to a missing
     channel, or to one whose unit needs an amplification, raises UsageError.
@@ -75,32 +75,32 @@ class Playback:
         self.now, self._origin = 0, 0
         self.seed, self.fineness = 0, 0.0
 
-    def begin_anew(self, tick: int) -> None:
-        """Let the recording begin at a tick."""
+    def restart(self, tick: int) -> None:
+        """Begin the recording at a tick."""
         self._origin = tick
 
     def noise_of(self, signal: str) -> float:
-        """Return 0: a recording has the noise that it was made with."""
+        """Return 0: a recording contains the noise of its measurement."""
         return 0.0
 
     def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
-        """Go on to instants; return the channels there. No voltage changes them."""
+        """Advance to instants; return the channels there, which no voltage changes."""
         self.now = int(instants[-1])
         times: Floats = np.asarray((instants - self._origin) * TICK, dtype=np.float64)
         return {signal: track.at(times) for signal, track in self._tracks.items()}
 
     @property
     def state(self) -> dict[str, float]:
-        """The channels now."""
+        """The present values of the channels."""
         now: Floats = np.asarray([(self.now - self._origin) * TICK], dtype=np.float64)
         return {signal: float(track.at(now)[0]) for signal, track in self._tracks.items()}
 
     def truth(self, volts: float) -> dict[str, float]:
-        """Return the channels now, in V or in their units."""
+        """Return the present values of the channels, in V or in their units."""
         return self.state
 
     def close(self) -> None:
-        """Nothing is left open."""
+        """Do nothing: no file stays open."""
 
 
 def _track(recording: Recording, wire: Wire, begin: float, where: str, file: str) -> Track:

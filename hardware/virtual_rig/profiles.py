@@ -1,4 +1,4 @@
-"""The devices that a virtual rig can be."""
+"""The devices that a virtual rig can model."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from dataclasses import dataclass
 from vibroimpact.hardware.daqmx import constants
 
 TIMEBASE = 100e6
-"""Clock of which sample clocks are whole fractions, Hz, as in NI's X Series."""
+"""Clock that sample clocks divide by an integer, Hz, as in NI's X Series."""
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What a device can do."""
+    """The capabilities of a device."""
 
     product: str
     category: int
-    """NI's number of the kind of product."""
+    """NI's number of the product category."""
     bits: int
-    """Of inputs and outputs."""
+    """Resolution of inputs and outputs."""
     inputs: int
     outputs: int
-    """Analog channels, as `inputs`."""
+    """Number of analog channels, as `inputs`."""
     ranges: tuple[float, ...]
-    """Input ranges, V, each to both sides of 0; the smallest first."""
+    """Input ranges, V, each to both sides of 0, in ascending order."""
     output_range: float
-    """V, to both sides of 0."""
+    """Output range, V, to both sides of 0."""
     conversion_rate: float
-    """Samples per second: of all channels together where they are multiplexed, of each where not."""
+    """Conversions per second: of all channels together if they are multiplexed, else of each channel."""
     simultaneous: bool
     """Whether all channels are sampled at once."""
     output_rate: float
@@ -37,7 +37,7 @@ class Profile:
     """Whether inputs inside the device measure its outputs, as `Dev1/_ao0_vs_aognd`."""
 
     def highest_rate(self, channels: int) -> float:
-        """Return the highest sample rate of so many inputs, Hz."""
+        """Return the highest sample rate for a number of inputs, Hz."""
         return self.conversion_rate if self.simultaneous else self.conversion_rate / max(channels, 1)
 
     @staticmethod
@@ -47,7 +47,7 @@ class Profile:
         >>> round(Profile.clock_rate(44_100.0, 1e6), 1), Profile.clock_rate(5000.0, 1e6)
         (44091.7, 5000.0)
         """
-        # a rate of 1e9 / 3 is rounded itself: a divisor of 3.0000000004 is 3
+        # a rate of 1e9 / 3 is itself rounded: a divisor of 3.0000000004 is 3
         least = math.ceil(TIMEBASE / highest * (1.0 - 1e-12))
         return TIMEBASE / max(round(TIMEBASE / rate), least)
 
@@ -56,7 +56,7 @@ class Profile:
         return 0.0 if self.simultaneous else 1.0 / self.conversion_rate
 
     def input_range(self, low: float, high: float) -> float | None:
-        """Return the smallest range that holds an interval of voltages; None where there is none.
+        """Return the smallest range that contains an interval of voltages; None if no range does.
 
         >>> PROFILES["labpc+"].input_range(-0.3, 0.2)
         0.5
@@ -65,7 +65,7 @@ class Profile:
 
 
 PROFILES = {
-    # the thesis's board: 12 us for a conversion; gains of 1 to 100
+    # board of the thesis: 12 us per conversion; gains of 1 to 100
     "labpc+": Profile(
         product="Lab-PC+ (virtual)",
         category=constants.ProductCategory.E_SERIES_DAQ.value,

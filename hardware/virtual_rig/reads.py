@@ -16,7 +16,7 @@ from vibroimpact.hardware.virtual_rig.tasks import INPUT, State, Task
 from vibroimpact.hardware.virtual_rig.waveforms import put_waveforms
 
 _MOST_AT_ONCE = 2**24
-"""Samples of one read, of all channels: 128 MiB of doubles."""
+"""Maximum samples of one read, of all channels: 128 MiB of doubles."""
 _ALL_THERE_IS = -1
 
 
@@ -24,7 +24,7 @@ class Reads(Answers):
     """Answers the calls that read."""
 
     def _read(self, request: Any, size: int) -> tuple[NDArray[np.int16], Floats, int, int]:
-        """Return codes of samples, shape (channel, sample), V of a step of them, their number, the status."""
+        """Return the codes of samples, shape (channel, sample), V per step, their number and the status."""
         task = self._task(request)
         if task.kind != INPUT:
             raise Refusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, task.name)
@@ -62,13 +62,13 @@ class Reads(Answers):
 
     def _buffered(self, task: Task, count: int, timeout: float) -> tuple[NDArray[np.int16], int]:
         if task.needed is not None and count > task.needed - task.position:
-            count = task.needed - task.position  # what is left of a finite task is read without an error
+            count = task.needed - task.position  # a read of the rest of a finite task is no error
             if count <= 0:
                 raise Refusal(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, task.name, read=0)
         pieces: list[NDArray[np.int16]] = [task.take(0)]
         left, end = count, np.inf if timeout < 0 else time.monotonic() + timeout
         while left:
-            # a read may be larger than the buffer, which it empties as it fills
+            # a read may exceed the buffer, which it empties as it fills
             piece = min(left, max(task.length // 2, 1))
             there = self._wait_for_samples(
                 task, piece, timeout if timeout < 0 else max(end - time.monotonic(), 0.0)
@@ -101,16 +101,16 @@ class Reads(Answers):
 
     @staticmethod
     def _laid_out(values: NDArray[Any], request: Any) -> NDArray[Any]:
-        """Return samples in the order that was asked for; by channel each has the room that it asked for."""
+        """Return samples in the requested order; by channel, each is padded to the requested length."""
         if (request.fill_mode_raw or request.fill_mode) == BY_SCAN:
             return np.ascontiguousarray(values.T).ravel()
-        asked = max(request.num_samps_per_chan, values.shape[1])
-        padded = np.zeros((len(values), asked), dtype=values.dtype)
+        requested = max(request.num_samps_per_chan, values.shape[1])
+        padded = np.zeros((len(values), requested), dtype=values.dtype)
         padded[:, : values.shape[1]] = values
         return padded.ravel()
 
     def do_read_analog_f64(self, request: Any, response: Any) -> bytes:
-        """Read volts; the numbers go onto the wire as they are, which is what makes it fast."""
+        """Read volts; the numbers are put into the message as raw bytes, for speed."""
         codes, steps, count, status = self._read(request, request.array_size_in_samps)
         response.status, response.samps_per_chan_read = status, count
         data = self._laid_out(codes * steps, request).tobytes()
@@ -136,15 +136,15 @@ class Reads(Answers):
         self._read_codes(np.int16, request, response)
 
     def do_read_binary_u16(self, request: Any, response: Any) -> None:
-        """Read the codes of the converter, their 16 bits taken as a number without a sign."""
+        """Read the codes of the converter, their 16 bits taken as unsigned numbers."""
         self._read_codes(np.uint16, request, response)
 
     def do_read_binary_i32(self, request: Any, response: Any) -> None:
-        """Read the codes of the converter as wider numbers."""
+        """Read the codes of the converter as 32-bit numbers."""
         self._read_codes(np.int32, request, response)
 
     def do_read_binary_u32(self, request: Any, response: Any) -> None:
-        """Read the codes of the converter as wider numbers without a sign."""
+        """Read the codes of the converter as unsigned 32-bit numbers."""
         self._read_codes(np.uint32, request, response)
 
     def _read_codes(self, kind: type[np.integer[Any]], request: Any, response: Any) -> None:
@@ -158,7 +158,7 @@ class Reads(Answers):
         response.status, response.samps_read, response.num_bytes_per_samp = status, count, 2
         data = np.ascontiguousarray(codes.T).tobytes()
         rest = request.array_size_in_bytes - len(data)
-        # what is left of an array that no scan fits into any more is cleared
+        # the rest of an array, too small for a scan, is cleared
         response.read_array = data + bytes(rest if 0 < rest < 2 * len(codes) else 0)
 
     def do_read_analog_waveforms(self, request: Any, response: Any) -> None:
@@ -172,7 +172,7 @@ class Reads(Answers):
 
 
 def _varint(number: int) -> bytes:
-    """Return a length as protocol buffers write it.
+    """Return a length encoded as a protocol buffer varint.
 
     >>> _varint(300)
     b'\\xac\\x02'

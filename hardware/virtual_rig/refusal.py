@@ -1,4 +1,4 @@
-"""What the virtual rig refuses, with the codes of NI-DAQmx."""
+"""The refusals of the virtual rig, with the codes of NI-DAQmx."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ class Refusal(Exception):
     Attributes
     ----------
     code : int
-        NI's.
+        NI's code.
     text : str
     read, written : int or None
-        Samples per channel that moved before.
+        Samples per channel that were moved before the failure.
     """
 
     def __init__(
@@ -86,14 +86,14 @@ class Refusal(Exception):
         super().__init__(self.text)
 
     def after(self, *, read: int | None = None, written: int | None = None) -> Refusal:
-        """Return the same with the samples per channel that a call has moved before."""
+        """Return the same refusal with the samples per channel that the call has moved before."""
         again = Refusal(DAQmxErrors(self.code), read=read, written=written)
         again.text = self.text
         return again
 
 
 def text_of(code: int) -> str:
-    """Return the words for a code; none for one that NI-DAQmx does not have.
+    """Return the text of a code; empty for a code that NI-DAQmx does not have.
 
     >>> text_of(-200089), text_of(-12345)
     ('The name is that of another task', '')

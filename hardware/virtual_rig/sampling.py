@@ -14,13 +14,13 @@ from vibroimpact.hardware.virtual_rig.settings import RigSettings
 from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Task
 
 Levels = Callable[[int, Ticks], Floats]
-"""V of an output, by its number, just after ticks."""
+"""Voltages of an output, by its number, just after ticks."""
 Seen = Callable[[str, Ticks], Floats]
-"""What the plant shows at ticks, by the name of a signal."""
+"""Values of a signal of the plant, by its name, at ticks."""
 
 
 class Sampling:
-    """The analog side of a device; `held` are the V of the outputs now, shape (output,)."""
+    """The analog side of a device; `held` are the present voltages of the outputs, V, shape (output,)."""
 
     def __init__(self, settings: RigSettings, profile: Profile, plant: Plant) -> None:
         self._wiring, self._plant = settings.wiring, plant
@@ -30,11 +30,11 @@ class Sampling:
 
     @property
     def driving(self) -> float:
-        """The voltage that drives the plant now."""
+        """The present voltage of the driving output."""
         return 0.0 if self._wiring.driver is None else float(self.held[self._wiring.driver])
 
     def advance(self, running: Sequence[Task], target: int) -> set[str]:
-        """Let tasks and plant go on to a tick; return the names of the outputs that ran empty."""
+        """Advance tasks and plant to a tick; return the names of the tasks whose output ran empty."""
         updates = {task.name: task.generated(target) for task in running if task.kind == OUTPUT}
         edges = {task.name: task.samples_until(target) for task in running if task.kind == INPUT}
         parts = [ticks for ticks, _, _ in updates.values()]
@@ -47,7 +47,7 @@ class Sampling:
         volts = np.zeros(len(befores)) if driver is None else levels(driver, befores)
         for task in running:
             if task.kind == INPUT and task.count == 0 and edges[task.name][0].size:
-                self._plant.begin_anew(int(task.edge(0)))
+                self._plant.restart(int(task.edge(0)))
         found = self._plant.advance(instants, volts)
         for task in running:
             if task.kind == INPUT:
@@ -82,7 +82,7 @@ class Sampling:
         for place, (channel, ticks) in enumerate(zip(task.channels, edges, strict=True)):
             if ticks.size:
                 task.keep(place, self._codes(channel, ticks, levels, seen))
-        task.tell(task.sampled[-1])
+        task.report(task.sampled[-1])
 
     def _codes(self, channel: Channel, ticks: Ticks, levels: Levels, seen: Seen) -> NDArray[np.int16]:
         wire = self._wiring.inputs.get(channel.number)
@@ -91,7 +91,7 @@ class Sampling:
         elif wire is None:
             volts = np.zeros(ticks.shape)
         else:
-            # an edge of a shared clock samples what was put out before it
+            # an edge of a shared clock samples the output value before that edge
             seen_there = seen(wire.signal, ticks) if wire.output is None else levels(wire.output, ticks - 1)
             volts = seen_there if wire.amplification is None else wire.amplification * seen_there
         return self.inputs.codes(channel, volts)
@@ -100,10 +100,10 @@ class Sampling:
         if ticks.size:
             for place, channel in enumerate(task.channels):
                 self.held[channel.number] = samples[place, -1]
-        task.tell(task.count + ticks.size)
+        task.report(task.count + ticks.size)
 
     def now(self, channels: Sequence[Channel]) -> NDArray[np.int16]:
-        """Return what inputs have now, without a clock; shape (channel,)."""
+        """Return the present codes of inputs, without a clock; shape (channel,)."""
         ticks = np.array([self._plant.now])
         levels = self._levels((), {})
         state = self._plant.state

@@ -17,14 +17,15 @@ from vibroimpact.orchestrator.scene.measuring_models import DRIVE
 from vibroimpact.orchestrator.scene.models import MOST_IMPACTS_PER_POINT
 
 MOST_STEPS = 100_000
-"""Of one call of the session: rows that are in memory at once."""
+"""Maximum rows held in memory, of one call of the session."""
 
 
 class ScenePlant:
-    """A scene that goes on for as long as the rig is served.
+    """A scene that runs for as long as the rig is served.
 
-    The time reached is `now`, in ticks, and `state` the V of its channels then. SceneError, UsageError: the scene is
-    wrong, or no plant: a chain, components, a replay, a base that moves, or without what is wired.
+    The time reached is `now`, in ticks, and `state` the voltages of its channels then. A wrong scene raises
+    SceneError. A scene that cannot be a plant raises UsageError: a chain, components, a replay, a moving base, or one
+    without a wired channel.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -42,17 +43,17 @@ class ScenePlant:
         self.advance(np.array([1]), np.zeros(1))
 
     def truth(self, volts: float) -> dict[str, float]:
-        """Return displacement (m), velocity (m/s) and forces (N) now."""
+        """Return the present displacement (m), velocity (m/s) and forces (N)."""
         return {**self._session.truth, "exciter_force": self._session.exciter_force(volts)}
 
     def noise_of(self, signal: str) -> float:
-        """Return the rms of the noise on a channel; on the wire of an output it is that of the drive."""
+        """Return the rms of the noise on a channel; the wire of an output has that of the drive."""
         return 0.0 if self._noise is None else self._noise.of(signal or DRIVE)
 
     def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
-        """Go on to instants, a voltage held before each; return the channels there, V before noise and conversion."""
+        """Advance to instants, with a voltage held before each; return the channels there, V before noise and ADC."""
         times = np.concatenate([[self.now], instants]) * TICK
-        # after months some ticks round to the same time: nothing happens between them
+        # after months some ticks round to the same time: the plant does not advance
         later = np.diff(times) > 0.0
         rows = {name: [np.array([value])] for name, value in self.state.items()}
         if later.any():
@@ -73,16 +74,16 @@ class ScenePlant:
             yield self._session.advance(times[begin : end + 1], volts[begin:end])
             begin = end
 
-    def begin_anew(self, tick: int) -> None:
-        """A plant goes on, whoever measures it."""
+    def restart(self, tick: int) -> None:
+        """Do nothing: the plant runs on when a measurement begins."""
 
     def close(self) -> None:
-        """Free the components."""
+        """Release the components."""
         self._session.close()
 
 
 def plant_scene(settings: RigSettings) -> Scene:
-    """Return the scene of a rig as its plant: without its sweep, for as long as it is served."""
+    """Return the scene of a rig as its plant: without its sweep, and without an end."""
     assert settings.rig.scene is not None
     scene = load_scene(settings.beside(settings.rig.scene))
     if not scene.is_lone_body:
@@ -96,5 +97,5 @@ def plant_scene(settings: RigSettings) -> Scene:
 
 
 def opened_plant(settings: RigSettings) -> Plant:
-    """Return the plant of a rig, its scene or its recording."""
+    """Return the plant of a rig: its scene or its recording."""
     return Playback(settings) if settings.rig.recording is not None else ScenePlant(settings)

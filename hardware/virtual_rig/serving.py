@@ -22,13 +22,13 @@ HOST = "127.0.0.1"
 DESCRIPTORS = 16
 """Descriptors that the server and one program on it open: 12 measured on Linux."""
 THREADS = 64
-"""Each event that a program listens to holds one."""
+"""Maximum concurrent calls; each event that a program listens to occupies one."""
 
 
 class RigServer:
-    """A virtual rig that is served until it is closed, at `address`, `host:port`; port 0 is any free one.
+    """A virtual rig, served until it is closed, at `address`, `host:port`; port 0 is any free one.
 
-    SceneError, UsageError: the plant is none, the port is taken, or this machine lacks what a rig needs.
+    A wrong plant raises SceneError or UsageError; a taken port, or a machine without the means of a rig, UsageError.
     """
 
     def __init__(self, settings: RigSettings, port: int = 0) -> None:
@@ -62,7 +62,7 @@ class RigServer:
         stopped.wait()
 
     def vanish(self) -> None:
-        """End all calls at once, as if the machine of the server were gone."""
+        """End all calls at once, as if the machine of the server had failed."""
         threading.Thread(target=self._server.stop, args=(None,), name="rig end").start()
 
     # ---- NI's service ----
@@ -99,7 +99,7 @@ class RigServer:
         except Refusal as refusal:
             _abort(context, refusal)
         context.add_callback(lambda: stream.heard.put(None))
-        context.send_initial_metadata(())  # or the client waits for ever
+        context.send_initial_metadata(())  # without it the client waits for ever
         yield from messages_of(stream, make)
 
     # ---- the control service ----
@@ -120,13 +120,13 @@ class RigServer:
 
 
 class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]  # grpc carries no types
-    """Finds what answers a method of a service by its name."""
+    """Finds the function that answers a method of a service by its name."""
 
     def __init__(self, service: str, find: Callable[[str], Any]) -> None:
         self._prefix, self._find = f"/{service}/", find
 
     def service(self, handler_call_details: Any) -> Any:
-        """Return what answers a call; None where it is of another service."""
+        """Return the handler of a call; None for another service."""
         method: str = handler_call_details.method
         return self._find(method.removeprefix(self._prefix)) if method.startswith(self._prefix) else None
 
@@ -145,7 +145,7 @@ def _abort(context: Any, refusal: Refusal) -> NoReturn:
 
 @contextmanager
 def served(settings: RigSettings, port: int = 0) -> Iterator[RigServer]:
-    """Serve a rig for as long as the block lasts."""
+    """Serve a rig for the duration of the block."""
     server = RigServer(settings, port)
     try:
         yield server

@@ -1,4 +1,4 @@
-"""The file of a virtual rig: what is its plant, which device measures it, what is wired to what."""
+"""The file of a virtual rig: its plant, its device and the wiring."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.scene.problems import (
 
 TABLES = ("rig", "wiring")
 WORST_CLOCK = 1e4
-"""Error of an input clock, ppm."""
+"""Maximum error of an input clock, ppm."""
 
 
 class RigTable(BaseModel):
@@ -62,7 +62,7 @@ class RigSettings(BaseModel):
     wiring: Wiring
 
     def beside(self, name: str) -> Path:
-        """Return a file that is given from where the file of the rig is."""
+        """Return the path of a file that is given relative to the rig file."""
         return Path(self.source).parent / name
 
 
@@ -72,7 +72,7 @@ def read_rig(path: Path) -> RigSettings:
     Raises
     ------
     UsageError
-        It cannot be read, is no TOML, or describes no rig: all problems, a line for each.
+        It cannot be read, is no TOML, or describes no rig; every problem has a line.
     """
     document = document_of(text_of(path, "the file of a rig"), str(path))
     problems: list[Problem] = []

@@ -1,4 +1,4 @@
-"""Tasks of the virtual device: channels, sample clock, buffers and states, as NI-DAQmx has them."""
+"""Tasks of the virtual device: channels, sample clock, buffers and states, as in NI-DAQmx."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ ALLOW_REGENERATION = constants.RegenerationMode.ALLOW_REGENERATION.value
 INPUT = constants.ChannelType.ANALOG_INPUT.value
 OUTPUT = constants.ChannelType.ANALOG_OUTPUT.value
 NEVER = 2**62
-"""A tick that does not come."""
+"""A tick that is never reached."""
 MOST_SAMPLES = 2**26
-"""Samples of a buffer, of all its channels."""
+"""Maximum samples of a buffer, of all its channels."""
 FROM_FIRST = constants.ReadRelativeTo.FIRST_SAMPLE.value
 FROM_POSITION = constants.ReadRelativeTo.CURRENT_READ_POSITION.value
 FROM_NEWEST = constants.ReadRelativeTo.MOST_RECENT_SAMPLE.value
-"""Where a read begins."""
+"""Origins of a read, by NI's numbers."""
 
-# default input buffers of continuous tasks, samples per channel up to a rate (Hz)
+# default input buffers of continuous tasks: samples per channel, up to a rate (Hz)
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1e6, 100_000), (np.inf, 1_000_000))
 
 
 class State(Enum):
-    """Where a task is."""
+    """The state of a task."""
 
     verified = "verified"
     reserved = "reserved"
@@ -48,7 +48,7 @@ class Channel:
     Attributes
     ----------
     output : int or None
-        Of an input inside the device: the output that it measures.
+        The output that an input inside the device measures.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Channel:
 
 @dataclass(slots=True)
 class Clock:
-    """A sample clock as it was asked for."""
+    """A sample clock with its requested values."""
 
     rate: float
     mode: int
@@ -72,12 +72,12 @@ class Clock:
 
 
 UNSET_CLOCK = Clock(1000.0, CONTINUOUS, 1000)
-"""What the properties of a clock say before a program sets them."""
+"""Properties of a clock before a program sets them."""
 
 
 @dataclass(slots=True)
 class EventStream:
-    """Who hears of an event: numbers of samples, or the status at the end; None ends the stream."""
+    """The listener of an event: sample counts, or the status at the end; None ends the stream."""
 
     heard: queue.SimpleQueue[int | None] = field(default_factory=queue.SimpleQueue)
     every: int = 0
@@ -85,37 +85,37 @@ class EventStream:
 
 
 class Task:
-    """What inputs and outputs have in common.
+    """Common state of input and output tasks.
 
     Attributes
     ----------
     state : State
     kept : bool
-        Reserved by `TaskControl`, so that it stays so when it stops.
+        Reserved by `TaskControl`; the reservation outlasts a stop.
     start : int or None
         Tick of the first edge of its clock; None: it does not run, or waits for a trigger.
     rate : float
-        Of the clock that runs, Hz; not quite what was asked for, where the clock is in error.
+        Rate of the running clock, Hz; it differs from the requested rate by the clock error.
     source : Task or None
-        Whose clock it has.
+        The task whose clock it shares.
     edges_before : int
-        Edges of the clock that were over when the task began.
+        Edges of the clock before the task began.
     count : int
-        Edges of the clock that are over, with the samples of all channels.
+        Elapsed edges of the clock, each with the samples of all channels.
     sampled : list of int
-        Samples of each channel of an input; of inputs one after the other the first have more.
+        Samples of each channel of an input; of multiplexed inputs the first have more.
     triggered : bool
-        The edge that it waits for has come, or it waits for none.
+        The awaited trigger edge has occurred, or the task waits for none.
     done : bool
         It has ended by itself.
     failure : Refusal or None
-        Why it has ended.
+        The reason of its end; None: no failure.
     implicit : bool
-        A read has started it, so that it stops when all of it is read.
+        It was started by a read, and stops when all its samples are read.
     timing, clocked : Clock, bool
         The properties of its sample clock, and whether it has one.
     relative, offset, overwrites : int, int, bool
-        Where a read begins, and whether unread samples may be written over.
+        The origin and offset of a read, and whether unread samples may be overwritten.
     """
 
     def __init__(self, name: str, device: str, profile: Profile) -> None:
@@ -132,28 +132,28 @@ class Task:
         self.count = 0
         self.done = self.implicit = self.triggered = False
         self.failure: Refusal | None = None
-        self.asked_buffer: int | None = None
+        self.requested_buffer: int | None = None
         self.regeneration = ALLOW_REGENERATION
         self.buffer: NDArray[Any] = np.empty((0, 0))
         self.sampled: list[int] = []
-        self.position = 0  # samples per channel that the program has read or written
+        self.position = 0  # samples per channel read or written by the program
         self.every: EventStream | None = None
         self.ended: EventStream | None = None
 
     # ---- set up ----
 
     def refuse_running(self) -> None:
-        """Refuse a change while the task runs."""
+        """Raise Refusal for a change while the task runs."""
         if self.state is State.running:
             raise Refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, self.name)
 
     def refuse_empty(self) -> None:
-        """Refuse what needs channels."""
+        """Raise Refusal for a task without channels."""
         if not self.channels:
             raise Refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK, self.name)
 
     def add(self, kind: int, channels: list[Channel]) -> None:
-        """Add channels, or none of them."""
+        """Add all the channels, or none of them."""
         self.refuse_running()
         if self.kind not in (0, kind):
             raise Refusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, self.name)
@@ -170,39 +170,39 @@ class Task:
 
     @property
     def clock_rate(self) -> float:
-        """Rate of its sample clock, Hz: the timebase over the whole number that is nearest to the rate asked for."""
+        """Rate of its sample clock, Hz: the timebase over the integer that comes nearest to the requested rate."""
         return self.profile.clock_rate(self.timing.rate, self.highest_rate)
 
     @property
     def holder(self) -> str:
-        """The task in words, as one that holds what another one needs: name, channels, and what it does."""
+        """The task as the holder of a resource, in words: name, channels and state."""
         word = "ai" if self.kind == INPUT else "ao"
         names = ", ".join(f"{self.device}/{word}{channel.number}" for channel in self.channels)
         doing = "runs" if self.state is State.running and not self.done else "is reserved"
         return f"task {self.name!r}, which {doing} ({names})"
 
     def set_clock(self, clock: Clock) -> None:
-        """Give the task a sample clock; `checks.verify` refuses what the device does not have of it."""
+        """Give the task a sample clock; `checks.verify` refuses unsupported settings."""
         self.refuse_running()
         self.refuse_empty()
         self.timing, self.clocked = clock, True
 
     def set_buffer(self, samples: int | None) -> None:
-        """Ask for a buffer of so many samples per channel; None: the size that NI's driver takes."""
+        """Set the buffer size in samples per channel; None: the default of NI's driver."""
         self.refuse_running()
         self.refuse_empty()
         if samples is not None and samples < 1:
             raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a buffer of {samples} samples per channel")
-        self.asked_buffer = samples
+        self.requested_buffer = samples
 
     def refuse_large_buffer(self, samples: int) -> None:
-        """Refuse a buffer that has no room."""
+        """Raise Refusal for a buffer above `MOST_SAMPLES`."""
         if samples > MOST_SAMPLES // len(self.channels):
             raise Refusal(DAQmxErrors.PAL_MEMORY_FULL, f"{samples} samples of {len(self.channels)} channels")
 
     @property
     def highest_rate(self) -> float:
-        """Of its channels, Hz."""
+        """Highest sample rate with its channels, Hz."""
         if self.kind == OUTPUT:
             return self.profile.output_rate
         return self.profile.highest_rate(len(self.channels))
@@ -214,7 +214,7 @@ class Task:
 
     @property
     def length(self) -> int:
-        """Samples per channel of the buffer."""
+        """Length of the buffer, samples per channel."""
         return int(self.buffer.shape[1])
 
     @property
@@ -223,10 +223,10 @@ class Task:
         return self.clock.samples if self.clock is not None and self.clock.mode == FINITE else None
 
     def default_buffer(self) -> int:
-        """Return the samples per channel that an input buffer has."""
+        """Return the length of an input buffer, samples per channel."""
         assert self.clock is not None
-        if self.asked_buffer:
-            return self.asked_buffer
+        if self.requested_buffer:
+            return self.requested_buffer
         if self.clock.mode == FINITE:
             return self.clock.samples
         usual = next(size for rate, size in _DEFAULT_BUFFERS if self.clock.rate <= rate)
@@ -235,7 +235,7 @@ class Task:
     # ---- run ----
 
     def begin(self) -> None:
-        """Be running, with no edge of the clock over."""
+        """Enter the running state, with no edge of the clock elapsed."""
         if self.kind == INPUT and self.clock is not None:
             self.refuse_large_buffer(self.default_buffer())
         if self.every is not None and self.clock is None:
@@ -251,7 +251,7 @@ class Task:
             self.buffer = np.zeros((len(self.channels), self.default_buffer()), dtype=np.int16)
 
     def stop(self) -> None:
-        """Stop; what was reserved by itself is given back."""
+        """Stop; an implicit reservation is released."""
         self.state = State.reserved if self.kept else State.verified
         self.last_start = self.last_start if self.start is None else self.start
         self.start = None
@@ -260,14 +260,14 @@ class Task:
             self.buffer = np.empty((0, 0))
 
     def finish(self, failure: Refusal | None = None) -> None:
-        """End by itself."""
+        """End the task by itself."""
         self.done, self.failure = True, failure
         if self.ended is not None:
             self.ended.heard.put(failure.code if failure else 0)
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing of it is to come: without a clock, nothing ever is."""
+        """Whether it has ended or has no further edges; always so without a clock."""
         return self.done or self.state is not State.running or self.clock is None
 
     @property
@@ -276,25 +276,25 @@ class Task:
         return self.start is not None and not self.done
 
     def edge(self, number: Any) -> Any:
-        """Return the ticks of edges of the clock, by their numbers; also of one that has just stopped."""
+        """Return the ticks of clock edges, by their numbers; also for a task that has just stopped."""
         start = self.last_start if self.start is None else self.start
         place = np.asarray(number) + self.edges_before
         return start + np.rint(place / (self.rate * TICK)).astype(np.int64)
 
     def follow(self, other: Task) -> None:
-        """Have the clock of another task, from its next edge on."""
+        """Share the clock of another task, from its next edge on."""
         self.start, self.rate, self.source = other.start, other.rate, other
         self.edges_before = other.edges_before + other.count - self.count
 
     def retune(self, rate: float) -> None:
-        """Go on at another rate from the next edge on."""
+        """Change the rate from the next edge on."""
         following = int(self.edge(self.count))
         self.start = following - round((self.count + self.edges_before) / (rate * TICK))
         self.rate = rate
 
     @property
     def limit(self) -> int:
-        """The last tick before its buffer runs empty or over."""
+        """The last tick before its buffer runs empty or overflows."""
         whole = self.needed
         last = self.position + self.length if self.kind == INPUT else self.position
         bound = self.kind == INPUT or not self.regenerates
@@ -303,7 +303,7 @@ class Task:
         return int(self.edge(last)) - 1
 
     def edges_until(self, tick: int) -> int:
-        """Return how many edges there are up to a tick, it included."""
+        """Return the number of edges up to and including a tick."""
         assert self.start is not None
         if tick < self.start:
             return 0
@@ -315,12 +315,12 @@ class Task:
         return count if self.needed is None else min(count, self.needed)
 
     def due(self, tick: int) -> int:
-        """Return how many edges its clock gives up to a tick: none, once an output has run empty."""
+        """Return the number of edges that its clock passes on up to a tick; it stops once an output has run empty."""
         edges = self.edges_until(tick)
         return min(edges, self.position) if self.kind == OUTPUT and not self.regenerates else edges
 
-    def tell(self, count: int) -> None:
-        """Say to the listener that so many edges are over."""
+    def report(self, count: int) -> None:
+        """Report the number of elapsed clock edges to the listener."""
         self.count = count
         stream = self.every
         if stream is not None:
@@ -332,16 +332,16 @@ class Task:
 
     @property
     def room(self) -> int:
-        """Samples per channel that can be written."""
+        """Free space of the buffer, samples per channel."""
         return min(max(self.length - (self.position - self.count), 0), self.length)
 
     @property
     def regenerates(self) -> bool:
-        """Whether samples go out again when there are no new ones."""
+        """Whether samples are repeated when there are no new ones."""
         return bool(self.regeneration == ALLOW_REGENERATION)
 
     def write(self, samples: Floats) -> None:
-        """Append samples, shape (channel, sample), for which there is room."""
+        """Append samples, shape (channel, sample), that fit into the free space."""
         places = (self.position + np.arange(samples.shape[1])) % self.length
         self.buffer[:, places] = samples
         self.position += samples.shape[1]
@@ -351,7 +351,7 @@ class Task:
         due = self.due(until)
         starved = not self.regenerates and self.edges_until(until) > self.position
         numbers = np.arange(self.count, due)
-        # what was written before the start and is shorter than the buffer goes round by itself
+        # samples written before the start repeat even if they do not fill the buffer
         round_length = min(self.length, self.position) if self.position < self.length else self.length
         return self.edge(numbers), self.buffer[:, numbers % max(round_length, 1)], starved
 
@@ -364,11 +364,11 @@ class Task:
 
     @property
     def overrun(self) -> bool:
-        """Whether samples that nobody has read are lost, which ends the task."""
+        """Whether unread samples are lost, which ends the task."""
         return self.available > self.length and not self.overwrites
 
     def seek(self) -> None:
-        """Let the next read begin where the program wants it to."""
+        """Move the read position to the origin and offset that the program has set."""
         if self.relative != FROM_POSITION or self.offset:
             origin = {FROM_FIRST: 0, FROM_POSITION: self.position, FROM_NEWEST: self.count}[self.relative]
             if origin + self.offset < 0:
@@ -379,12 +379,12 @@ class Task:
         self.refuse_overwritten()
 
     def refuse_overwritten(self) -> None:
-        """Refuse to read samples that newer ones have taken the place of."""
+        """Raise Refusal where newer samples have overwritten those to be read."""
         if self.available > self.length:
             raise Refusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, self.name, read=0)
 
     def samples_until(self, tick: int) -> list[Ticks]:
-        """Return for each channel the ticks of its samples up to a tick."""
+        """Return the sample ticks of each channel up to a tick."""
         found = []
         for place, count in enumerate(self.sampled):
             late = self.skew * place
@@ -400,7 +400,7 @@ class Task:
         self.sampled[place] = last
 
     def take(self, count: int) -> NDArray[np.int16]:
-        """Return the next samples, shape (channel, sample), which count as read."""
+        """Return the next samples, shape (channel, sample), and advance the read position."""
         places = (self.position + np.arange(count)) % self.length
         self.position += count
         taken: NDArray[np.int16] = self.buffer[:, places]
@@ -408,6 +408,6 @@ class Task:
 
     @property
     def steps(self) -> Floats:
-        """V for a step of the converter, of each channel; shape (channel, 1)."""
+        """V per step of the converter, by channel; shape (channel, 1)."""
         ranges = np.array([[channel.device_range] for channel in self.channels])
         return ranges / 2.0 ** (self.profile.bits - 1)

@@ -1,4 +1,4 @@
-"""The terminals of a device: which task has whose clock, and which edge starts it."""
+"""The terminals of a device: shared clocks, and the edges that start tasks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Terminals:
         return text.strip("/").lower() == f"{self._device}/{word}/{signal}".lower()
 
     def has_clock_of_others(self, task: Task) -> bool:
-        """Return whether a task has the clock of the other direction, for which it waits."""
+        """Return whether a task shares the clock of the other direction, for which it waits."""
         other = "ao" if task.kind == INPUT else "ai"
         return task.clock is not None and self._is(task.clock.source, other, "SampleClock")
 
@@ -33,9 +33,9 @@ class Terminals:
         return found
 
     def arm(self, task: Task, now: int, rate: float) -> None:
-        """Start the clock of a task that runs, if what it waits for is there."""
+        """Start the clock of a running task, if it waits for nothing more."""
         task.rate = rate
-        task.triggered = not task.trigger  # an edge that is over starts nothing
+        task.triggered = not task.trigger  # an earlier edge starts nothing
         self._try(task, now)
 
     def _try(self, task: Task, now: int) -> None:
@@ -51,7 +51,7 @@ class Terminals:
                 self._set_off_by(task)
 
     def _set_off_by(self, task: Task) -> None:
-        """Start the tasks that wait for the clock or the trigger of one that has just started."""
+        """Start the tasks that wait for the clock or the trigger of a task that has just started."""
         for other in filter(_waits, self.followers(task, "StartTrigger")):
             other.triggered = True
             if not self.has_clock_of_others(other):
@@ -63,18 +63,18 @@ class Terminals:
                 self._set_off_by(other)
 
     def end_followers(self, task: Task) -> None:
-        """Let the tasks that have the clock of one that has ended wait for it."""
+        """Let the tasks that share the clock of an ended task wait for it."""
         for other in self.followers(task, "SampleClock"):
             other.start = None
 
     def retune_followers(self, task: Task) -> None:
-        """Let the tasks that have the clock of one go on at its rate."""
+        """Let the tasks that share the clock of a task continue at its rate."""
         for other in self.followers(task, "SampleClock"):
             if other.ticking:
                 other.retune(task.rate)
 
     def pulse(self, terminal: str, now: int) -> int:
-        """Put an edge on a terminal; return how many tasks it has started."""
+        """Put an edge on a terminal; return the number of tasks started."""
         waiting = [
             task
             for task in self._tasks.values()

@@ -8,15 +8,15 @@ from vibroimpact.hardware.virtual_rig.plant import TICK, Floats
 from vibroimpact.hardware.virtual_rig.tasks import Task
 
 _TIMING, _PROPERTIES = 1, 2
-"""Bits of what a client wants beside the samples."""
+"""Bits of the parts that a client requests beside the samples."""
 _SECONDS_TO_1970 = 2_082_844_800
-"""From 1904, where NI's time begins."""
+"""Time from 1904, the origin of NI's time, to 1970, s."""
 
 
 def put_waveforms(response: Any, task: Task, volts: Floats, mode: int, served_at: float) -> None:
     """Put samples just read from a task, shape (channel, sample), into a response.
 
-    `mode` is what is wanted beside the samples; the rig was at 0 at `served_at`, s since 1970.
+    `mode` gives the parts requested beside the samples; the rig was at 0 at `served_at`, s since 1970.
     """
     count = volts.shape[1]
     for place, channel in enumerate(task.channels):

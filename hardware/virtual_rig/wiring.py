@@ -1,4 +1,4 @@
-"""`[wiring]` of a rig file: which output drives the plant, and what each input sees."""
+"""`[wiring]` of a rig file: the output that drives the plant, and the signal on each input."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class WireTable(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """What an input is wired to."""
+    """The source of an input."""
 
     signal: str
-    """A channel of the plant; empty: an output."""
+    """Channel of the plant; empty: an output."""
     amplification: float | None = None
     """V for a unit of the signal; None: not given."""
     output: int | None = None
@@ -44,24 +44,24 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What is wired to what."""
+    """All connections of a rig."""
 
     driver: int | None = None
     """The output that drives the exciter."""
     inputs: dict[int, Wire] = field(default_factory=dict)
-    """By the number of the input."""
+    """Wires by the number of the input."""
 
     @property
     def signals(self) -> list[str]:
-        """Channels of the plant that some input sees, each once."""
+        """Channels of the plant on at least one input, each once."""
         return list(dict.fromkeys(wire.signal for wire in self.inputs.values() if wire.output is None))
 
 
 def wiring_of(raw: object, device: str, played: bool, problems: list[Problem]) -> Wiring | None:
-    """Return the wiring of a document's `wiring`; None, and its problems added to the list, where it is none.
+    """Return the wiring of a document's `wiring`; if it is wrong, None, with its problems added to the list.
 
-    The device is one of `PROFILES`. Of a plant that is a recording (`played`) the channels are not known here, and no
-    output drives it.
+    The device is one of `PROFILES`. The channels of a recording (`played`) are not known here, and no output drives
+    it.
     """
     if not isinstance(raw, dict):
         problems.append(Problem("wiring", "a table", quoted(raw), "Write [wiring]."))
@@ -86,16 +86,16 @@ def wiring_of(raw: object, device: str, played: bool, problems: list[Problem]) -
         problems.append(Problem("wiring", "at least one terminal", "none", _HINT))
         return None
     driver = drivers[0] if drivers else None
-    lost = [
+    undriven = [
         number for number, wire in inputs.items() if wire.signal == DRIVE and driver is None and not played
     ]
-    if lost:
+    if undriven:
         hint = 'Write ao0 = "exciter".'
         problems.append(
-            Problem(f"wiring.ai{lost[0]}", "an output at the exciter for the drive", "none", hint)
+            Problem(f"wiring.ai{undriven[0]}", "an output at the exciter for the drive", "none", hint)
         )
         return None
-    # the voltage that drives is an output like others
+    # the driving voltage is an output like others
     inputs = {
         number: Wire("", wire.amplification, driver) if wire.signal == DRIVE and not played else wire
         for number, wire in inputs.items()
@@ -104,7 +104,7 @@ def wiring_of(raw: object, device: str, played: bool, problems: list[Problem]) -
 
 
 def _number(terminal: str, device: str) -> tuple[str, int] | None:
-    """Return the direction and the number of a terminal that the device has."""
+    """Return the direction and the number of a terminal of the device."""
     found, profile = _TERMINAL.fullmatch(terminal), PROFILES[device]
     if found is None:
         return None

@@ -28,7 +28,7 @@ class Writes(Answers):
     do_write_binary_u16 = do_write_binary_i32 = do_write_binary_u32 = do_write_binary_i16
 
     def do_write_raw(self, request: Any, response: Any) -> None:
-        """Write codes of the converter as bytes, scan by scan; a scan that is not whole is left out."""
+        """Write codes of the converter as bytes, scan by scan; an incomplete scan is left out."""
         task = self._task(request)
         channels, given = max(len(task.channels), 1), len(request.write_array) // 2
         count = min(request.num_samps, given // channels) if request.num_samps > 0 else given // channels
@@ -91,7 +91,7 @@ class Writes(Answers):
             return self._write_buffer(task, rounded, auto_start, patience)
 
     def _write_now(self, task: Task, samples: Floats, auto_start: bool) -> int:
-        """Put out one value after the other."""
+        """Put out the values one after the other."""
         if task.state is not State.running:
             if not auto_start:
                 raise Refusal(
@@ -102,10 +102,10 @@ class Writes(Answers):
         return int(samples.shape[1])
 
     def _write_buffer(self, task: Task, samples: Floats, auto_start: bool, timeout: float) -> int:
-        """Write piece by piece, as there is room."""
+        """Write in pieces, as space becomes free."""
         if task.length == 0:
-            task.refuse_large_buffer(task.asked_buffer or samples.shape[1])
-            task.buffer = np.zeros((len(task.channels), task.asked_buffer or samples.shape[1]))
+            task.refuse_large_buffer(task.requested_buffer or samples.shape[1])
+            task.buffer = np.zeros((len(task.channels), task.requested_buffer or samples.shape[1]))
         written, whole = 0, samples.shape[1]
         end = np.inf if timeout < 0 else time.monotonic() + timeout
         while written < whole:

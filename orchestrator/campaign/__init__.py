@@ -20,7 +20,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # Dask takes a tenth of a second to load, and a run without workers does not need it.
+    # The import of Dask takes a tenth of a second, and a run without workers does not need it.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_HOMES.get(name, 'campaign')}"), name)

@@ -1,10 +1,10 @@
 """A campaign: every point of a sweep, computed by workers, kept as parts, compacted into one dataset.
 
-Whatever ends a campaign (Ctrl-C, kill -9, a full disk, a lost machine), the parts that are complete stay, and
-the same command goes on from them. The rows are then bit-identical to those of an uninterrupted campaign.
+A campaign may end by Ctrl-C, kill -9, a full disk or a lost machine. The complete parts stay, and the same command
+goes on from them. The rows are then bit-identical to the rows of an uninterrupted campaign.
 
-The folder holds `campaign.json` (what it was started with), `parts/` while it runs, and `dataset.nc` at the
-end.
+The folder holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and
+`dataset.nc` at the end.
 """
 
 from __future__ import annotations
@@ -80,14 +80,14 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
 MOST_ROUNDS = 3
-"""How often parts that turn out unfit are computed again by one command."""
+"""Largest number of times that one command computes unfit parts, before it gives up."""
 MOST_NAMED = 5
 
 OpenedWorkers = Callable[[], AbstractContextManager["WorkerPool"]]
 
 
 def open_workers(**options: Any) -> AbstractContextManager[WorkerPool]:
-    """Open workers, see `cluster.open_workers`: loaded by those who need any, since Dask takes half a second."""
+    """Open workers, see `cluster.open_workers`; imported only when needed, since Dask takes half a second."""
     from vibroimpact.orchestrator.campaign.cluster import open_workers as opened
 
     return opened(**options)
@@ -108,25 +108,25 @@ def run_campaign(
     ----------
     scene : Scene
     folder : path
-        One campaign, one folder; made when absent.
+        Folder of this campaign alone; made when absent.
     workers : int, optional
-        Worker processes on this machine. By default the campaign begins in this process, and one for each processor
-        goes on with it where more than 2 s are left.
+        Worker processes on this machine. By default the campaign begins in this process. Where more than 2 s of work
+        are left, one worker for each processor goes on with it.
     scheduler : str or dask.distributed.Client, optional
-        Address of a Dask scheduler, or a client of one, to use instead.
+        Address of a Dask scheduler, or a client of a scheduler, to use instead.
     runner : str
         The class that runs a point, as `module:name`.
     progress : Progress, optional
-        Told how far the campaign is.
+        Receives the progress of the campaign.
 
     Raises
     ------
     UsageError
-        When the folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+        The folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
     CampaignError
-        When the campaign could not finish; the same call resumes it.
+        The campaign could not finish; the same call resumes it.
     CampaignInterrupted
-        On Ctrl-C.
+        Ctrl-C interrupted the campaign.
     """
     home = Path(folder).absolute()
     make_folder(home)
@@ -137,7 +137,7 @@ def run_campaign(
             campaign = _Campaign(scene, home, runner, progress or Progress(), here=here)
             return campaign.finished_before() or campaign.run(opened)
         except OSError as error:
-            # Of this process or of a worker: the folder for temporary files may be full too.
+            # This process or a worker raised it: the folder for temporary files may be full, too.
             raise CampaignError(
                 message(
                     f"{error.filename or home}: expected a file that can be read and written, got "
@@ -161,7 +161,7 @@ class _Campaign:
         self._parts_folder = home / "parts"
         self._manifest_path = home / "campaign.json"
         self._manifest = self._checked_manifest()
-        # A worker may live in another folder, and files that a scene names lie beside it.
+        # A worker may run in another folder; files named by the scene lie next to the scene.
         source = str(Path(scene.source).absolute())
         self._report = CampaignReport(home / "dataset.nc", run_count(scene.sweep))
         self._go_on_with_this_sweep()
@@ -180,13 +180,13 @@ class _Campaign:
         )
 
     def _execution(self) -> str:
-        """Return how the points run: in lanes or fused, as those of an earlier sweep did; empty: as the scene says."""
-        begun = "" if self._manifest is None else self._manifest.identity.execution
+        """Return the execution of the points, `lanes` or `fused`, of an earlier sweep; empty: the scene's own."""
+        earlier_way = "" if self._manifest is None else self._manifest.identity.execution
         either = self._scene.execution.how == "auto" and may_go_by_lanes(self._scene)
-        return begun if either and begun in ("fused", "lanes") else ""
+        return earlier_way if either and earlier_way in ("fused", "lanes") else ""
 
     def _checked_manifest(self) -> Manifest | None:
-        """Return the manifest of the folder, made again from its copies where it is lost; None of a new campaign."""
+        """Return the manifest of the folder, made again from its copies where it is lost; None for a new campaign."""
         damage: DamagedManifestError | None = None
         try:
             manifest = read_manifest(self._manifest_path)
@@ -208,7 +208,7 @@ class _Campaign:
         return manifest
 
     def _manifest_again(self, state: str) -> Manifest | None:
-        """Return the manifest made again from its copies in the folder; None where there are none."""
+        """Return the manifest made again from its copies in the folder; None without copies."""
         made = manifest_again(self._home, self._scene)
         if made is None:
             return None
@@ -218,7 +218,7 @@ class _Campaign:
         return read_manifest(self._manifest_path)
 
     def _go_on_with_this_sweep(self) -> None:
-        """Keep what an earlier sweep of the same scene has computed of this one."""
+        """Keep the points of this sweep that an earlier sweep of the same scene has computed."""
         if self._manifest is None:
             return
         old = scene_of_manifest(self._manifest, self._scene)
@@ -248,7 +248,7 @@ class _Campaign:
         self._manifest = read_manifest(self._manifest_path)
 
     def finished_before(self) -> CampaignReport | None:
-        """Return the report of a campaign with nothing left to do; None when there is."""
+        """Return the report of a finished campaign; None when points are left."""
         target = self._report.dataset
         if self._manifest is None or not target.exists():
             return None
@@ -262,7 +262,7 @@ class _Campaign:
         return replace(self._report, runs=rows, resumed=rows)
 
     def _give_title(self, attrs: Mapping[str, Any]) -> None:
-        """Let the dataset have the title that the scene has now; it has no effect on any number."""
+        """Give the dataset the present title of the scene; the title has no effect on any number."""
         if self._scene.title and attrs.get("title") != self._scene.title:
             rows = read_flat(self._report.dataset)
             attributes = {name: self._attributes()[name] for name in ("title", "scene")}
@@ -270,7 +270,7 @@ class _Campaign:
             self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
 
     def run(self, workers: OpenedWorkers) -> CampaignReport:
-        """Compute what is left and compact it; parts that turn out unfit are computed again."""
+        """Compute the points that are left and compact all parts; unfit parts are computed again."""
         make_folder(self._parts_folder)
         remove_temporary_files(self._home)
         unfit: list[tuple[Path, str]] = []
@@ -289,7 +289,7 @@ class _Campaign:
         )
 
     def _complete(self, workers: OpenedWorkers) -> list[Path]:
-        """Compute what no part holds, and return the files that hold all runs."""
+        """Compute all runs that no part holds, and return the files with all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
         self._rounds = Rounds(self._scene) if adaptive_axes(self._scene) else None
@@ -304,7 +304,7 @@ class _Campaign:
             lambda: [*parts, *self._computed()],
             kept.stretches if kept is not None else (),
         )
-        # of a sweep the number of runs is known, of rounds the first that is not complete
+        # a sweep is complete by its number of runs; rounds are complete if no stage comes
         stage = next(stages, None) if self._rounds or self._report.resumed < self._report.runs else None
         if stage is not None:
             there = [path for path in stored if path.exists()]
@@ -315,7 +315,7 @@ class _Campaign:
         return found
 
     def _computed(self) -> list[StoredPart]:
-        """Return the parts that were computed by now."""
+        """Return the parts that this command has computed so far."""
         folder = self._parts_folder
         return [
             StoredPart(folder / chunk.part_name, chunk, None, chunk.count) for chunk in self._report.chunks
@@ -324,7 +324,7 @@ class _Campaign:
     def _read_kept(self) -> Kept | None:
         for path in own_files(self._parts_folder):
             if path.name.startswith("kept-") and path != self._kept_path:
-                path.unlink()  # of a sweep that this one has taken the place of
+                path.unlink()  # it belongs to an earlier sweep
         if not self._kept_path.exists():
             return None
         try:
@@ -361,17 +361,17 @@ class _Campaign:
             remove_temporary_files(self._parts_folder)
 
     def _with_manifest(self, work: Work) -> Work:
-        """Return the work with what each part says of its campaign."""
+        """Return the work with the manifest that each part carries."""
         return replace(work, manifest=carried_manifest(read_content(self._manifest_path), work.scene.source))
 
     def _computed_here(self, stages: Iterator[Stage]) -> Iterator[Stage]:
-        """Compute in this process what is quickly done; return what is left for workers."""
+        """Compute quick stages in this process; return the stages that are left for workers."""
         with opened_here(self._work) as opened:
             if opened is None:
                 return stages
             identity, self._form = opened.runner.identity, opened.form
             if self._manifest and runner_differences(self._manifest, identity):
-                return stages  # what differs from what began is the workers' to compare
+                return stages  # workers compare the other build with stored points
             if self._manifest is None:
                 write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
                 self._manifest = read_manifest(self._manifest_path)
@@ -386,7 +386,7 @@ class _Campaign:
         return iter(())
 
     def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
-        # loaded by those who need workers
+        # imported only when workers are needed
         from vibroimpact.orchestrator.campaign.computation import Computation
 
         self._report.workers = len(pool.worker_addresses())
@@ -400,7 +400,7 @@ class _Campaign:
             pool.cancel_all()
 
     def _schedule(self, work: Work, stage: Stage, workers: int) -> ChunkSchedule:
-        """Return the schedule of a stage, which begins now."""
+        """Return the schedule of a stage, and start its progress."""
         in_lanes = work.identity is not None and work.identity.execution == "lanes"
         schedule = ChunkSchedule(stage.branches, stage.held, workers, in_lanes=in_lanes)
         self._report.runs = stage.runs
@@ -419,7 +419,7 @@ class _Campaign:
             self._report.compute_seconds += time.perf_counter() - began
 
     def _agree_with_manifest(self, pool: WorkerPool, work: Work, stored: Sequence[Path]) -> None:
-        """Let a new campaign note what runs it, and an old one refuse what would give it other results."""
+        """Write the manifest of a new campaign; raise UsageError if workers could give an old one other results."""
         assert work.identity is not None
         if self._manifest is None:
             write_manifest(self._manifest_path, self._scene, work.identity, self._report.runs)
@@ -438,13 +438,13 @@ class _Campaign:
         self._manifest = read_manifest(self._manifest_path)
 
     def _take(self, result: ChunkResult) -> None:
-        if result.outcomes:  # else all its runs were kept from an earlier sweep: there is no part
+        if result.outcomes:  # a chunk of kept runs has no outcomes and no part
             self._report.chunks.append(result.chunk)
         self._report.outcomes.update(result.outcomes)
         self._progress.advance(sum(result.outcomes.values()))
 
     def _compact(self, parts: Sequence[Path]) -> list[tuple[Path, str]]:
-        """Make the dataset; returns the parts that prevent it, which are removed, each with the reason."""
+        """Write the dataset; return the unfit parts that prevent it, which are removed, each with the reason."""
         began = time.perf_counter()
         try:
             form = self._form or DatasetForm(self._scene)
@@ -485,7 +485,7 @@ class _Campaign:
 
 
 def _common_identity(pool: WorkerPool, work: Work) -> RunnerIdentity:
-    """Let every worker load what it needs, and return the runner that all of them have."""
+    """Prepare every worker, and return the identity of the runner that all workers share."""
     answers: dict[str, RunnerIdentity] = pool.call_everywhere(get_ready, work)
     first, *others = answers.values()
     for other in others:

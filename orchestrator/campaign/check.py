@@ -1,4 +1,4 @@
-"""What a scene would do and cost, known from the scene itself and from one of its points, which is computed."""
+"""The expected cost of a scene, from the scene itself and from one computed point."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from vibroimpact.orchestrator.scene.sweep import dimensions, most_points, run_co
 MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
 LONG_ENOUGH = 0.5
-"""A shorter trial is repeated, s: the first call of a process is slower than all that follow."""
+"""Wall time of a trial, s, below which it is repeated: the first call of a process is slower than all others."""
 LANE_TRIALS, FEWEST_LANE_TRIALS = 64, 8
-"""Points that are tried together where they run in lanes: fewer where one by itself takes long."""
+"""Largest and least number of points that are tried together in lanes; slow points are tried in smaller numbers."""
 GOLDEN = 0.6180339887498949
-"""Its multiples, of its powers likewise, spread over the unit interval: no two axes move together."""
+"""Multiples of this number (and of its powers) fill [0, 1) evenly."""
 SECONDS_BESIDE = 3e-5
-"""What a point takes beside its own time: handing out, arranging and writing it, s."""
+"""Time of a point besides its run, s: handing it out, arranging and writing it."""
 BYTES_BESIDE = 28_000
-"""What a dataset has beside its values: names, attributes, the text of the scene."""
+"""Size of a dataset besides its values, bytes: names, attributes, the text of the scene."""
 COPIES_IN_RUN, COPIES_IN_CAMPAIGN = 4, 2
-"""Size of the memory that arranging and writing all results takes, over that of the results."""
+"""Memory for arranging and writing all results, over the size of the results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,21 +42,21 @@ class Trial:
     Attributes
     ----------
     values : mapping of str to float
-        What it has of the swept keys: of each axis the value in the middle.
+        Values of the swept keys: the middle value of each axis.
     outcome : Outcome
-        Likewise `timeout` where it was given up after `MOST_TRIAL_SECONDS`.
+        Outcome of the run; `timeout`, too, if it was given up after `MOST_TRIAL_SECONDS`.
     message : str
-        Why it ended so.
+        Reason of the outcome.
     seconds : float
         Wall time, s.
     impacts : int
         Number of recorded impacts.
     size : int
-        Bytes of what was recorded.
+        Size of the results, bytes.
     given_up : bool
-        Whether it was ended here, and not by a deadline of the scene.
+        Whether the trial ended the run, not a deadline of the scene.
     lane_seconds : float or None
-        Wall time of one of many points of the sweep that run at once, where they do, s.
+        Wall time of each of many points that run at once in lanes, s; None without lanes.
     """
 
     values: Mapping[str, float]
@@ -76,20 +76,20 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class SceneCost:
-    """What a scene would cost, extrapolated from one point.
+    """The expected cost of a scene, extrapolated from one point.
 
     Attributes
     ----------
     points : int
-        Of the sweep; 1 without.
+        Number of points of the sweep, for an adaptive sweep its largest; 1 without a sweep.
     branches : int
-        Chains of points along which each starts where the one before ended; `points` without a continuation.
+        Number of chains of points in which each point starts where the point before ended; else `points`.
     trial : Trial or None
-        None where no point could be tried.
+        The computed point; None where no point could be tried.
     untried : str
-        Why none was tried.
+        Reason why no point was tried.
     first : int
-        Points of the first round of an adaptive sweep, whose `points` are the most that there may be; else 0.
+        Number of points of the first round of an adaptive sweep; else 0.
     """
 
     points: int
@@ -104,22 +104,22 @@ class SceneCost:
         return None if self.trial is None else self.points * self.trial.size
 
     def seconds(self, workers: int = 1) -> float | None:
-        """Return the wall time of all points on so many workers, without their start, s; None when none was tried."""
+        """Return the wall time of all points, without the start of workers, s; None when no point was tried."""
         if self.trial is None:
             return None
         return self.points * (self.trial.seconds_of_a_point + SECONDS_BESIDE) / min(workers, self.branches)
 
 
 def cost_of(scene: Scene) -> SceneCost:
-    """Run one point of a scene, and say what all of them would cost.
+    """Return the expected cost of a scene, by a run of one point.
 
-    The point is the middle one of the sweep, from the scene's own start state. It is given up after
+    The point has the middle value of each axis and the scene's own start state. It is given up after
     `MOST_TRIAL_SECONDS`.
 
     Parameters
     ----------
     scene : Scene
-        As `load_scene` returns it.
+        Scene returned by `load_scene`.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def _tried(scene: Scene) -> Trial:
 
 
 def _lane_seconds(scene: Scene, count: int) -> float:
-    """Return what one of so many points, spread over the sweep, takes when they run in lanes, s."""
+    """Return the wall time of one of `count` points in lanes, spread over the sweep, s."""
     share = np.arange(count)
     values: dict[str, NDArray[np.float64]] = {}
     for number, members in enumerate(dimensions(scene.sweep)):
@@ -177,7 +177,7 @@ def _lane_seconds(scene: Scene, count: int) -> float:
         values |= {axis.key: np.array(axis.values)[place] for axis in members}
     points = independent_points(values, count)
     with open_scene(scene) as runner:
-        for _ in range(2):  # the first call of a process is slower than all that follow
+        for _ in range(2):  # the first call of a process is slower than all others
             began = time.perf_counter()
             columns, _ = runner.rows(points, None, began + MOST_TRIAL_SECONDS)
             seconds = time.perf_counter() - began

@@ -1,8 +1,7 @@
-"""What a worker does with a chunk: run its points, write them as one part, say how that went.
+"""The work on a chunk: a worker runs its points, writes them as one part, and returns the outcomes.
 
-A chunk is a range of neighbouring runs. Everything here runs on a worker; the components
-of the scene are loaded once in each process and used for every chunk after that. What a point returns
-never depends on how the runs were cut into chunks.
+A chunk is a range of neighbouring runs. All of this module runs on a worker; each process loads the components of the
+scene once and uses them for all its chunks. The results of a point never depend on the cut of the runs into chunks.
 """
 
 from __future__ import annotations
@@ -34,42 +33,42 @@ from vibroimpact.orchestrator.scene.sweep import Branch, expand
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
-"""Attributes of a part: the state that the next run of its branch starts from; two numbers, or an array."""
+"""Attributes of a part: start state of the next run of its branch, as two numbers or an array."""
 MANIFEST = "campaign_manifest"
-"""Attribute of a part: what its campaign was started with, as `manifest.carried_manifest` returns it."""
+"""Attribute of a part: the manifest of its campaign, from `manifest.carried_manifest`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What all chunks of a campaign have in common; small, sent along with each."""
+    """The data that all chunks of a campaign share; it is small and sent with each chunk."""
 
     scene: Scene
-    """With an absolute path for its source: a worker may live in another folder."""
+    """Scene with an absolute path as its source, since a worker may run in another folder."""
     parts_folder: str
-    """Absolute path of the folder that the parts go to."""
+    """Absolute path of the folder of parts."""
     runner: str = DEFAULT_RUNNER
     """The runner class as `module:name`."""
     scene_hash: str = ""
-    """Written into each part, so that a stray part of another campaign is noticed."""
+    """Hash in each part, by which a part of another campaign is noticed."""
     identity: RunnerIdentity | None = None
-    """What the runner must be; None while the campaign still asks."""
+    """Required identity of the runner; None while the campaign asks the workers for it."""
     execution: str = ""
-    """How points run where the campaign has begun so; empty: as the scene says."""
+    """Execution with which the campaign began; empty: the scene's own."""
     kept: str = ""
-    """File with the runs of an earlier sweep that are left out of all chunks; it may be absent."""
+    """File with the runs of an earlier sweep, which all chunks leave out; it may be absent."""
     branches: tuple[Branch, ...] = ()
-    """The points of a round of an adaptive sweep; empty: those of the scene's sweep."""
+    """The points of a round of an adaptive sweep; empty: the points of the scene's sweep."""
     manifest: str = ""
-    """Written into each part, from which `campaign.json` is made again; empty: nothing is written."""
+    """Manifest in each part, from which `campaign.json` can be made again; empty: none is written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """Runs `first` to `stop - 1`; the first is in branch `branch` and starts from `start`.
 
-    Either a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the
-    run before; None is the scene's own start state. A chunk that takes longer than
-    `most_seconds` ends early, after a point; the rest is left to other chunks.
+    A chunk is a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the run
+    before; None is the scene's own start state. A chunk that takes longer than `most_seconds` ends early, after a
+    point; other chunks compute the rest.
     """
 
     branch: int
@@ -85,30 +84,30 @@ class Chunk:
 
     @property
     def part_name(self) -> str:
-        """Name of the file that its results go to."""
+        """Name of the file of the part."""
         return f"branch-{self.branch:06d}_runs-{self.first:010d}-{self.stop:010d}.nc"
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """What a worker says of a chunk whose part is on the disk."""
+    """The answer of a worker on a chunk whose part is on the disk."""
 
     chunk: Chunk
-    """The runs that the part holds: those asked for, or the first of them."""
+    """The runs of the part: all requested runs, or the first of them."""
     carried: State | None
-    """The state (m, m/s) that the next run of the branch starts from."""
+    """The start state (m, m/s) of the next run of the branch."""
     outcomes: Mapping[str, int]
-    """How many runs ended in each way."""
+    """Number of runs by outcome."""
     compute_seconds: float
     """Wall time of the runs, s."""
 
 
 _at_work: dict[Work, tuple[tuple[Branch, ...], OpenedScene]] = {}
-"""What this process has opened for chunks, and the branches of its scene: one scene at most."""
+"""The scene that this process has opened for chunks, with its branches: one scene at most."""
 
 
 def _opened(work: Work) -> tuple[tuple[Branch, ...], OpenedScene]:
-    """Return the branches of a scene, and what runs their points in this process."""
+    """Return the branches of a scene, and the opened scene that runs their points in this process."""
     key = Work(work.scene, "", work.runner, execution=work.execution)
     if key not in _at_work:
         take_up(key, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
@@ -116,35 +115,35 @@ def _opened(work: Work) -> tuple[tuple[Branch, ...], OpenedScene]:
 
 
 def take_up(work: Work, opened: OpenedScene) -> None:
-    """Let chunks run by a scene that is open in this process."""
+    """Use a scene that is open in this process for the following chunks."""
     lay_down()
     _at_work[Work(work.scene, "", work.runner, execution=work.execution)] = expand(work.scene), opened
 
 
 def lay_down() -> None:
-    """Let go of what chunks have run by; whoever opened it closes it."""
+    """Forget the opened scene of chunks, without closing it."""
     _at_work.clear()
     _kept_runs.cache_clear()
 
 
 def runner_identity(work: Work) -> RunnerIdentity:
-    """Open the scene in this process, where it stays open, and return which runner it has."""
+    """Open the scene in this process, where it stays open, and return the identity of its runner."""
     return _opened(work)[1].runner.identity
 
 
 def get_ready(work: Work) -> RunnerIdentity:
-    """Load all that a worker needs before its first chunk, and return which runner it has."""
+    """Prepare a worker for its first chunk, and return the identity of its runner."""
     identity = runner_identity(work)
-    # The first dataset of a process takes long, because libraries load what they need when they need it.
+    # The first dataset of a process takes long, because libraries import modules on first use.
     with ScratchFolder("rehearsal") as folder:
         write_dataset(empty_dataset(work.scene), Path(folder.name, "rehearsal.nc"))
     return identity
 
 
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
-    """Run the points of a chunk and write them as one part.
+    """Run the points of a chunk, write them as one part, and return the outcomes.
 
-    CampaignError: the runner is not the one the campaign began with, or the part cannot be written.
+    CampaignError: the campaign began with another runner, or the part cannot be written.
     """
     branches, opened = _opened(work)
     _refuse_other_runner(work, opened.runner)
@@ -153,7 +152,7 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     if not len(points):
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
-    opened.failed = True  # until it has ended
+    opened.failed = True  # until the chunk has ended
     records, carried = opened.runner.rows(points, chunk.start, deadline)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
@@ -164,7 +163,7 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
-    """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
+    """Return the rows of all points of a chunk, including kept points, by a run; nothing is written."""
     branches, opened = _opened(work)
     _refuse_other_runner(work, opened.runner)
     points = points_of(branches, chunk)
@@ -173,7 +172,7 @@ def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
-    """Write the part of points that kill the process that runs them; nothing of the points is run."""
+    """Write the part of points that kill their process, without running them, and return the outcomes."""
     points = _points_left(work, work.branches or expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in range(len(points))]
     written = write_part(work, chunk, DatasetForm(work.scene), points, records, chunk.start)
@@ -189,7 +188,7 @@ def _refuse_other_runner(work: Work, runner: Runner) -> None:
 
 
 def points_of(branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
-    """Return the points of a chunk, which may reach over several branches."""
+    """Return the points of a chunk, which may span several branches."""
     return columns_of_points(branches[chunk.branch :], chunk.first, chunk.stop)
 
 
@@ -205,16 +204,16 @@ def _kept_runs(path: str) -> NDArray[np.int32]:
 
 
 def carried_attributes(state: State) -> dict[str, Any]:
-    """Return the attributes of a part that keep the state its branch goes on from."""
+    """Return the attributes of a part that store the start state of the next run of its branch."""
     if len(state) == len(CARRIED):
         return dict(zip(CARRIED, state, strict=True))
     return {CARRIED_STATE: np.array(state)}
 
 
 def carried_state(attrs: Mapping[str, Any]) -> State | None:
-    """Return the state that the attributes of a part keep; None where there is none."""
+    """Return the state stored in the attributes of a part; None where there is none."""
     if CARRIED_STATE in attrs:
-        # NetCDF gives an array of one element back as a number.
+        # NetCDF returns an array of one element as a number.
         return tuple(np.atleast_1d(np.asarray(attrs[CARRIED_STATE], dtype=np.float64)).tolist())
     displacement, velocity = (attrs.get(name) for name in CARRIED)
     return None if displacement is None or velocity is None else (float(displacement), float(velocity))
@@ -228,7 +227,7 @@ def write_part(
     records: Sequence[RunRecord] | RunColumns,
     carried: State | None,
 ) -> dict[str, int]:
-    """Write the part of a chunk, as a whole or not at all; returns how many runs ended in each way."""
+    """Write the part of a chunk, as a whole or not at all; return the number of runs by outcome."""
     attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
     if work.manifest:
         attrs[MANIFEST] = work.manifest

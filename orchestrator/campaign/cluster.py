@@ -1,6 +1,6 @@
-"""Where the workers of a campaign live: processes of this machine, or behind the address of a Dask scheduler.
+"""The cluster of a campaign's workers: processes of this machine, or the workers of a Dask scheduler.
 
-Only this module and `pool` import dask or distributed. docs/scaling.md says what the settings `QUIET` are worth.
+Only this module and `pool` import dask or distributed. docs/scaling.md has the effect of the settings `QUIET`.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.run.progress import Progress
 
 CONNECT_SECONDS = 5.0
-"""How long a scheduler may take to answer before it counts as absent."""
+"""Time to answer, s, after which a scheduler counts as absent."""
 
 STOP_SECONDS = 3.0
-"""How long a worker may take to stop by itself before it is killed, s."""
+"""Time to stop, s, after which a worker is killed."""
 
 MOST_STARTS = 5
-"""Starts of the workers of this machine that may fail before that is an error."""
+"""Number of failed starts of the workers of this machine, from which on the failure is an error."""
 
 START = "distributed.worker.multiprocessing-method"
-"""Dask's setting of how workers start: `spawn` one by one, or forked by a `forkserver`."""
+"""Dask's setting for the start of workers: `spawn` one by one, or forks of a `forkserver`."""
 
 QUIET: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
@@ -66,37 +66,37 @@ QUIET: dict[str, Any] = {
     "distributed.client.scheduler-info-interval": "10s",
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
-    # A chunk whose worker died twice is handed back, so that the campaign can find the point that kills.
+    # A chunk whose worker died twice comes back, so that the campaign can find the point that kills workers.
     "distributed.scheduler.allowed-failures": 1,
     "logging": {"distributed": "critical"},
 }
-"""Settings of Dask that switch off or slow down what it does beside the work."""
+"""Settings of Dask that switch off or slow down its activity besides the work."""
 
 OWN_DESCRIPTORS = 32
-"""Descriptors that a campaign opens for itself and Dask's scheduler: 18 measured on Linux, with 1 and 2 workers."""
+"""File descriptors of a campaign and Dask's scheduler: 18 were measured on Linux, with 1 and 2 workers."""
 
 WORKER_DESCRIPTORS = 12
-"""Descriptors that a campaign opens for each of its workers: 11 measured on Linux, with 1 and 2 workers."""
+"""File descriptors of a campaign for each worker: 11 were measured on Linux, with 1 and 2 workers."""
 
 LONGEST_TEMPORARY = 75
-"""Bytes of the path of a temporary folder beyond which no socket in it has a name: Linux takes 107."""
+"""Longest path of a temporary folder in which a socket can have a name, bytes: Linux allows 107 for the socket."""
 
 
 @contextmanager
 def open_workers(
     *, workers: int | None = None, scheduler: str | Client | None = None, progress: Progress | None = None
 ) -> Iterator[WorkerPool]:
-    """Open workers for one campaign and leave no process behind, whatever ends it; `progress` is told of lost workers.
+    """Open workers for one campaign and leave no process behind, whatever ends it; `progress` gets lost workers.
 
-    One worker runs for each processor by default. The scheduler is the address of one of Dask (`tcp://host:8786`), or a
-    client of one, to use instead; its workers outlive the campaign, and the client stays as it is. UsageError: nothing
-    listens there, or this machine lacks what its own workers need. CampaignError: workers cannot be started.
+    One worker runs for each processor by default. `scheduler` is the address of a Dask scheduler (`tcp://host:8786`) or
+    a client, to use instead. Its workers outlive the campaign, and the client stays as it is. UsageError: nothing
+    listens there, or this machine lacks descriptors or loopback for workers. CampaignError: workers cannot be started.
     """
-    # Dask warns of workers that end: they are meant to, or an error says it better.
-    for name in ("distributed", "distributed.client"):  # which have levels of their own
+    # Dask warns of workers that end: this is intended, or an error explains it better.
+    for name in ("distributed", "distributed.client"):  # these loggers have their own levels
         logging.getLogger(name).setLevel(logging.CRITICAL)
     with warnings.catch_warnings(), dask.config.set(QUIET), ExitStack() as stack:
-        # Ctrl-C may come between the making of a coroutine of Dask and its start.
+        # Ctrl-C may come between the creation of a coroutine of Dask and its start.
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         if scheduler is None:
             number = workers or processor_count()
@@ -120,7 +120,7 @@ def open_workers(
 
 
 def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:
-    """Return the address of a scheduler, and the certificates of the client that knows it."""
+    """Return the address of a scheduler, and the certificates of its client."""
     if isinstance(scheduler, str):
         return scheduler, None
     if not isinstance(scheduler, Client):
@@ -171,9 +171,9 @@ def _remote_cluster(address: str, security: Security | None) -> Iterator[Cluster
 
 
 def _connected(address: str, security: Security) -> Client:
-    """Return a client of a scheduler, by another try where Dask's own could not take its first message."""
+    """Return a client of a scheduler; try again where Dask's client could not take its first message."""
     for _ in range(MOST_STARTS - 1):
-        # a busy scheduler may send two messages as one; Dask's client asserts that the first comes alone
+        # a busy scheduler may send two messages as one, where Dask's client asserts a single first message
         with suppress(AssertionError):
             return Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
     return Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
@@ -186,7 +186,7 @@ def _embedded_cluster(workers: int, scratch: Path) -> Iterator[Cluster]:
         with Client(cluster, set_as_default=False) as client:
             yield Cluster(client, workers, lambda: _replace_dead_workers(cluster, workers, scratch))
     except BaseException:
-        # A worker may be deep in a long call; what it computes is not wanted any more.
+        # A worker may be in a long call, whose result is no longer needed.
         _kill_workers(cluster)
         raise
     finally:
@@ -197,15 +197,15 @@ def _embedded_cluster(workers: int, scratch: Path) -> Iterator[Cluster]:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Let the threads and processes that begin here not hear Ctrl-C: it is for this thread alone.
+    """Block Ctrl-C in the threads and processes that begin in the block: only this thread handles it.
 
-    A terminal sends the signal to every process of the command. A blocked signal is inherited by threads and
-    by the processes they start, also by those that replace a dead worker later. Here it only waits.
+    A terminal sends the signal to every process of the command. Threads inherit the blocked signal, and so do their
+    processes, including later replacements of dead workers. In this thread the signal waits for the end of the block.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # Start it now: starting it unblocks SIGINT in the calling thread.
+    # The start of the tracker unblocks SIGINT in the calling thread, so it comes first.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -215,7 +215,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _started_workers(workers: int, scratch: Path) -> LocalCluster:
-    """Start workers on this machine, again where one of them died before it was up."""
+    """Start workers on this machine; start again if a worker dies during its start."""
     for _ in range(MOST_STARTS):
         try:
             with _interrupts_blocked():
@@ -224,19 +224,19 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
                     threads_per_worker=1,
                     processes=True,
                     host=LOOPBACK,
-                    # None would still open the usual port of a Dask dashboard, to the whole network.
+                    # With None, Dask would still open its usual dashboard port to the whole network.
                     dashboard_address=f"{LOOPBACK}:0",
                     scheduler_kwargs={"dashboard": False},
                     protocol="tls://",
                     security=_own_certificates(scratch),
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
-                    # What workers are forked from has the environment of when it was started.
+                    # The fork server has the environment of the time of its start.
                     env=dict(os.environ),
                 )
         except RuntimeError as error:
             failure = error
-            # What they are forked from may be out of reach: somebody has cleaned the folder of its socket.
+            # The fork server may be out of reach, if the folder of its socket was cleaned.
             dask.config.set({START: "spawn"})
     raise CampaignError(
         message(
@@ -248,21 +248,21 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
 
 
 def _prepare_start() -> str:
-    """Return how workers start. Where they are forked from one process, it is told what to import for all of them."""
-    # Elsewhere than on Linux what system libraries do in a process may not outlive a fork.
+    """Return the start method of workers; a fork server gets the modules to import for all workers."""
+    # On other systems than Linux, system libraries may not survive a fork.
     if sys.platform != "linux" or len(os.fsencode(tempfile.gettempdir())) > LONGEST_TEMPORARY:
         return "spawn"
     with dask.config.set({START: "forkserver"}):
-        # Dask names packages the first time that it is asked: ours take their place.
+        # Dask sets its own modules on the first call; these replace them.
         get_mp_context().set_forkserver_preload([Computation.__module__])
     return "forkserver"
 
 
 def _own_certificates(folder: Path) -> Security:
-    """Return a key made for this cluster: Dask runs what it is sent, so other users must not reach it.
+    """Return a new key for this cluster: Dask runs any code it receives, so other users must not reach it.
 
-    Key and certificate are files in `folder`, which nobody else may read: one that Dask holds in memory it writes to a
-    temporary folder for each connection, which stays where a process is killed meanwhile.
+    Key and certificate are files in `folder`, which other users cannot read. Dask would write a key in memory to a
+    temporary folder for each connection, and a killed process would leave that folder behind.
     """
     try:
         made = Security.temporary()
@@ -280,7 +280,7 @@ def _own_certificates(folder: Path) -> Security:
 
 
 def _refuse_poor_surroundings(workers: int) -> None:
-    """Raise UsageError where workers of this machine cannot be started or reached."""
+    """Raise UsageError unless workers of this machine can be started and reached."""
     fewer = message("ask for fewer workers with ", Argument("workers")) if workers > 1 else ""
     whose = f"{workers} worker{'s' if workers > 1 else ''}"
     refuse_few_descriptors(OWN_DESCRIPTORS + workers * WORKER_DESCRIPTORS, whose, fewer)
@@ -289,7 +289,7 @@ def _refuse_poor_surroundings(workers: int) -> None:
 
 
 def _replace_dead_workers(cluster: LocalCluster, workers: int, scratch: Path) -> None:
-    """Start as many new workers as are dead for good: those killed while they were started again."""
+    """Start a new worker for each worker that is dead for good, killed during its restart."""
     leave_removed_folder(scratch)
     living = sum(nanny.is_alive() for nanny in cluster.workers.values())
     if living < workers:

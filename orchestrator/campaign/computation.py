@@ -1,9 +1,8 @@
 """Keeps workers busy with the chunks of a schedule until every run is on the disk.
 
-A chunk whose worker died twice is cut into smaller ones. A single run that was lost is tried once more with
-nothing else on the way, so that the point that kills its process is told from those that only waited beside
-it. Workers may also be taken away faster than a point lasts: before its row says that it crashed, a point is
-run in a process of its own, which is no worker.
+A chunk whose worker died twice is cut into smaller chunks. A lost single run is tried once more while no other chunk
+is under way, to find the point that kills its process. Workers may also be taken away faster than a point lasts.
+Before its row gets the outcome of a crash, a point therefore runs in its own process, which is no worker.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ CRASH_MESSAGE = "this point kills the process that runs it"
 
 
 class Computation:
-    """One pass over a schedule; `done` is told of each chunk whose part is on the disk."""
+    """One pass over a schedule; `done` gets the result of each chunk whose part is on the disk."""
 
     def __init__(
         self, pool: WorkerPool, work: Work, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
@@ -33,19 +32,19 @@ class Computation:
         self._alone: Chunk | None = None
 
     def run(self) -> None:
-        """Compute all that is left; a chunk that cannot be computed or written raises VibroimpactError."""
+        """Compute all chunks that are left; raise VibroimpactError unless each can be computed and written."""
         while self._hand_out():
             ended = self._pool.next_finished()
-            asked = self._in_flight.pop(ended.ticket)
+            planned = self._in_flight.pop(ended.ticket)
             if ended.worker_lost:
-                self._lost(asked)
+                self._lost(planned)
             elif ended.error is not None:
                 raise ended.error
             else:
-                self._ended(asked, ended.result)
+                self._ended(planned, ended.result)
 
     def _hand_out(self) -> bool:
-        """Give the workers enough to do; return whether there was anything."""
+        """Hand out enough chunks to the workers; return whether any chunk is under way."""
         while len(self._in_flight) < self._schedule.most_in_flight and (chunk := self._schedule.next_chunk()):
             self._submit(chunk)
         if not self._in_flight and self._suspects:
@@ -56,22 +55,22 @@ class Computation:
     def _submit(self, chunk: Chunk) -> None:
         self._in_flight[self._pool.submit(run_chunk, self._work, chunk)] = chunk
 
-    def _ended(self, asked: Chunk, result: ChunkResult) -> None:
-        self._schedule.finished(asked, result)
+    def _ended(self, planned: Chunk, result: ChunkResult) -> None:
+        self._schedule.finished(planned, result)
         self._done(result)
 
-    def _lost(self, asked: Chunk) -> None:
-        if asked is self._alone:
-            self._ended(asked, self._tried_alone(asked))
-        elif asked.count == 1:
-            self._suspects.append(asked)
+    def _lost(self, planned: Chunk) -> None:
+        if planned is self._alone:
+            self._ended(planned, self._tried_alone(planned))
+        elif planned.count == 1:
+            self._suspects.append(planned)
         else:
-            self._schedule.lost(asked)
+            self._schedule.lost(planned)
 
     def _tried_alone(self, chunk: Chunk) -> ChunkResult:
-        """Run a point whose workers died in a process of its own; where that dies too, its row says so."""
+        """Run a point in its own process after its workers died; write it as crashed if that process dies, too."""
         if not self._pool.is_local:
-            # This machine may be of another kind than those of the workers.
+            # This machine may differ from the machines of the workers.
             return write_crashed(
                 self._work, chunk, f"{CRASH_MESSAGE}, or its workers were taken away each time"
             )

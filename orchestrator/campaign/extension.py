@@ -1,9 +1,9 @@
-"""A campaign goes on with another sweep: points whose values are equal are kept, the others are computed.
+"""A campaign goes on with another sweep: points with equal values are kept, all others are computed.
 
-A row depends on the values of its point alone or, along a continuation axis, on those of the points before it.
-So a run of the new scene is one of the old scene when the two scenes with the values of that run in them are the
-same, bit for bit; along a branch, when that holds for all runs before it too. The rows of such runs are kept in one
-file in the folder of parts, `kept-HASH.nc`, on the coordinates of the new sweep.
+A row depends only on the values of its point and, along a continuation axis, of the points before it. A new run equals
+an old run if both scenes, with the values of that run, are equal bit for bit. Along a branch, this must hold for all
+runs before it, too. The rows of equal runs are kept in one file in the folder of parts, `kept-HASH.nc`, on the
+coordinates of the new sweep.
 """
 
 from __future__ import annotations
@@ -55,19 +55,19 @@ from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, SweepAxi
 Runs = NDArray[np.int64]
 
 SHORTEST_STRETCH = 64
-"""Kept runs of a sweep without branches that are worth an interruption of a chunk; the worker leaves fewer out."""
+"""Number of neighbouring kept runs that end a chunk, without branches; the worker itself skips shorter stretches."""
 
 
 def kept_path(folder: Path, scene_hash: str) -> Path:
-    """Return the file of the kept rows of a campaign that was extended; it is there only then."""
+    """Return the path of the kept rows of an extended campaign; only extended campaigns have the file."""
     return folder / f"kept-{scene_hash[:16]}.nc"
 
 
-# ---- which runs are the same ----
+# ---- equal runs ----
 
 
 def other_differences(old: Scene, new: Scene) -> list[str]:
-    """Return in words what differs between two scenes beside the values that they sweep."""
+    """Return the differences of two scenes, besides their swept values, in words."""
     axes = {axis.key: axis for axis in (*old.sweep, *new.sweep)}
     shared = {axis.key for axis in old.sweep} & {axis.key for axis in new.sweep}
     try:
@@ -75,14 +75,14 @@ def other_differences(old: Scene, new: Scene) -> list[str]:
             key: axis.values[0] if key in shared else _alone(old, new, key) for key, axis in axes.items()
         }
     except UsageError:
-        # A swept key that the other scene does not give: nothing says what it was.
+        # One scene has no value for a key that the other scene sweeps.
         return differences(flat_scene(old), flat_scene(new))
     one, other = (_without_sweep(scene, values) for scene in (old, new))
     return differences(one, other)
 
 
 def _alone(old: Scene, new: Scene, key: str) -> float:
-    """Return the number that a key has in the scene that does not sweep it."""
+    """Return the value of a key in the scene that does not sweep it."""
     return (new if any(axis.key == key for axis in old.sweep) else old).value(key)
 
 
@@ -98,9 +98,9 @@ def _without_sweep(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
 
 
 def same_runs(old: Scene, new: Scene) -> Runs:
-    """Return which run of an old scene each run of a new one is, shape (run,); -1 where it is none of them.
+    """Return the equal run of the old scene for each run of the new scene, shape (run,); -1 where there is none.
 
-    The scenes differ in what they sweep only: `other_differences`.
+    The scenes differ only in their sweeps: see `other_differences`.
     """
     was, now = _Layout(old.sweep), _Layout(new.sweep)
     adaptive = any(axis.adaptive is not None for axis in (*old.sweep, *new.sweep))
@@ -128,25 +128,25 @@ def same_runs(old: Scene, new: Scene) -> Runs:
 
 
 def _rows(members: Dimension) -> list[tuple[float, ...]]:
-    """Return the values that the axes of a dimension have together."""
+    """Return the values of the axes of a dimension, point by point."""
     return list(zip(*(axis.values for axis in members), strict=True))
 
 
 def _values(layout: _Layout, place: int, members: Dimension) -> list[tuple[float, ...]]:
-    """Return the values of a dimension of a layout, in the order of the axes of another."""
+    """Return the values of a dimension of a layout, in the order of the axes `members`."""
     own = {axis.key: axis for axis in layout.dimensions[place]}
     return _rows(tuple(own[axis.key] for axis in members))
 
 
 def _values_in(scene: Scene, members: Dimension) -> list[tuple[float, ...]]:
-    """Return what a scene has of keys without sweeping them; nothing where it sweeps one of them in other company."""
+    """Return the values of keys that a scene does not sweep; empty where it sweeps one of them in another dimension."""
     if {axis.key for axis in members} & {axis.key for axis in scene.sweep}:
         return []
     return [tuple(scene.value(axis.key) for axis in members)]
 
 
 class _Layout:
-    """How the runs of a sweep lie: spanning axes in their order, then direction and place along a branch."""
+    """The order of the runs of a sweep: spanning axes in their order, then direction and place along a branch."""
 
     def __init__(self, sweep: Sequence[SweepAxis]) -> None:
         self.carried = next((axis for axis in sweep if axis.continuation), None)
@@ -168,18 +168,18 @@ class _Layout:
             yield members, math.prod(self.shape[place + 1 :])
 
     def place_of(self, members: Dimension) -> int | None:
-        """Return which dimension has the keys of another one, and no others."""
+        """Return the place of the dimension with exactly the keys of `members`; None where there is none."""
         keys = {axis.key for axis in members}
         own = (place for place, axes in enumerate(self.dimensions) if {axis.key for axis in axes} == keys)
         return next(own, None)
 
     def along(self, place: int | None) -> tuple[int, ...]:
-        """Return the shape of an array along one dimension that is broadcast along the others."""
+        """Return the shape of an array along one dimension that is broadcast along all others."""
         return tuple(length if other == place else 1 for other, length in enumerate(self.shape))
 
 
 def _places(values: Sequence[tuple[float, ...]], among: Sequence[tuple[float, ...]]) -> Runs:
-    """Return where each point is among others, bit for bit; -1: nowhere."""
+    """Return the place of each point among others, compared bit for bit; -1: not among them."""
     if not values:
         return np.array([-1], dtype=np.int64)
     known = {tuple(map(float.hex, point)): place for place, point in enumerate(among)}
@@ -187,7 +187,7 @@ def _places(values: Sequence[tuple[float, ...]], among: Sequence[tuple[float, ..
 
 
 def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
-    """Return the old place, along branches of both directions, of each new one; -1 from the first other value on."""
+    """Return the old place of each new place along branches of both directions; -1 from the first difference on."""
     old_directions = DIRECTIONS[was.path]
     rows = []
     for direction in DIRECTIONS[now.path]:
@@ -202,18 +202,18 @@ def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
     return np.array(rows)
 
 
-# ---- their rows ----
+# ---- rows of equal runs ----
 
 
 def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
-    """Return the rows of an old campaign, given in run order, that a new one keeps, with its indices and coordinates.
+    """Return the old rows that the new campaign keeps, with indices and coordinates of the new campaign.
 
-    Not all rows need be there; the dataset is one-dimensional.
+    `rows` are in run order and one-dimensional; rows may be missing.
     """
-    wanted = same_runs(old, new)
+    sources = same_runs(old, new)
     known = rows.run_index.values.astype(np.int64)
-    place = np.searchsorted(known, wanted).clip(max=known.size - 1)
-    there = (wanted >= 0) & (known[place] == wanted)
+    place = np.searchsorted(known, sources).clip(max=known.size - 1)
+    there = (sources >= 0) & (known[place] == sources)
     if any(axis.continuation for axis in new.sweep):
         branches = there.reshape(-1, _Layout(new.sweep).shape[-1])
         there = np.logical_and.accumulate(branches, axis=1).reshape(-1)
@@ -222,7 +222,7 @@ def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
 
 
 def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> xr.Dataset:
-    """Return rows as the new scene's own runs would have them: names, attributes and coordinates."""
+    """Return rows with the names, the attributes and the coordinates of the new scene's runs."""
     like = empty_dataset(new)
     values: dict[str, NDArray[Any]] = {"run_index": runs.astype(np.int32), **_coordinates(new, runs)}
     sampled = dict(zip(stored_samples(new), stored_samples(old), strict=True))
@@ -240,7 +240,7 @@ def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) ->
 
 
 def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
-    """Return the swept values of runs, by the name of the coordinate."""
+    """Return the swept values of runs, by the name of their coordinate."""
     layout, names = _Layout(scene.sweep), coordinate_names(scene)
     places = np.unravel_index(runs, layout.shape) if layout.shape else ()
     found = {
@@ -256,7 +256,7 @@ def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
 
 
 def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
-    """Cut off the periods that no run has: the runs that had them are not among these."""
+    """Return rows without the last periods that no row has, as rows with more periods may have been left out."""
     tables = [v.values for v in rows.variables.values() if v.dims == ("run", "period")]
     if not tables:
         return rows
@@ -264,7 +264,7 @@ def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
     return rows.isel(period=slice(0, int(np.flatnonzero(filled).max(initial=-1)) + 1))
 
 
-# ---- going on from them ----
+# ---- going on from kept rows ----
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,13 +273,13 @@ class Kept:
 
     path: Path
     runs: Runs
-    """Ascending, shape (run,)."""
+    """Numbers of the kept runs, ascending, shape (run,)."""
     stretches: list[StoredPart]
-    """Neighbouring runs that chunks go round, with the state that the run after them starts from."""
+    """Neighbouring runs that chunks leave out, with the start state of the run after them."""
 
 
 def read_kept(path: Path, scene: Scene) -> Kept:
-    """Read which rows are kept; a damaged file raises DatasetError."""
+    """Return the kept rows of a file; raise DatasetError if it is damaged."""
     rows = read_flat(path)
     runs = rows.run_index.values.astype(np.int64)
     layout = _Layout(scene.sweep)
@@ -299,16 +299,16 @@ def read_kept(path: Path, scene: Scene) -> Kept:
 
 
 def _carried(rows: xr.Dataset, begin: int, stop: int) -> State | None:
-    """Return the state that the runs from the beginning of a branch hand on, as `Runner.rows` finds it."""
+    """Return the state that runs from the start of a branch hand on, by the rule of `Runner.rows`."""
     states = final_states(rows, slice(begin, stop))
     outcome = rows.outcome.values[begin:stop]
-    # A run that was marked for its values has handed on its state; one that failed has none.
+    # A run marked for impossible values has handed on its state; a failed run has no finite state.
     usable = np.isin(outcome, [*CARRYING, Outcome.error]) & np.isfinite(states).all(axis=1)
     return tuple(states[np.flatnonzero(usable)[-1]].tolist()) if usable.any() else None
 
 
 def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
-    """Return the states at the end of some runs, shape (run, 2 N): displacements (m), then velocities (m/s)."""
+    """Return the final states of some runs, shape (run, 2 N): displacements (m), then velocities (m/s)."""
     if "final_state" in rows.variables:
         states: NDArray[np.float64] = rows.final_state.values[part]
         return states
@@ -317,7 +317,7 @@ def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class EarlierSweep:
-    """A campaign in the folder `home`, started with another sweep; `note` is told in words what is kept."""
+    """A campaign in the folder `home`, started with another sweep; `note` gets messages on its kept points."""
 
     scene: Scene
     manifest: Manifest
@@ -329,12 +329,12 @@ class EarlierSweep:
         return self.home / "parts"
 
     def hand_over(self, new: Scene, runs: int) -> bool:
-        """Make the folder one of a new sweep; returns False where nothing of the old one is in it.
+        """Hand the folder over to a new sweep; return False where the new sweep keeps no row of the old one.
 
-        The folder belongs to the old sweep until the new manifest is there, and nothing is removed before.
+        The folder belongs to the old sweep until the new manifest is written, and nothing is removed before.
         """
-        rows, begun, hashed = self._rows(), self.manifest, scene_hash(new)
-        manifest = new_manifest(new, begun.identity, runs, begun.continued_with)
+        rows, old, hashed = self._rows(), self.manifest, scene_hash(new)
+        manifest = new_manifest(new, old.identity, runs, old.continued_with)
         if rows is not None:
             kept = kept_rows(self.scene, new, rows)
             count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
@@ -353,7 +353,7 @@ class EarlierSweep:
         return True
 
     def _rows(self) -> xr.Dataset | None:
-        """Return what was computed, one-dimensional; None where nothing was."""
+        """Return the computed rows, one-dimensional; None without rows."""
         target = self.home / "dataset.nc"
         if target.exists() and is_of(read_finished(target).attrs, self.manifest, self.scene):
             return read_flat(target)
@@ -365,7 +365,7 @@ class EarlierSweep:
         return merge_datasets(paths) if paths else None
 
     def _store(self, rows: xr.Dataset, left: int) -> None:
-        """Keep the points that the new sweep does not have where they can be opened."""
+        """Write all old points to a file of its own, since the new sweep leaves some of them out."""
         path = self.home / f"earlier-{self.manifest.scene_hash[:8]}.nc"
         attributed = rows.assign_attrs(self.manifest.attributes(self.scene))
         attributed.attrs.pop(MANIFEST, None)
@@ -374,21 +374,21 @@ class EarlierSweep:
 
 
 def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:
-    """Return the scene that a campaign was started with; None where it cannot be read any more.
+    """Return the scene with which a campaign was started; None where it can no longer be read.
 
-    Files that it names are looked for where those of `like` are.
+    Paths in the scene are relative to the source of `like`.
     """
     try:
         scene = parse_scene(manifest.scene_text, like.source)
     except VibroimpactError:
         return None
-    # A key that came after the campaign was started has its default.
+    # A key that is newer than the campaign has its default.
     known = flat_scene(scene) | dict(manifest.scene)
     return None if differences(known, flat_scene(scene)) else scene
 
 
 def read_finished(path: Path) -> Part:
-    """Read what the dataset of a campaign says of itself; a damaged one raises DatasetError."""
+    """Return attributes and run numbers of a campaign's dataset; raise DatasetError if it is damaged."""
     try:
         return read_part(path)
     except DatasetError as error:
@@ -396,6 +396,6 @@ def read_finished(path: Path) -> Part:
 
 
 def is_of(attrs: Mapping[str, Any], manifest: Manifest, scene: Scene) -> bool:
-    """Whether a dataset is that of a campaign: another one is of the sweep before it was extended."""
+    """Return whether a dataset belongs to a campaign; other datasets are of the sweep before its extension."""
     own = (manifest.scene_hash, scene_hash(scene))
     return attrs.get("scene_hash", manifest.scene_hash) in own

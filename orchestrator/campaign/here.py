@@ -1,7 +1,7 @@
-"""The beginning of a campaign, in this process: one of few points needs no workers, which take seconds to start.
+"""The beginning of a campaign in this process: a short campaign needs no workers, which take seconds to start.
 
-Chunks, parts and bits are those of workers. As soon as the pace of what is done says that more than `HERE_SECONDS` are
-left, or a chunk takes that long, workers go on with the rest.
+Chunks, parts and bits equal those of workers. Workers take over as soon as more than `HERE_SECONDS` of work are left at
+the measured pace, or a chunk takes that long.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 
 HERE_SECONDS = 2.0
-"""Work left, or in one chunk, above which workers take over, s: about what their start takes."""
+"""Work left, or work of one chunk, s, above which workers take over: about the time of their start."""
 
 _ONE_AT_A_TIME = threading.Lock()
-"""Held by the campaign that computes in this process; one of another thread starts workers."""
+"""Lock of the campaign that computes in this process; a campaign of another thread starts workers."""
 
 
 def may_begin_here(scene: Scene, runner: str, points: int) -> bool:
-    """Return whether a campaign may begin in this process, with nothing that takes it down or holds it up.
+    """Return whether a campaign may begin in this process, where no component can crash or block it.
 
-    Bodies of ours do neither. Where a guard watches over strangers, waiting for it is worth it for one point alone.
+    The package's own bodies do neither. Guarded components run in a child process, which pays only for one point.
     """
     if runner != DEFAULT_RUNNER:
         return False
@@ -47,7 +47,7 @@ def may_begin_here(scene: Scene, runner: str, points: int) -> bool:
 
 @contextmanager
 def opened_here(work: Work) -> Iterator[OpenedScene | None]:
-    """Open a scene in this process for a while; None where another campaign of this process computes in it."""
+    """Open a scene in this process for the block; None where another campaign of this process computes in it."""
     if not _ONE_AT_A_TIME.acquire(blocking=False):
         yield None
         return
@@ -63,10 +63,10 @@ def opened_here(work: Work) -> Iterator[OpenedScene | None]:
 def computed_here(
     work: Work, stage: Stage, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
 ) -> Stage | None:
-    """Compute a stage until it is complete (None), or until what is left, which is returned, is not worth doing here.
+    """Compute a stage until it is complete (None), or until too much is left for this process; return the stage then.
 
-    The work is opened in this process (`opened_here`), the schedule is for one worker, and `done` is told of each chunk
-    whose part is on the disk. The stage returned has the parts of this process.
+    The work is opened in this process (`opened_here`), and the schedule is for one worker. `done` gets the result of
+    each chunk whose part is on the disk. The returned stage has the parts of this process.
     """
     results: list[ChunkResult] = []
     while (chunk := schedule.next_chunk()) is not None:
@@ -84,7 +84,7 @@ def computed_here(
 
 
 def _with_parts(stage: Stage, results: Iterable[ChunkResult], folder: Path) -> Stage:
-    """Return a stage of which more is computed."""
+    """Return a stage that also holds the parts of these results."""
     parts = [
         StoredPart(folder / one.chunk.part_name, one.chunk, one.carried, one.chunk.count) for one in results
     ]

@@ -1,11 +1,11 @@
-"""`campaign.json`: what a campaign folder was started with, so that it is only ever resumed with the same.
+"""`campaign.json`: scene, components and machine at the start of a campaign, so that it resumes only with the same.
 
 A resumed campaign is bit-identical to an uninterrupted one. That holds only for the same scene, the same
 components, the same way of running and the same instruction set; anything else is refused here.
 
-Each part carries the manifest too, in one attribute of a few kB (`carried_manifest`): `manifest_copies` makes
-`campaign.json` again from it. Long values are left out: the text of the scene has them, and a SHA-256 shows that they
-are the same.
+Each part carries the manifest, too, in one attribute of a few kB (`carried_manifest`). `manifest_copies` makes
+`campaign.json` again from this attribute. Long values are left out: they are in the text of the scene, and a SHA-256
+verifies them.
 """
 
 from __future__ import annotations
@@ -30,47 +30,47 @@ FORMAT = 2
 _FORMATS = (1, FORMAT)
 """Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`."""
 NO_EFFECT = ("title",)
-"""Keys that no result depends on: a campaign goes on when they change."""
+"""Keys without effect on any result: a campaign goes on when they change."""
 MOST_CARRIED_TEXT = 8192
-"""Characters of a scene's text above which a part carries neither text nor values: the scene has to be given again."""
+"""Length of a scene's text, characters, above which a part carries neither text nor values, only their hash."""
 MOST_CARRIED_VALUE = 256
-"""Characters of a value, as JSON, above which a part leaves it to the text of the scene."""
+"""Length of a value as JSON, characters, above which a part leaves the value to the text of the scene."""
 DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
-"""Errors that content of another shape than that of a manifest leads to."""
+"""Errors by content that has not the shape of a manifest."""
 _LONGEST = 60  # characters of a value in a message
 _MOST_DIFFERENCES = 5
 _LARGEST = 96 * 2**20
-"""Bytes of a manifest above which it is not read; four axes of a million values are below."""
+"""Largest size of a manifest that is read, bytes; four axes of a million values are below."""
 _MOST_OF = {b",": 4_500_000, b"[": 100_000, b"{": 100_000, b":": 1_000_000}
-"""Characters of a manifest above whose number it is not read: parsing more takes above 300 MB."""
+"""Largest number of each character in a manifest that is read; parsing more would take above 300 MB of memory."""
 
 Content = dict[str, Any]
-"""What `campaign.json` holds."""
+"""Content of `campaign.json`."""
 
 
 class DamagedManifestError(UsageError):
-    """A file is in the place of a manifest and does not hold what was once written there."""
+    """The file of a manifest does not have the content that was written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """What a campaign was started with."""
+    """The scene and the runner at the start of a campaign."""
 
     scene: Mapping[str, Any]
     """Every number and word of the scene by its key; comments and layout of the file do not count."""
     scene_hash: str
-    """SHA-256 of what counts of `scene`; every part of the campaign says it."""
+    """SHA-256 of the keys of `scene` that affect results; every part of the campaign has it."""
     scene_text: str
-    """The TOML text."""
+    """TOML text of the scene."""
     runs: int
-    """Runs of the campaign."""
+    """Number of runs of the campaign."""
     identity: RunnerIdentity
-    """What ran when it was started."""
+    """Identity of the runner at the start."""
     continued_with: tuple[Mapping[str, Any], ...] = ()
-    """Other builds of its components that went on with it, each as `add_build` wrote it."""
+    """Other builds of the components that went on with the campaign, each as written by `add_build`."""
 
     def attributes(self, scene: Scene) -> dict[str, Any]:
-        """Return the global attributes of the dataset of this campaign: what began it, and what went on with it."""
+        """Return the global attributes of the campaign's dataset: the runner at its start, and other builds."""
         found = provenance(scene, self.identity)
         if self.continued_with:
             found["continued_with"] = json.dumps(self.continued_with)
@@ -92,7 +92,7 @@ def flat_scene(scene: Scene) -> dict[str, Any]:
             "values": axis["values"],
             "path": axis["path"],
             "place": place,
-            # absent in campaigns that were begun before there were such axes
+            # absent in campaigns of versions without such axes
             "together": axis["together"] or None,
             "adaptive": axis["adaptive"],
         }
@@ -113,7 +113,7 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def scene_hash(scene: Scene) -> str:
-    """Return the SHA-256 of a scene: the same for two files that differ in comments, layout and title only."""
+    """Return the SHA-256 of a scene, the same for two files that differ only in comments, layout and title."""
     return _hash_of({key: value for key, value in flat_scene(scene).items() if key not in NO_EFFECT})
 
 
@@ -122,7 +122,7 @@ def _hash_of(content: Mapping[str, Any]) -> str:
 
 
 def holds_scene(attrs: Mapping[str, Any], scene: Scene) -> bool:
-    """Whether the global attributes of a dataset are of one made from a scene: equal but for comments and layout."""
+    """Return whether a dataset with these global attributes was made from a scene, up to comments and layout."""
     text = str(attrs.get("scene", ""))
     try:
         return bool(text) and (
@@ -138,7 +138,7 @@ def new_manifest(
     runs: int,
     continued_with: Sequence[Mapping[str, Any]] = (),
 ) -> Content:
-    """Return the manifest of a campaign that begins."""
+    """Return the manifest of a new campaign."""
     content: Content = {
         "format": FORMAT,
         "scene_hash": scene_hash(scene),
@@ -155,7 +155,7 @@ def new_manifest(
 
 
 def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
-    """Note in a manifest that a campaign goes on with other builds; `compared` points, computed again, were equal."""
+    """Add another build of the components to a manifest; `compared` points, computed again, were equal."""
     content = read_content(path)
     build = {
         "fmu_hashes": dict(identity.fmu_hashes),
@@ -174,7 +174,7 @@ def write_manifest(
     runs: int,
     continued_with: Sequence[Mapping[str, Any]] = (),
 ) -> None:
-    """Write the manifest of a campaign that begins, whole or not at all."""
+    """Write the manifest of a new campaign, whole or not at all."""
     write_content(path, new_manifest(scene, identity, runs, continued_with))
 
 
@@ -185,19 +185,19 @@ def write_content(path: Path, content: Content) -> None:
 
 
 def content_hash(content: Content) -> str:
-    """Return the SHA-256 of a manifest, without the one that it has."""
+    """Return the SHA-256 of a manifest, computed without its key `sha256`."""
     return _hash_of({key: value for key, value in content.items() if key != "sha256"})
 
 
 def read_manifest(path: Path) -> Manifest | None:
-    """Read the manifest of a folder; None when there is none.
+    """Return the manifest of a folder; None where there is no manifest.
 
     Raises
     ------
     DamagedManifestError
-        When it is no file, or its content is not what was once written.
+        The manifest is no file, or its content has changed since it was written.
     UsageError
-        When it is of another format.
+        The manifest has another format.
     """
     try:
         content = read_content(path)
@@ -217,7 +217,7 @@ def read_manifest(path: Path) -> Manifest | None:
 
 
 def read_content(path: Path) -> Content:
-    """Return the JSON of a file, read only where its size and its structure are those of a manifest."""
+    """Return the JSON of a file; raise ValueError unless its size and structure suit a manifest."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise ValueError("it is no file")
@@ -234,9 +234,9 @@ def read_content(path: Path) -> Content:
 
 
 def _checked(content: Content) -> Manifest:
-    """Return what a manifest says, if it is what was once written.
+    """Return the manifest of some content, if the content has not changed since it was written.
 
-    Anything else raises ValueError, KeyError, TypeError or AttributeError.
+    Other content raises ValueError, KeyError, TypeError or AttributeError.
     """
     recorded, found = content.get("sha256"), content_hash(content)
     if recorded is None and content["format"] == 1:
@@ -262,27 +262,27 @@ def _checked(content: Content) -> Manifest:
 
 
 def carried_manifest(content: Content, source: str) -> str:
-    """Return the manifest of a campaign, the content of `campaign.json`, as its parts carry it: JSON.
+    """Return the manifest of a campaign, the content of `campaign.json`, as JSON for its parts.
 
-    `null` stands for what the scene tells; files that it names lie beside `source`.
+    `null` stands for values that the scene has; paths in the scene are relative to `source`.
     """
     text, values = content["scene_text"], content["scene"]
     content = {**content, "sha256": content_hash(content)}
     shown = {key: json.dumps(value) for key, value in values.items()}
-    told: dict[str, str] = {}
+    in_text: dict[str, str] = {}
     if len(text) > MOST_CARRIED_TEXT or any(len(one) > MOST_CARRIED_VALUE for one in shown.values()):
-        told = {key: json.dumps(value) for key, value in values_of(text, source).items()}
-    if len(text) > MOST_CARRIED_TEXT and told == shown:
+        in_text = {key: json.dumps(value) for key, value in values_of(text, source).items()}
+    if len(text) > MOST_CARRIED_TEXT and in_text == shown:
         return json.dumps(content | {"scene": None, "scene_text": None})
     short = {
-        key: None if len(shown[key]) > MOST_CARRIED_VALUE and told.get(key) == shown[key] else value
+        key: None if len(shown[key]) > MOST_CARRIED_VALUE and in_text.get(key) == shown[key] else value
         for key, value in values.items()
     }
     return json.dumps(content | {"scene": short})
 
 
 def values_of(text: str, source: str) -> dict[str, Any]:
-    """Return the values of the text of a scene, as a manifest has them; none where it cannot be read."""
+    """Return the values of a scene's text in the form of a manifest; empty where the text cannot be read."""
     try:
         scene = parse_scene(text, source)
     except VibroimpactError:
@@ -291,18 +291,18 @@ def values_of(text: str, source: str) -> dict[str, Any]:
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Return in words what differs between two flat scenes in what results depend on."""
+    """Return the differences of two flat scenes, in keys that affect results, in words."""
     keys = sorted((old.keys() | new.keys()) - set(NO_EFFECT))
     return [
         f"{key} was {_shown(old.get(key))}, is {_shown(new.get(key))}"
         for key in keys
-        # as text -0.0 is not 0.0
+        # -0.0 and 0.0 differ as text
         if json.dumps(old.get(key)) != json.dumps(new.get(key))
     ]
 
 
 def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
-    """Raise UsageError with the first few differences between a scene and the one the campaign was started with."""
+    """Raise UsageError with the first few differences from the scene with which the campaign was started."""
     shown = "; ".join(different[:_MOST_DIFFERENCES])
     hidden = len(different) - _MOST_DIFFERENCES
     more = f"; and {hidden} more" if hidden > 0 else ""
@@ -326,7 +326,7 @@ def _shown(value: Any) -> str:
 
 
 def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str]:
-    """Return in words what differs between what runs now and what has run a campaign; empty when nothing does."""
+    """Return the differences of a runner from the runner of a campaign, in words; empty when they are equal."""
     if any(build["fmu_hashes"] == identity.fmu_hashes for build in manifest.continued_with):
         identity = replace(identity, fmu_hashes=manifest.identity.fmu_hashes)
     was, now = (dict(_flat("", asdict(one))) for one in (manifest.identity, identity))
@@ -334,9 +334,9 @@ def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str
 
 
 def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") -> NoReturn:
-    """Refuse to mix results of different components, ways of running or instruction sets.
+    """Raise UsageError, as results of different components, executions or instruction sets are never mixed.
 
-    UsageError says what differs, and the reason why stored points do not show equal results.
+    The message has the differences, and the reason why stored points do not prove equal results.
     """
     raise UsageError(
         message(

@@ -1,7 +1,7 @@
-"""`campaign.json` made again, where it is lost or damaged, from what the other files of a campaign say.
+"""A lost or damaged `campaign.json`, made again from the other files of a campaign.
 
-Each part, and the rows kept from an earlier sweep, carry the manifest (`manifest.carried_manifest`); the dataset of a
-finished campaign has the same facts among its attributes. Files of several campaigns are refused by name.
+Each part carries the manifest (`manifest.carried_manifest`), and so do the rows kept from an earlier sweep. The dataset
+of a finished campaign has the same facts among its attributes. Files of several campaigns are refused by name.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from vibroimpact.orchestrator.run import OTHER_ENGINE
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 _CHANGING = ("continued_with", "sha256")
-"""Keys in which parts of one campaign differ, where other builds of the components went on with it."""
+"""Keys in which parts of one campaign may differ, if other builds of the components went on with it."""
 _RUNNER = ("execution", "instruction_set", "fmu_hashes", "engine")
-"""Keys that a campaign keeps when it is extended to another sweep."""
+"""Keys that stay the same when a campaign is extended to another sweep."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Copy:
-    """The manifest that a file of `runs` runs carries; `None` in it stands for what the scene tells."""
+    """The manifest in a file with `runs` runs; `None` in it stands for values that the scene has."""
 
     path: Path
     content: Content
@@ -47,8 +47,8 @@ class _Copy:
         return str(self.content["scene_hash"])
 
     @property
-    def begun(self) -> str:
-        """What all parts of one campaign have in common, as text."""
+    def shared(self) -> str:
+        """The keys that all parts of one campaign share, as text."""
         return json.dumps({key: value for key, value in self.content.items() if key not in _CHANGING})
 
     @property
@@ -61,14 +61,14 @@ class _Copy:
         return list(self.content.get("continued_with", ()))
 
     def is_of_campaign(self, other: _Copy, *, any_sweep: bool) -> bool:
-        """Whether two files are of one campaign, which one of them may know less builds of than the other."""
-        begun = self.runner == other.runner if any_sweep else self.begun == other.begun
-        return begun and all(was == now for was, now in zip(self.builds, other.builds, strict=False))
+        """Return whether two files belong to one campaign; one of them may list fewer of its builds."""
+        is_same = self.runner == other.runner if any_sweep else self.shared == other.shared
+        return is_same and all(was == now for was, now in zip(self.builds, other.builds, strict=False))
 
 
 @dataclass(slots=True)
 class _Folder:
-    """What the sound files in a folder of parts say: with a copy of the manifest, or with the hash of a scene alone."""
+    """The sound files in a folder of parts: with a copy of the manifest, or (older) only with the hash of a scene."""
 
     parts: list[_Copy] = field(default_factory=list)
     kept: list[_Copy] = field(default_factory=list)
@@ -76,17 +76,17 @@ class _Folder:
 
 
 def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
-    """Return the manifest that the files of a campaign carry, and in words which files; None where none does.
+    """Return the manifest in the files of a campaign, and the files in words; None where no file has it.
 
-    `home` is its folder, and the scene is the one it is to go on with. UsageError: the files are of several campaigns,
-    or the scene that the manifest needs is not given.
+    `home` is the folder of the campaign, and `scene` is the scene of the present command. UsageError: the files belong
+    to several campaigns, or the manifest needs another scene for its left-out values.
     """
     there = _read(home / "parts")
     finished = _finished(home / "dataset.nc", scene)
     chosen = _chosen(there, finished, scene_hash(scene))
     if chosen is None:
         return None
-    count = sum(copy.begun == chosen.begun for copy in there.parts)
+    count = sum(copy.shared == chosen.shared for copy in there.parts)
     origin = "1 part" if count == 1 else f"{count} parts" if count else chosen.path.name
     return _completed(chosen, scene), origin
 
@@ -97,7 +97,7 @@ def _read(folder: Path) -> _Folder:
         try:
             part = read_part(path)
         except DatasetError:
-            continue  # resuming names and removes it
+            continue  # the resumed campaign names and removes it
         content = _content_in(part.attrs)
         if content is None:
             found.older.append((path, str(part.attrs.get("scene_hash"))))
@@ -120,18 +120,18 @@ def _content_in(attrs: Mapping[str, Any]) -> Content | None:
 
 
 def _finished(path: Path, scene: Scene) -> _Copy | None:
-    """Return the manifest that the dataset of a finished campaign tells; None where it is another dataset."""
+    """Return the manifest from the dataset of a finished campaign; None for any other dataset."""
     if not path.is_file():
         return None
     try:
         part = read_part(path)
         runs = len(part.run_index)
-        return _Copy(path, _told_by(part.attrs, runs, scene), runs)
+        return _Copy(path, _content_of_dataset(part.attrs, runs, scene), runs)
     except (VibroimpactError, *DAMAGE):
         return None
 
 
-def _told_by(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
+def _content_of_dataset(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
     text = str(attrs["scene"])
     content: Content = {
         "format": FORMAT,
@@ -152,10 +152,10 @@ def _told_by(attrs: Mapping[str, Any], runs: int, scene: Scene) -> Content:
 
 
 def _chosen(there: _Folder, finished: _Copy | None, given: str) -> _Copy | None:
-    """Return the copy of the campaign that a folder is of; None where no file has one.
+    """Return the copy of the manifest to which a folder belongs; None where no file has a copy.
 
-    A campaign that is extended has for a moment the parts of its earlier sweep beside the rows that it keeps of them.
-    It is of the sweep of these rows where the scene of that sweep is given, else of the earlier one.
+    During an extension, the folder has the parts of the earlier sweep and the rows kept for the new sweep. The folder
+    belongs to the new sweep if its scene is given, else to the earlier sweep.
     """
     begins = [copy for copy in there.kept if copy.scene_hash == given]
     kept = sorted(there.kept, key=lambda copy: -copy.runs)
@@ -164,12 +164,12 @@ def _chosen(there: _Folder, finished: _Copy | None, given: str) -> _Copy | None:
         return None
     first = candidates[0]
     _refuse_several(first, there, extended=bool(begins))
-    same = [copy for copy in (*there.parts, *there.kept) if copy.begun == first.begun]
+    same = [copy for copy in (*there.parts, *there.kept) if copy.shared == first.shared]
     return max([first, *same], key=lambda copy: len(copy.builds))
 
 
 def _refuse_several(first: _Copy, there: _Folder, *, extended: bool) -> None:
-    """Raise UsageError unless all files in a folder of parts are of one campaign."""
+    """Raise UsageError unless all files in a folder of parts belong to one campaign."""
     strangers = [copy.path for copy in there.kept if not copy.is_of_campaign(first, any_sweep=True)]
     for copy in there.parts:
         known = copy.is_of_campaign(first, any_sweep=extended)
@@ -187,15 +187,15 @@ def _refuse_several(first: _Copy, there: _Folder, *, extended: bool) -> None:
 
 
 def _completed(copy: _Copy, scene: Scene) -> Content:
-    """Return a manifest with what its copy leaves to the scene; UsageError where the scene does not tell."""
+    """Return a manifest with the values that its copy leaves to the scene; UsageError for another scene."""
     content = dict(copy.content)
     if content["scene_text"] is None and scene_hash(scene) == content["scene_hash"]:
         content |= {"scene": flat_scene(scene), "scene_text": scene.text}
-        return content | {"sha256": content_hash(content)}  # comments and title may be others
+        return content | {"sha256": content_hash(content)}  # comments and title may differ
     if content["scene"] is not None:
         values = content["scene"].items()
-        told = values_of(content["scene_text"], scene.source) if None in content["scene"].values() else {}
-        content["scene"] = {key: told.get(key) if value is None else value for key, value in values}
+        known = values_of(content["scene_text"], scene.source) if None in content["scene"].values() else {}
+        content["scene"] = {key: known.get(key) if value is None else value for key, value in values}
     if content["sha256"] != content_hash(content):
         raise UsageError(
             f"{copy.path}: expected the scene that this campaign was started with, to make campaign.json again, got "

@@ -1,7 +1,7 @@
-"""Do other builds of the components give the rows that a campaign has? Asked of its points, not of the hashes.
+"""The comparison of other builds of the components with a campaign, by its points, not by hashes.
 
 FMUs of another version or another compiler have other hashes, whether their results differ or not. A few stored
-points, spread evenly over what is there, are computed again: a campaign goes on only where they are equal bit for bit.
+points, spread evenly over the files, are computed again: a campaign goes on only if they are equal bit for bit.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
 MOST_POINTS = 8
-"""Points that are computed again."""
+"""Largest number of points that are computed again."""
 MOST_SECONDS = 60.0
-"""Wall time that these points took when they were stored, together, s; the first counts however long it took."""
+"""Largest sum of the stored wall times of these points, s; the first point is always computed again."""
 COMPARABLE = (Outcome.ok, Outcome.stuck, Outcome.impact_limit)
-"""Outcomes that the same components always give; a crash or a timeout may be the fault of a machine."""
+"""Outcomes that the same components always give; a crash or a timeout may depend on the machine."""
 OF_THE_MACHINE = ("point_seconds",)
-"""Variables that no two computations of a point have in common."""
+"""Variables that differ between two computations of a point."""
 
 
 def compare_with_stored(
     pool: WorkerPool, work: Work, scene: Scene, stored: Sequence[Path]
 ) -> tuple[int, str]:
-    """Compute a few points of the stored files again; return how many, and why they do not show equal results.
+    """Compute a few stored points again; return their number, and the reason why they do not prove equal results.
 
-    The reason is empty where all are equal bit for bit.
+    The reason is empty if all points are equal bit for bit.
     """
     chosen = list(_chosen(scene, stored))
     if not chosen:
@@ -63,7 +63,7 @@ def compare_with_stored(
 def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Dataset]]:
     """Yield points that can be computed again, spread evenly over the files, each with its stored row."""
     branches = expand(scene)
-    # A point without a branch begins at the scene's own start state, as the first one of a branch does.
+    # Independent points and first points of branches begin at the scene's own start state.
     length = 1 if branches[0].direction == "independent" else len(branches[0].points)
     files = _spread(len(stored), MOST_POINTS)
     seconds = 0.0
@@ -71,7 +71,7 @@ def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Da
         rows = read_flat(stored[place])
         run, states = rows.run_index.values, final_states(rows, slice(None))
         carries = np.isin(rows.outcome.values, CARRYING) & np.isfinite(states).all(axis=1)
-        # where a refined point of an adaptive path started is not in its row
+        # the row of a refined point of an adaptive path does not have its start state
         first_round = run < run_count(scene.sweep)
         begins, follows = run % length == 0, np.append(False, (np.diff(run) == 1) & carries[:-1])
         known = np.flatnonzero(np.isin(rows.outcome.values, COMPARABLE) & (begins | follows) & first_round)
@@ -85,7 +85,7 @@ def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Da
 
 
 def _spread(size: int, most: int) -> NDArray[np.intp]:
-    """Return at most so many of the first `size` numbers, from the first to the last."""
+    """Return at most `most` of the first `size` numbers, evenly spread from the first to the last."""
     return np.unique(np.linspace(0, size - 1, min(size, most)).astype(np.intp))
 
 
@@ -95,7 +95,7 @@ def _name(row: xr.Dataset) -> str:
 
 
 def _difference(stored: xr.Dataset, again: xr.Dataset) -> str:
-    """Return in words the first difference between two rows of a point; empty where they are equal bit for bit."""
+    """Return the first difference between two rows of a point, in words; empty if they are equal bit for bit."""
     try:
         refuse_unlike("computed again", again, _name(stored), stored)
     except DatasetError as error:

@@ -1,8 +1,7 @@
-"""The parts of a campaign on the disk: which are there, which are sound, and how they become one dataset.
+"""The parts of a campaign on the disk: listing, checking, and joining them to one dataset.
 
-Resuming a campaign is listing its parts. A part is whole or not there at all, because it is renamed into
-place, and ends with the SHA-256 of its content; a file that is damaged all the same is found before it is opened,
-and its points are computed again.
+A campaign resumes by listing its parts. A part is whole or absent, because it is renamed into place, and it ends with
+the SHA-256 of its content. A damaged file is therefore found before it is opened, and its points are computed again.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ _PART = r"branch-(\d{6,})_runs-(\d{10,})-(\d{10,})\.nc"
 _KEPT = r"kept-[0-9a-f]{16}\.nc"
 _NAME = re.compile(_PART)
 _OWN = re.compile(rf"{_PART}|{_KEPT}")
-# As `analysis.atomic` names them.
+# Names of temporary files, from `analysis.files.atomic`.
 _TEMPORARY = re.compile(
     rf"\.({_PART}|{_KEPT}|(dataset|earlier-[0-9a-f]{{8}})\.nc|campaign\.json)\.\d+\.[0-9a-f]{{8}}\.tmp"
 )
@@ -55,7 +54,7 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class StoredPart:
-    """A sound part: its chunk, the state that the next run of its branch starts from, and its number of rows."""
+    """A sound part: its chunk, the start state of the next run of its branch, and its number of rows."""
 
     path: Path
     chunk: Chunk
@@ -66,14 +65,14 @@ class StoredPart:
 def list_parts(
     folder: Path, scene_hash: str, note: Note, kept: NDArray[np.int64] = NO_RUNS
 ) -> list[StoredPart]:
-    """Return the sound parts in a folder, in run order; what is of no use is removed.
+    """Return the sound parts in a folder, in run order; damaged and duplicate parts are removed.
 
-    A part of version 0.1 has no hash: it is read and checked as a whole. `note` is told of each part that has to be
+    A part of version 0.1 has no hash: it is read and checked as a whole. `note` gets a line for each part that must be
     computed again; the runs `kept`, shape (run,), are in no part (see `extension`).
     """
     sound: list[StoredPart] = []
     for path, chunk in _named_parts(folder):
-        # Two parts of the same runs hold the same rows; one is enough.
+        # Parts of the same runs have the same rows, so one is enough.
         if sound and sound[-1].chunk.stop > chunk.first:
             path.unlink()
             continue
@@ -86,25 +85,25 @@ def list_parts(
 
 
 def own_files(folder: Path) -> list[Path]:
-    """Return the files of a campaign in its folder of parts; whatever else lies there is somebody else's."""
+    """Return the files of a campaign in its folder of parts; other files there do not belong to it."""
     return [path for path in folder.iterdir() if _OWN.fullmatch(path.name) and path.is_file()]
 
 
 def remove_temporary_files(folder: Path) -> None:
-    """Remove what a writer of a campaign that was killed left behind."""
+    """Remove the temporary files that a killed writer of a campaign left behind."""
     for path in folder.iterdir():
         if _TEMPORARY.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove the parts of a campaign that is complete, and their folder if nothing else is in it."""
+    """Remove the parts of a complete campaign, and their folder if it is empty then."""
     if not folder.is_dir():
         return
     remove_temporary_files(folder)
     for path in own_files(folder):
         path.unlink(missing_ok=True)
-    # It may be a link to a folder elsewhere, or hold what is somebody else's: both stay.
+    # The folder may be a link, or have files of others: both stay.
     with suppress(OSError):
         folder.rmdir()
 
@@ -132,13 +131,13 @@ def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) ->
 
 
 def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """Write the rows of all parts as one dataset, whole or not at all, with the numbers that the scene does not sweep.
+    """Write the rows of all parts as one dataset, with the numbers that are not swept, and return the dataset.
 
-    What was written is returned. DatasetError: a part cannot be read or joined with the others; `unfit_parts` finds out
-    which. OSError: the dataset cannot be written.
+    The file is written as a whole or not at all. DatasetError: a part cannot be read or joined with the others;
+    `unfit_parts` finds the part. OSError: the dataset cannot be written.
     """
     dataset = merge_datasets(parts)
-    # Those of the first part: what they say of it is not true of all runs.
+    # Attributes of the first part, which do not hold for all runs.
     own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
     dataset = dataset.assign_coords(wrapped(form.constants()))
@@ -147,7 +146,7 @@ def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mappi
 
 
 def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:
-    """Yield the parts that cannot be read, or that are no parts of a scene, each with the reason."""
+    """Yield the parts that cannot be read, or that do not belong to a scene, each with the reason."""
     like = empty_dataset(scene)
     for path in parts:
         try:

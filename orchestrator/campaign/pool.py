@@ -1,6 +1,6 @@
-"""Workers that take pieces of work and hand back what became of them, wherever they live (`cluster`).
+"""Workers that take pieces of work and return their results, on any `cluster`.
 
-A campaign submits work, takes finished work, and is told when a worker was lost.
+A campaign submits work and takes finished work, which may be marked as lost with its worker.
 """
 
 from __future__ import annotations
@@ -21,46 +21,46 @@ from vibroimpact.fmus.messages import CALL, message
 from vibroimpact.orchestrator.run.progress import Progress
 
 WORKERLESS_SECONDS = 30.0
-"""How long a campaign waits for a first or a new worker before it gives up, s."""
+"""Time without any worker, s, after which a campaign gives up."""
 
 LOOK_SECONDS = 1.0
-"""How often the pool looks which workers are there, s."""
+"""Time between two checks of the present workers, s."""
 
 ASK_SECONDS = 0.05
-"""How often the pool looks for workers and answers while they get ready, s."""
+"""Time between two checks of workers and their answers while workers get ready, s."""
 
 RESULT_SECONDS = 10.0
-"""Time after which a worker counts as gone when the answer of a finished call has not arrived, s."""
+"""Time without the result of a finished call, s, after which its worker counts as gone."""
 
 SUSPENDED_SECONDS = 10.0
-"""Time between two looks, which come every second or so, above which this process was suspended meanwhile, s."""
+"""Time between two checks, s, normally about a second, above which this process was suspended in between."""
 
 DEAD_SECONDS = 5.0
-"""Time after which another worker is started in place of a dead one of this machine, s."""
+"""Time with a dead worker of this machine, s, after which a new worker replaces it."""
 
 STALL_SECONDS = 10.0
-"""Time without a piece of work that ended after which the pool asks whether any is being computed, s."""
+"""Time without finished work, s, after which the pool asks whether any worker computes."""
 
 IDLE_LOOKS = 3
-"""Answers of no in a row at which the connections count as stalled."""
+"""Number of idle answers in a row, from which on the connections count as stalled."""
 
 MOST_RESTARTS = 3
-"""Stalls in a row, without a piece of work that ended, that end the campaign."""
+"""Number of restarts in a row without finished work; the next stall ends the campaign."""
 
 MOST_REPLACEMENTS = 50
-"""Replacements of dead workers in a campaign, after which the others go on alone."""
+"""Largest number of replaced workers in a campaign; after that, the living workers go on alone."""
 
 MOST_DEATHS = 5
-"""Deaths per worker, while all get ready, above which the scene counts as what kills them."""
+"""Deaths per worker while workers get ready, above which the scene counts as the cause."""
 
 
 UNREADABLE = "Error during deserialization"
-"""How Dask's own error begins where a scheduler or a worker lacks a package."""
+"""Start of Dask's error message where a scheduler or a worker lacks a package."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A piece of work that ended: its ticket, and its result or its error."""
+    """A finished piece of work: its ticket, and its result or its error."""
 
     ticket: int
     result: Any = None
@@ -70,7 +70,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """A client and, where the workers are our own, their number and what replaces those that stay dead."""
+    """A client and, for workers of this machine, their number and a function that replaces dead workers."""
 
     client: Client
     size: int = 0
@@ -80,8 +80,8 @@ class Cluster:
 class WorkerPool:
     """Workers of one Dask cluster, one piece of work at a time on each.
 
-    Messages say `where` they are; `progress` is told of those that were lost, `lost_workers` so far. Local workers are
-    processes of this command. `connection` closes the connection; a pool that connects anew goes on with it.
+    `where` names the cluster in messages; `progress` gets the number of lost workers, `lost_workers`. Local workers are
+    processes of this command. `connection` closes the connection, also after the pool has connected anew.
     """
 
     def __init__(
@@ -106,9 +106,9 @@ class WorkerPool:
         self._looked = self._last_present = self._last_complete = self._last_moved = time.monotonic()
 
     def worker_addresses(self) -> tuple[str, ...]:
-        """Return the addresses of the workers that are there now; take note of those that are not any more.
+        """Return the addresses of the present workers, and count the workers that have gone.
 
-        WorkersGoneError: no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
+        WorkersGoneError: no worker, or no scheduler, has been present for `WORKERLESS_SECONDS`.
         """
         self._leave_out_suspension()
         there = self._workers_there()
@@ -133,9 +133,9 @@ class WorkerPool:
         return tuple(sorted(there or ()))
 
     def _workers_there(self) -> frozenset[str] | None:
-        """Return the addresses of the workers that the scheduler has; None where it does not answer.
+        """Return the addresses of the scheduler's workers; None where the scheduler does not answer.
 
-        What `Client.scheduler_info` returns may be the answer to another call of the client, which has no workers.
+        `Client.scheduler_info` is not used: it may return the answer to another call, which has no workers.
         """
         if self._client.scheduler is None:
             return None
@@ -147,7 +147,7 @@ class WorkerPool:
         return frozenset(answer["workers"])
 
     def _leave_out_suspension(self) -> None:
-        """Count as no waiting what passed while this process was stopped: Ctrl-Z, or a computer that slept."""
+        """Subtract from all waiting times the time in which this process was suspended (Ctrl-Z, sleep)."""
         away = time.monotonic() - self._looked
         if away > SUSPENDED_SECONDS:
             self._last_present += away
@@ -163,15 +163,15 @@ class WorkerPool:
             self._cluster.replace_dead()
 
     def wait_for_workers(self) -> None:
-        """Wait until a worker is there."""
+        """Wait until a worker is present."""
         while not self.worker_addresses():
             time.sleep(ASK_SECONDS)
 
     def call_everywhere(self, function: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
-        """Call a function once on each worker, in its working thread; return what each returned, by its address.
+        """Call a function once on each worker, in its working thread; return the results by address.
 
-        A worker that dies meanwhile is not waited for; the one that comes in its place is asked too. CampaignError:
-        workers die again and again. UsageError: scheduler or workers lack this package.
+        A worker that dies meanwhile is left out; its replacement is called, too. CampaignError: workers die again and
+        again. UsageError: scheduler or workers lack this package.
         """
         calls: dict[str, Future[Any]] = {}
         answers: dict[str, Any] = {}
@@ -193,7 +193,7 @@ class WorkerPool:
                 calls, answers = {}, {}
 
     def _new_answers(self, calls: dict[str, Future[Any]], waiting: Set[str]) -> dict[str, Any]:
-        """Return the answers that are there after a while; a call that was lost is taken out of `calls`."""
+        """Return the answers that have arrived after a short wait; lost calls are removed from `calls`."""
         answers = {}
         time.sleep(ASK_SECONDS)
         for address in waiting:
@@ -210,7 +210,7 @@ class WorkerPool:
         return answers
 
     def _refuse_strangers(self, error: Exception) -> None:
-        """Refuse a scheduler or a worker that cannot read what it is sent."""
+        """Raise UsageError if the error shows a scheduler or a worker that cannot read its messages."""
         if isinstance(error, ImportError) or str(error).startswith(UNREADABLE):
             raise UsageError(
                 f"{self._where}: expected a scheduler and workers with the packages of this process, got some that "
@@ -219,7 +219,7 @@ class WorkerPool:
             ) from error
 
     def _is_complete(self, began: float) -> bool:
-        """Return whether all workers are there, or those that are missing have been waited for."""
+        """Return whether all workers are present, or the time to wait for missing workers is over."""
         return len(self._present) >= self._cluster.size or time.monotonic() - began > WORKERLESS_SECONDS
 
     def _refuse_deadly_start(self, deaths: int) -> None:
@@ -231,7 +231,7 @@ class WorkerPool:
             )
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> int:
-        """Queue a call on whichever worker is free first; return the ticket of its `Finished`."""
+        """Queue a call for the first free worker; return the ticket of its `Finished`."""
         self._tickets += 1
         self._calls[self._tickets] = (function, *arguments)
         self._send(self._tickets)
@@ -246,7 +246,7 @@ class WorkerPool:
         self._futures[ticket].add_done_callback(lambda _future: ended.put(ticket))
 
     def next_finished(self) -> Finished:
-        """Wait for the next piece of work to end; WorkersGoneError as of `worker_addresses`."""
+        """Wait for the next finished piece of work and return it; WorkersGoneError: see `worker_addresses`."""
         while True:
             if time.monotonic() - self._looked > LOOK_SECONDS:
                 self.worker_addresses()
@@ -264,12 +264,12 @@ class WorkerPool:
                 return finished
 
     def _moved(self) -> None:
-        """Take note of a piece of work that ended: nothing stalls."""
+        """Reset the clock and the restarts of stalls, since a piece of work has ended."""
         self._last_moved = time.monotonic()
         self._restarts = 0
 
     def _finished_work(self, ticket: int, future: Future[Any]) -> Finished | None:
-        """Return what became of a piece of work; None when it is under way again."""
+        """Return a finished piece of work; None if it is under way again."""
         try:
             if future.status != "lost":
                 return Finished(ticket, result=future.result(timeout=RESULT_SECONDS))
@@ -284,19 +284,19 @@ class WorkerPool:
                 )
             ) from error
         except Exception as error:
-            # Whatever the work raised; who asked for the work knows what to make of it.
+            # The work itself raised an error: the caller handles it.
             if future.status == "error" or not isinstance(error, TimeoutError):
                 return Finished(ticket, error=error)
-        # Its worker died with the result in its memory; another one works on it already.
+        # The worker died with the result in its memory; another worker computes it already.
         self._announce(ticket)
         return None
 
     def _is_stalled(self) -> bool:
-        """Return whether no worker computes although work is out: messages about it were not sent, or one hangs.
+        """Return whether no worker computes although work is out: a message is missing, or a worker hangs.
 
-        Dask sends a message when the wall clock has passed a deadline; where the clock was set back, that is
-        never. A worker that loads may not answer for long and have ended its work when it does: so the caller looks
-        for ended work afterwards.
+        Dask sends a message when the wall clock passes a deadline, so never after the clock was set back. A worker that
+        imports modules may answer late, when its work has ended already. The caller therefore checks for finished work
+        afterwards.
         """
         if time.monotonic() - self._last_moved < STALL_SECONDS or not self._present:
             return False
@@ -308,9 +308,9 @@ class WorkerPool:
         return True
 
     def _is_idle(self) -> bool:
-        """Return whether no worker computes, or one does not answer; asked on a way of its own.
+        """Return whether no worker computes, or a worker does not answer, by a direct call of the scheduler.
 
-        A worker answers while it computes: what it calls for a point leaves its other threads free.
+        A worker answers while it computes, since the call of a point leaves its other threads free.
         """
         scheduler = self._client.scheduler
         if scheduler is None:
@@ -323,7 +323,7 @@ class WorkerPool:
             return False
 
     def _restart(self) -> None:
-        """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
+        """Connect anew and send all work again; a chunk computed twice gives the same part."""
         stalled = CampaignError(
             message(
                 f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is "

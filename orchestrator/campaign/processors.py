@@ -1,4 +1,4 @@
-"""How many processors there are, and which workers go together; `cluster`, which needs it, imports all of Dask."""
+"""The number of processors and the choice of workers, apart from `cluster`, which imports all of Dask."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from vibroimpact.fmus.messages import Argument, message
 
 
 def processor_count() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def refuse_two_kinds_of_workers(workers: int | None, scheduler: object) -> None:
-    """Refuse workers of this machine beside those of a scheduler."""
+    """Raise UsageError if both workers of this machine and a scheduler are given."""
     if workers is not None and scheduler is not None:
         raise UsageError(
             message(

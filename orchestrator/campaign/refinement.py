@@ -1,7 +1,7 @@
-"""Where the points of the next round go: between neighbours whose motion jumps, halfway, down to the tolerance.
+"""The points of the next round: halfway between neighbours whose motion jumps, down to the tolerance.
 
-All of it is a function of the rows of the rounds before, and of nothing else: whatever computed these rows, and in
-whatever order, the next points are the same, bit for bit.
+The points depend only on the rows of the rounds before. They are the same bit for bit, whatever computed these rows
+and in whatever order.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """The points that are computed.
+    """The computed points.
 
     Attributes
     ----------
     values : ndarray of float, shape (point, axis)
-        Their swept values, in the order of the axes.
+        Swept values of the points, in the order of the axes.
     direction : ndarray of int, shape (point,)
-        `Direction` of each.
+        `Direction` of each point.
     classes : RunClasses
     """
 
@@ -42,22 +42,22 @@ class Refined:
     """The points of a round."""
 
     values: Floats
-    """Shape (point, axis)."""
+    """Swept values of the points, shape (point, axis)."""
     direction: NDArray[np.int64]
-    """Shape (point,)."""
+    """`Direction` of each point, shape (point,)."""
     below: NDArray[np.intp]
-    """Known point before each by value, shape (point,): where one of an up branch starts; -1 in a plane."""
+    """Known point just below each value, from which an up branch starts, shape (point,); -1 in a plane."""
     above: NDArray[np.intp]
-    """Known point after it, shape (point,)."""
+    """Known point just above each value, from which a down branch starts, shape (point,); -1 in a plane."""
     left: int
-    """Places where the motion jumps that there was no room for."""
+    """Number of jumps of the motion for which there was no room."""
 
 
 def halved_intervals(known: Known, axis: int, tolerance: float, step: float, room: int) -> Refined:
-    """Return the middle of each interval of one axis in which the motion jumps, at most so many, the widest first.
+    """Return the middle of each interval of one axis in which the motion jumps, at most `room`, the widest first.
 
-    Neighbours are compared along each line of the axis. No interval is halved that is at most as wide as the tolerance;
-    ranges that differ by `step` (m) jump.
+    Neighbours are compared along each line of the axis. Only intervals wider than the tolerance are halved; ranges
+    that differ by more than `step` (m) jump.
     """
     others = np.delete(known.values, axis, axis=1)
     along = known.values[:, axis]
@@ -83,7 +83,7 @@ class _Cell(NamedTuple):
     top: float
 
     def mid(self, tolerance: Sequence[float]) -> tuple[list[float], list[float]]:
-        """Return the values at which it is cut along each axis: with its ends, and the middle where it is too wide."""
+        """Return the cuts of the cell along each axis: its ends, and the middle where it is too wide."""
         return _cut(self.left, self.right, tolerance[0]), _cut(self.bottom, self.top, tolerance[1])
 
 
@@ -94,10 +94,10 @@ def _cut(low: float, high: float, tolerance: float) -> list[float]:
 def cut_cells(
     known: Known, start: Sequence[Sequence[float]], tolerance: Sequence[float], step: float, room: int
 ) -> Refined:
-    """Return the points that cut each cell of a plane at whose corners and edges the motion is not the same.
+    """Return the points that cut each cell of a plane whose corners and edges have different motions.
 
-    The values `start` began the two axes, ascending. A cell is cut along an axis while it is wider than the tolerance;
-    `step` and `room` are those of `halved_intervals`.
+    `start` are the first values of the two axes, ascending. A cell is cut along an axis while it is wider than the
+    tolerance; for `step` and `room` see `halved_intervals`.
     """
     plane = _Plane(known, tolerance, step)
     found: dict[tuple[float, float], None] = {}
@@ -125,7 +125,7 @@ class _Plane:
         self._tolerance, self._step = tolerance, step
 
     def cuts(self, cell: _Cell) -> Iterator[list[tuple[float, float]]]:
-        """Yield the new points of each cell that has to be cut, in the order of the cells."""
+        """Yield the new points of each cell that must be cut, in the order of the cells."""
         across, along = cell.mid(self._tolerance)
         points = [(x, y) for x in across for y in along]
         new = [point for point in points if point not in self._rows]
@@ -145,7 +145,7 @@ class _Plane:
         return spread > self._step or len({self._label[row] for row in rows}) > 1
 
     def _around(self, cell: _Cell) -> set[tuple[float, float]]:
-        """Return the known points at the corners of a cell, and those that finer neighbours have put on its edges."""
+        """Return the known points at the corners of a cell, and points of finer neighbours on its edges."""
         found = {(x, y) for x in (cell.left, cell.right) for y in (cell.bottom, cell.top)}
         for y in (cell.bottom, cell.top):
             self._between((cell.left, y), (cell.right, y), found)

@@ -1,4 +1,4 @@
-"""What a campaign did, for whoever started it."""
+"""The report of a campaign: its numbers of runs, outcomes, workers and times."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from vibroimpact.orchestrator.campaign.chunks import Chunk
 
 
 class CampaignInterrupted(KeyboardInterrupt):
-    """Ctrl-C ended a campaign in good order; its text says what is there and how to go on."""
+    """Ctrl-C ended a campaign in good order; the text has the completed points and the way to resume."""
 
 
 @dataclass(slots=True)
 class CampaignReport:
-    """What a campaign did.
+    """The results of a campaign.
 
     Attributes
     ----------
     dataset : Path
     runs : int
-        Runs in the dataset.
+        Number of runs in the dataset.
     resumed : int
-        Runs that were there already; equal to `runs` when there was nothing to do.
+        Number of runs that were complete before; equal to `runs` if nothing was left to do.
     outcomes : Counter
-        How the runs computed now ended.
+        Number of runs of this command, by outcome.
     chunks : list of Chunk
-        In the order in which they ended.
+        Computed chunks, in the order in which they ended.
     workers : int
-        0 where all was computed in this process.
+        Number of workers; 0 where all was computed in this process.
     lost_workers : int
-        How many died before the last point was done.
+        Number of workers that died before the last point was done.
     compute_seconds : float
-        From the first chunk handed out to the last one done; workers were ready before, s.
+        Time from the first chunk to the end of the last chunk, without the start of workers, s.
     compaction_seconds : float
-        Making one dataset of the parts, s.
+        Time to make one dataset of the parts, s.
     is_silent : bool
-        No run of the dataset failed or warns of anything, as is known where it was made now.
+        Whether no run of the dataset has a message; known only if this command made the dataset.
     """
 
     dataset: Path

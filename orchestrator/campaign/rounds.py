@@ -1,7 +1,7 @@
-"""The stages of a campaign: a sweep is one; where axes are adaptive each round of points is one, and makes the next.
+"""The stages of a campaign: a sweep is one stage; with adaptive axes, each round of points is a stage.
 
-A round is a function of the rows of the rounds before, so that a campaign which goes on has the rounds that it had,
-whatever ended it and however many workers there were. Runs are numbered round after round.
+A round depends only on the rows of the rounds before. A resumed campaign therefore has the same rounds, for any
+interruption and any number of workers. Runs are numbered round after round.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from vibroimpact.orchestrator.scene.sweep import Branch, Points, SweepAxis, Swee
 _WAYS: dict[int, SweepDirection] = {Direction.up: "up", Direction.down: "down"}
 
 Stored = Callable[[], Sequence[StoredPart]]
-"""Returns the sound parts that a campaign has by now, in run order."""
+"""Returns the present sound parts of a campaign, in run order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +38,15 @@ class Stage:
 
     branches: tuple[Branch, ...]
     held: list[StoredPart]
-    """The runs before `runs` that need not be computed."""
+    """Parts of the runs before `runs` that need not be computed."""
     runs: int
-    """Runs of the campaign with this stage."""
+    """Number of runs of the campaign including this stage."""
     said: str = ""
-    """What progress says of it; empty of a plain sweep."""
+    """Words on the round for the progress; empty for a plain sweep."""
 
 
 def adaptive_axes(scene: Scene) -> tuple[SweepAxis, ...]:
-    """Return the axes of a scene whose points are put where the motion jumps."""
+    """Return the adaptive axes of a scene, with points where the motion jumps."""
     return tuple(axis for axis in scene.sweep if axis.adaptive is not None)
 
 
@@ -56,7 +56,7 @@ class Rounds:
     Attributes
     ----------
     left : int
-        Places where the motion jumps that `at_most` left no points for, in the last round.
+        Number of jumps in the last round for which `at_most` left no points.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -70,7 +70,7 @@ class Rounds:
         self._usable: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
 
     def stages(self, stored: Stored) -> Iterator[Stage]:
-        """Yield each round that is not complete; when one is asked for the next, its parts are among those stored."""
+        """Yield each round that is not complete; its parts must be stored before the next round is requested."""
         branches, first, number = expand(self._scene), 0, 0
         while branches:
             stop = first + sum(len(branch.points) for branch in branches)
@@ -83,13 +83,14 @@ class Rounds:
             branches, first, number = self._next(stop), stop, number + 1
 
     def branch_of(self, rows: xr.Dataset, run: int) -> Branch | None:
-        """Return the branch of a run; None where no round has it, or one before it is not complete.
+        """Return the branch of a run; None where no round has the run, or a round before it is not complete.
 
         Parameters
         ----------
         rows : xarray.Dataset
-            Runs that are computed, one-dimensional.
+            Computed runs, one-dimensional.
         run : int
+            Number of the run.
         """
         branches, first = expand(self._scene), 0
         runs = rows.run_index.values
@@ -108,7 +109,7 @@ class Rounds:
     def _parts(
         self, stored: Sequence[StoredPart], branches: Sequence[Branch], first: int, stop: int
     ) -> list[StoredPart]:
-        """Return the parts of a round; one of other points, of rows that had to be computed again, is removed."""
+        """Return the parts of a round; parts with other points, from rows computed again since, are removed."""
         found = []
         for part in stored:
             if first <= part.chunk.first and part.chunk.stop <= stop and part.path.exists():
@@ -121,14 +122,14 @@ class Rounds:
     def _is_of(self, rows: xr.Dataset, branches: Sequence[Branch]) -> bool:
         runs = rows.run_index.values
         points = points_of(branches, Chunk(0, int(runs[0]), int(runs[-1]) + 1))
-        wanted = np.stack([points.values[key] for key in self._names], axis=1)
-        return bool(np.array_equal(wanted, self._values(rows)))
+        expected = np.stack([points.values[key] for key in self._names], axis=1)
+        return bool(np.array_equal(expected, self._values(rows)))
 
     def _values(self, rows: xr.Dataset) -> NDArray[np.float64]:
         return np.stack([rows[name].values for name in self._names.values()], axis=1)
 
     def _take(self, rows: xr.Dataset) -> None:
-        """Add the rows of a complete round to what is known."""
+        """Add the rows of a complete round to the known points."""
         states = final_states(rows, slice(None))
         usable = np.isin(rows.outcome.values, CARRYING) & np.isfinite(states).all(axis=1)
         values, classes = self._values(rows), classes_of(rows)
@@ -145,7 +146,7 @@ class Rounds:
         self._usable = np.concatenate([self._usable, usable])
 
     def _next(self, first: int) -> tuple[Branch, ...]:
-        """Return the branches of the next round; none where every jump is bracketed, or there is no more room."""
+        """Return the branches of the next round; none if every jump is bracketed, or no room is left."""
         assert self._known is not None
         room = self._at_most - first
         tolerance = [axis.adaptive.tolerance for axis in self._axes if axis.adaptive is not None]
@@ -159,7 +160,7 @@ class Rounds:
         return self._branches(refined, first)
 
     def _step(self) -> float:
-        """Return the difference of ranges that is a jump (m)."""
+        """Return the difference of ranges above which the motion jumps, m."""
         assert self._known is not None
         extent = self._known.classes.extent
         shares = [axis.adaptive.jump for axis in self._axes if axis.adaptive is not None]
@@ -184,9 +185,9 @@ class Rounds:
         )
 
     def _start(self, refined: Refined, number: int) -> State | None:
-        """Return the state from which a point goes on: that of the nearest computed point before it on its branch.
+        """Return the start state of a point: the final state of the nearest computed point before it on its branch.
 
-        A point that did not come to its end hands on that of the one before it, as along any path.
+        A run that ended early is skipped, so that the point before it hands on its state, as along any path.
         """
         assert self._known is not None
         up = refined.direction[number] == Direction.up
@@ -206,9 +207,9 @@ class Rounds:
 def stages_of(
     scene: Scene, rounds: Rounds | None, stored: Stored, kept: Sequence[StoredPart]
 ) -> Iterator[Stage]:
-    """Yield what a campaign has to compute, one after the other: its sweep, or each round of an adaptive one.
+    """Yield the stages of a campaign, one after the other: its sweep, or each round of an adaptive sweep.
 
-    Rounds are None of a plain sweep; `kept` are stretches of runs from an earlier sweep.
+    `rounds` is None for a plain sweep; `kept` are stretches of runs from an earlier sweep.
     """
     if rounds is not None:
         yield from rounds.stages(stored)

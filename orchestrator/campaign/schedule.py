@@ -1,14 +1,14 @@
-"""How the runs of a campaign are cut into chunks while they are computed.
+"""The cut of a campaign's runs into chunks while they are computed.
 
 A chunk should take about `CHUNK_SECONDS`: long enough that scheduling and writing do not count, short enough
-that little is lost when a process dies. How long a point takes is measured as the campaign goes; a chunk that
-turns out much longer than planned ends early, and what is left of it is handed out again.
+that little is lost when a process dies. The campaign measures the time of a point as it goes. A chunk that takes much
+longer than planned ends early, and its rest is handed out again.
 
 Runs are cut in whole *units*: a single independent run, or a whole branch of a continuation sweep. Towards
 the end the chunks get shorter, so that all workers finish together (guided self-scheduling). A branch that
-takes longer than a chunk becomes a *strand*: its next chunk exists only when the one before has ended,
-and strands run side by side. Branches that run side by side in one chunk, in lanes, are handed out together however
-long they take: one alone would take as long as all of them.
+takes longer than a chunk is computed piece by piece: its next chunk exists only when the chunk before has ended.
+Several such branches are under way side by side. Branches in lanes share a chunk, however long they take: a single
+branch would take as long as all of them.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene.sweep import Branch
 
 CHUNK_SECONDS = 1.0
-"""Work in one chunk, s."""
+"""Planned time of one chunk, s."""
 
 SHORTEST_SECONDS = 0.1
-"""Work in the last chunks of a sweep, s."""
+"""Least planned time of a chunk, s, for the last chunks of a sweep."""
 
 FIRST_POINTS = 64
-"""Points in a chunk while nothing is known of how long they take; it ends early when they take long."""
+"""Number of points in a chunk before the time of a point is known; a slow chunk ends early."""
 
 PATIENCE = 2.0
-"""A chunk ends early when it takes this many times as long as was planned: points differ."""
+"""Time of a chunk over its planned time, above which it ends early, since points differ."""
 
 MOST_POINTS = 20_000
-"""Points in one chunk, however quick they are: a part must fit in memory."""
+"""Largest number of points in one chunk, so that a part fits in memory."""
 
 LOST_PIECES = 16
-"""Into how many pieces a chunk is cut when it killed its worker, to find the point that does it."""
+"""Number of pieces into which a chunk is cut that killed its worker, to find the point at fault."""
 
 BRANCHES_IN_LANES, FEWEST_IN_LANES = 32, 8
-"""Branches that a chunk should have at least where they run in lanes, so that few lanes wait for the longest branch;
-and at least where not many are left for each worker, lest lanes are empty."""
+"""Least number of branches of a chunk in lanes. The first bounds it while many branches are left for each worker, so
+that few lanes wait for the longest branch. The second holds when few are left, so that no lanes stay empty."""
 
 QUEUED_PER_WORKER = 3
-"""Chunks handed out for each worker: one that runs, the rest so that it never waits for the next."""
+"""Number of chunks handed out for each worker: one runs, and the others follow without a pause."""
 
 
 @dataclass(slots=True)
 class Gap:
-    """Runs `first` to `stop - 1` to compute; the first starts from `start`, a chunk has at most `most`."""
+    """Runs `first` to `stop - 1` to compute; the first starts from `start`, a chunk has at most `most` runs."""
 
     first: int
     stop: int
@@ -59,15 +59,15 @@ class Gap:
     most: int = MOST_POINTS
 
     def take(self, count: int) -> Gap:
-        """Cut the first runs off."""
+        """Cut off the first `count` runs and return them."""
         taken = Gap(self.first, min(self.first + count, self.stop), self.start, self.most)
         self.first = taken.stop
         return taken
 
 
 @dataclass(slots=True)
-class _Strand:
-    """What is left of one branch that is computed piece by piece, in order."""
+class _BranchRest:
+    """The rest of one branch that is computed piece by piece, in order."""
 
     branch: int
     gaps: deque[Gap]
@@ -75,9 +75,9 @@ class _Strand:
 
 
 class ChunkSchedule:
-    """Cuts what is left of a campaign into chunks for a number of workers; branches and parts are in run order.
+    """Cuts the rest of a campaign into chunks for a number of workers; branches and parts are in run order.
 
-    `in_lanes`: branches of one chunk run side by side.
+    `in_lanes`: whether branches of one chunk run side by side.
     """
 
     def __init__(
@@ -89,8 +89,8 @@ class ChunkSchedule:
         self._unit = len(branches[0].points) if self._chained else 1
         self._pace: float | None = None
         self._units: deque[Gap] = deque()
-        self._strands: deque[_Strand] = deque()
-        self._begun: dict[int, _Strand] = {}
+        self._waiting: deque[_BranchRest] = deque()
+        self._open_branches: dict[int, _BranchRest] = {}
         runs = self._first_runs[-1] + len(branches[-1].points)
         for gap in gaps_between(parts, runs):
             self._queue(gap)
@@ -98,79 +98,79 @@ class ChunkSchedule:
 
     @property
     def most_in_flight(self) -> int:
-        """How many chunks are worth handing out at a time."""
+        """Largest number of chunks handed out at a time."""
         return QUEUED_PER_WORKER * self._workers
 
     @property
     def seconds_left(self) -> float:
-        """Return how long the runs that are not handed out take at the pace so far, s; 0 before it is known."""
+        """Time of the runs that are not handed out, at the pace so far, s; 0 before the pace is known."""
         return self.left * (self._pace or 0.0)
 
     def next_chunk(self) -> Chunk | None:
-        """Hand out a chunk; None when nothing can be computed before another chunk has ended."""
-        if self._units and len(self._begun) < self.most_in_flight:
+        """Return the next chunk to compute; None while all remaining chunks wait for the end of another chunk."""
+        if self._units and len(self._open_branches) < self.most_in_flight:
             return self._cut_units()
-        if self._strands:
-            return self._cut_strand(self._strands.popleft())
+        if self._waiting:
+            return self._cut_branch(self._waiting.popleft())
         return None
 
-    def finished(self, asked: Chunk, result: ChunkResult) -> None:
-        """Take note of a chunk that is done, with what it left open and how long it took."""
+    def finished(self, planned: Chunk, result: ChunkResult) -> None:
+        """Record a finished chunk, with the runs that it left out and the time that it took."""
         done = result.chunk
         if result.compute_seconds > 0.0:
             latest = result.compute_seconds / done.count
             self._pace = latest if self._pace is None else 0.5 * (self._pace + latest)
-        strand = self._begun.get(asked.branch)
-        if done.stop < asked.stop:
-            self._take_back(strand, Gap(done.stop, asked.stop, result.carried))
-        if strand is None:
+        rest = self._open_branches.get(planned.branch)
+        if done.stop < planned.stop:
+            self._take_back(rest, Gap(done.stop, planned.stop, result.carried))
+        if rest is None:
             return
         if result.compute_seconds > 0.0:
-            strand.pace = result.compute_seconds / done.count
-        if strand.gaps and strand.gaps[0].first == done.stop:
-            strand.gaps[0].start = result.carried
-        self._go_on(strand)
+            rest.pace = result.compute_seconds / done.count
+        if rest.gaps and rest.gaps[0].first == done.stop:
+            rest.gaps[0].start = result.carried
+        self._go_on(rest)
 
     def lost(self, chunk: Chunk) -> None:
         """Take back a chunk that killed its worker, to be handed out again in small pieces."""
-        strand = self._begun.get(chunk.branch)
-        if strand is None and self._chained and chunk.count <= self._unit:
-            strand = self._begun[chunk.branch] = _Strand(chunk.branch, deque())
-        self._take_back(strand, Gap(chunk.first, chunk.stop, chunk.start, max(1, chunk.count // LOST_PIECES)))
-        if strand is not None:
-            self._go_on(strand)
+        rest = self._open_branches.get(chunk.branch)
+        if rest is None and self._chained and chunk.count <= self._unit:
+            rest = self._open_branches[chunk.branch] = _BranchRest(chunk.branch, deque())
+        self._take_back(rest, Gap(chunk.first, chunk.stop, chunk.start, max(1, chunk.count // LOST_PIECES)))
+        if rest is not None:
+            self._go_on(rest)
 
-    def _take_back(self, strand: _Strand | None, gap: Gap) -> None:
+    def _take_back(self, rest: _BranchRest | None, gap: Gap) -> None:
         self.left += gap.stop - gap.first
-        if strand is not None:
-            strand.gaps.appendleft(gap)
+        if rest is not None:
+            rest.gaps.appendleft(gap)
         else:
             self._queue(gap)
 
-    def _go_on(self, strand: _Strand) -> None:
-        if strand.gaps:
-            self._strands.append(strand)
+    def _go_on(self, rest: _BranchRest) -> None:
+        if rest.gaps:
+            self._waiting.append(rest)
         else:
-            del self._begun[strand.branch]
+            del self._open_branches[rest.branch]
 
     def _queue(self, gap: Gap) -> None:
-        """Sort the runs of a gap into whole units and strands."""
+        """Sort the runs of a gap into whole units and pieces of branches."""
         for piece in self._at_branch_ends(gap):
             branch = self._branch_of(piece.first)
             if (piece.stop - piece.first) % self._unit == 0:
                 self._units.append(piece)
-            elif branch in self._begun:
-                self._begun[branch].gaps.append(piece)
+            elif branch in self._open_branches:
+                self._open_branches[branch].gaps.append(piece)
             else:
-                strand = self._begun[branch] = _Strand(branch, deque([piece]))
-                self._strands.append(strand)
+                rest = self._open_branches[branch] = _BranchRest(branch, deque([piece]))
+                self._waiting.append(rest)
 
     def _at_branch_ends(self, gap: Gap) -> Iterator[Gap]:
         """Split a gap into the rest of a branch, whole branches, and the beginning of a branch."""
         offset = gap.first % self._unit
         if offset:
             yield gap.take(self._unit - offset)
-        # From here on branches begin, at the scene's own start state.
+        # From here on, whole branches begin at the scene's own start state.
         gap.start = None
         whole = (gap.stop - gap.first) // self._unit * self._unit
         if whole:
@@ -190,12 +190,12 @@ class ChunkSchedule:
             self._units.popleft()
         branch = self._branch_of(taken.first)
         if points < self._unit:
-            strand = self._begun[branch] = _Strand(branch, deque([taken]), self._pace)
-            return self._cut_strand(strand)
+            rest = self._open_branches[branch] = _BranchRest(branch, deque([taken]), self._pace)
+            return self._cut_branch(rest)
         return self._hand_out(branch, taken, seconds)
 
     def _points_beside(self, gap: Gap) -> int:
-        """Return how many points a chunk has at least for its branches to run side by side; 0 where they do not."""
+        """Return the least number of points of a chunk in lanes, so that lanes are full; 0 without lanes."""
         if not (self._chained and self._in_lanes) or gap.most < MOST_POINTS:
             return 0
         share = -(-(gap.stop - gap.first) // (self._unit * self._workers))
@@ -203,22 +203,22 @@ class ChunkSchedule:
         return min(beside, MOST_POINTS // self._unit) * self._unit
 
     def _fair_seconds(self) -> float:
-        """Return how long the next chunk of units should take: half of a worker's share of the rest."""
+        """Return the planned time of the next chunk of units, s: half of a worker's share of the rest."""
         share = self.left * (self._pace or 0.0) / (2 * self._workers)
         return min(CHUNK_SECONDS, max(share, SHORTEST_SECONDS))
 
-    def _cut_strand(self, strand: _Strand) -> Chunk:
-        gap = strand.gaps[0]
-        pace = strand.pace or self._pace
+    def _cut_branch(self, rest: _BranchRest) -> Chunk:
+        gap = rest.gaps[0]
+        pace = rest.pace or self._pace
         seconds = SHORTEST_SECONDS if pace is None else CHUNK_SECONDS
         count = _points_in(seconds, pace)
         if gap.stop - gap.first < 1.5 * count:
-            # A short rest is not worth a chunk of its own.
+            # A short rest is taken along, without a chunk of its own.
             count = gap.stop - gap.first
         taken = gap.take(min(count, gap.most))
         if gap.first == gap.stop:
-            strand.gaps.popleft()
-        return self._hand_out(strand.branch, taken, seconds)
+            rest.gaps.popleft()
+        return self._hand_out(rest.branch, taken, seconds)
 
     def _hand_out(self, branch: int, taken: Gap, seconds: float) -> Chunk:
         self.left -= taken.stop - taken.first
@@ -226,14 +226,14 @@ class ChunkSchedule:
 
 
 def _points_in(seconds: float, pace: float | None) -> int:
-    """Return how many points make a chunk of this length."""
+    """Return the number of points in a chunk of `seconds`, s, at a pace, s per point."""
     if pace is None:
         return FIRST_POINTS
     return max(1, min(int(seconds / max(pace, 1e-9)), MOST_POINTS))
 
 
 def gaps_between(parts: Sequence[StoredPart], runs: int) -> Iterator[Gap]:
-    """Yield the gaps between parts in run order, each with the state that the part before it hands on."""
+    """Yield the gaps between parts in run order, each with the state handed on by the part before it."""
     reached, carried = 0, None
     for part in parts:
         if part.chunk.first > reached:

@@ -1,4 +1,4 @@
-"""Do the workers see the folder that the campaign writes to? Asked by a file, not by its name."""
+"""The check that all workers see the folder of a campaign, by a file in it, not by the folder's name."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def answer_question(folder: str, name: str) -> str:
-    """Read a question in a folder, on a worker, and leave an answer beside it, whose name is returned.
+    """Read a question file in a folder, on a worker; write an answer file next to it and return its name.
 
-    It is empty when the worker does not see the question or cannot write.
+    The name is empty if the worker does not see the question or cannot write.
     """
     answer = f".answer-{name}-{secrets.token_hex(8)}"
     try:
@@ -29,7 +29,7 @@ def answer_question(folder: str, name: str) -> str:
 
 
 def refuse_blind_workers(pool: WorkerPool, folder: Path) -> None:
-    """Raise UsageError with the workers that do not read and write the same folder as this process."""
+    """Raise UsageError unless all workers read and write the same folder as this process."""
     name = secrets.token_hex(16)
     question = folder / f".question-{name}"
     question.write_text(name, encoding="ascii")

@@ -1,1 +1,1 @@
-"""The command line: `cli` is what starts, `table` names all commands, a module for each is what it does."""
+"""The command line: `cli` starts it, `table` names all commands, and one module carries out each command."""

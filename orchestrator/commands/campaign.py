@@ -1,4 +1,4 @@
-"""What `vibroimpact campaign` does."""
+"""The command `vibroimpact campaign`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.study.preparing import prepared
 
 
 def run_to_folder(options: Campaign) -> None:
-    """Run a scene's sweep into the folder of a campaign and say what was done."""
+    """Run a scene's sweep into the folder of a campaign and print a summary."""
     refuse_two_kinds_of_workers(options.workers, options.scheduler)
     refuse_system_elsewhere(options.scene, options.scheduler)
     loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)
@@ -29,7 +29,7 @@ def run_to_folder(options: Campaign) -> None:
 
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
-    """Run a campaign and say what it did."""
+    """Run a campaign and print a summary."""
     report = computed(scene, folder, workers=workers, scheduler=scheduler)
     if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
         say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
@@ -50,7 +50,7 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
 def computed(
     scene: Scene, folder: Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> CampaignReport:
-    """Run a campaign; an interrupted one raises typer.Exit, and what to do about it is said."""
+    """Run a campaign; an interrupted one prints how to resume it and raises typer.Exit."""
     try:
         with shown_progress() as progress:
             return run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)

@@ -1,4 +1,4 @@
-"""What `vibroimpact check` does: it says what a scene without problems runs, and what it would cost."""
+"""The command `vibroimpact check`: prints the problems of a scene, or its engine, effects and cost."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WIDTH = 10
 
 
 def check_scene(options: Check) -> None:
-    """Load a scene, compute one point of it, and print what would run and what it would cost.
+    """Load a scene, compute one point of it, and print its engine, its effects and its cost.
 
     SceneError: the scene has problems. typer.Exit: the point failed.
     """
@@ -56,8 +56,11 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
     if meeting := contacts(scene):
         yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     known = effects(scene)
-    told = ("stops" if scene.stops else "", "contacts")
-    yield "effects", ", ".join(name for name, there in known.items() if there and name not in told) or "none"
+    listed = ("stops" if scene.stops else "", "contacts")
+    yield (
+        "effects",
+        ", ".join(name for name, there in known.items() if there and name not in listed) or "none",
+    )
     yield "without", ", ".join(name for name, there in known.items() if not there)
 
 
@@ -102,8 +105,8 @@ def _trial(trial: Trial) -> str:
     if trial.given_up:
         return f"{where}given up after {duration(MOST_TRIAL_SECONDS)}"
     if trial.message:
-        said = " ".join(trial.message.split())
-        return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {said}"
+        text = " ".join(trial.message.split())
+        return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {text}"
     alike = "; what follows takes all points to be like it" if at else ""
     if trial.lane_seconds is not None:
         alike = (

@@ -1,7 +1,7 @@
 """The command `vibroimpact`: one app; `table` names the commands, and another package can add its own.
 
-A function in the entry-point group `vibroimpact.commands` is called with the app where no command of this package is
-called.
+A function in the entry-point group `vibroimpact.commands` is called with the app, unless the command is one of this
+package.
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FEW_DESCRIPTORS = frozenset({errno.EMFILE, errno.ENFILE})
 _IMPORTING = "<frozen importlib._bootstrap>"
 _COLLECT_AFTER = 10_000
-"""Objects after which garbage is looked for; Python's own number is 700 or 2000."""
+"""New objects after which Python collects garbage; its own default is 700 or 2000."""
 _SOON = 0.02
-"""Seconds after which an interrupt that would have been lost comes again."""
+"""Delay after which a lost interrupt is raised again, s."""
 
 
 @contextmanager
 def _printable_misuse() -> Iterator[None]:
-    """Show the words of a command that is misused as `say` would; typer repeats them as they are."""
+    """Make the words of a misused command printable, as `say` does; typer repeats them unchanged."""
     try:
         yield
     except Exception as problem:
-        # misuse, whose class is typer's or click's with its version
+        # misuse: its class is typer's or click's, depending on the version
         if hasattr(problem, "format_message") and hasattr(problem, "message"):
             problem.message = printable(problem.message)
         raise
@@ -71,7 +71,7 @@ class _Commands(TyperGroup):
             return super().invoke(ctx)
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the commands in the order of their panels; those of other packages come last."""
+        """Return the names of the commands in the order of their panels; other packages' commands come last."""
         return sorted(self.commands, key=[*ORDER, *self.commands].index)
 
 
@@ -85,8 +85,8 @@ app = typer.Typer(
 )
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         say(f"vibroimpact {metadata.version('vibroimpact')}")
         raise typer.Exit
 
@@ -114,7 +114,7 @@ def _add_foreign(app: typer.Typer) -> None:
 
 
 def _with_called(words: Sequence[str]) -> typer.Typer:
-    """Return an app with the command that is called; where it is none of this package, with all there are."""
+    """Return an app with the called command; for a command of no name in this package, with all commands."""
     named = list(itertools.filterfalse(operator.methodcaller("startswith", "-"), words))
     called = copy.copy(app)
     if named and named[0] in COMMANDS.keys() | GROUPS.keys():
@@ -131,9 +131,9 @@ def _with_called(words: Sequence[str]) -> typer.Typer:
 
 @contextmanager
 def _no_vain_collections() -> Iterator[None]:
-    """Collect garbage less often, and not when the process ends.
+    """Collect garbage less often, and not at the end of the process.
 
-    Imports make some 300,000 objects that stay. Looking at them over and over takes a tenth of a short command.
+    Imports make some 300,000 objects that stay. Repeated collections over them take a tenth of a short command.
     """
     atexit.register(gc.freeze)
     usual = gc.get_threshold()
@@ -146,9 +146,9 @@ def _no_vain_collections() -> Iterator[None]:
 
 @contextmanager
 def _no_library_warns() -> Iterator[None]:
-    """Show no warning of a library: its reader is a developer, and what a person should know a command says itself.
+    """Hide warnings of libraries: they are for developers, and a command prints what its user needs.
 
-    The filter comes last, so that `python -W`, PYTHONWARNINGS and tests have their way.
+    The filter comes last, so that `python -W`, PYTHONWARNINGS and tests can override it.
     """
     silent = logging.NullHandler()
     logging.getLogger().addHandler(silent)
@@ -162,14 +162,14 @@ def _no_library_warns() -> Iterator[None]:
 
 @contextmanager
 def _no_interrupt_is_lost() -> Iterator[None]:
-    """Let an interrupt that would be lost come a moment later.
+    """Raise an interrupt that would be lost again, a moment later.
 
-    It is lost in two places. A compiled module whose import is interrupted may report an ImportError instead, which
-    its Python half takes for leave to do without it (so `xml.etree` does). And an exception in `__del__`, or in
+    An interrupt is lost in two places. First, a compiled module may report an ImportError when its import is
+    interrupted. Its Python half then does without it (`xml.etree` does so). Second, an exception in `__del__`, or in
     another function whose caller cannot raise, is ignored.
     """
     handler, ignored = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    # where Ctrl-C is ignored, or another program handles it, it stays so
+    # an ignored Ctrl-C, or one that another program handles, stays so
     if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -214,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for word in given:
             refuse_no_text(word)
         with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns():
-            # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
+            # typer reports misuse (2) and Ctrl-C (130) by itself; our own errors come out
             typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:
         sys.exit(end.code or (0 if all_was_written() else 1))
@@ -229,10 +229,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _of_surroundings(error: Exception) -> UsageError | None:
-    """Return the error that says what surrounds the command where that caused another error; None elsewhere."""
+    """Return the error of the command's surroundings if they caused another error, else None."""
     causes = list(_causes(error))
     numbers = {cause.errno for cause in causes if isinstance(cause, OSError)}
-    # A compiled module that cannot be opened is an ImportError, which has the words alone.
+    # a compiled module that cannot be opened is an ImportError, with no errno
     if numbers & _FEW_DESCRIPTORS or os.strerror(errno.EMFILE) in str(error):
         return UsageError(
             "this machine: expected another file that may be opened, got too many open ones. "
@@ -247,7 +247,7 @@ def _of_surroundings(error: Exception) -> UsageError | None:
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error, what it came from, and so on."""
+    """Yield an error, its cause, and so on."""
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
@@ -262,7 +262,7 @@ def _no_current_folder() -> bool:
 
 
 def _words(error: Exception, *, debug: bool) -> str:
-    """Return what to say of an error; of one that nobody foresaw, where a developer finds its place."""
+    """Return the message of an error; for an unexpected one with advice on how to report it."""
     if isinstance(error, VibroimpactError):
         return error.typed
     if isinstance(error, OSError) and error.errno in _FULL:

@@ -1,4 +1,4 @@
-"""`vibroimpact demo`: a scene file becomes a campaign, a dataset, a figure and numbers to check."""
+"""The command `vibroimpact demo`: a scene file becomes a campaign, a dataset, a figure and numbers to check."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 
 SCENE = "demo_scene.toml"
 STEPS_ALLOWED = 2.0
-"""How far a reading may lie from the exact value, in steps of the sweep."""
+"""Largest allowed distance of a reading from the exact value, in steps of the sweep."""
 
 
 def run_demo(options: Demo) -> None:
-    """Run the packaged bifurcation scene into a folder, draw its figure there, and say what was done and read.
+    """Run the packaged bifurcation scene into a folder, draw its figure there, and print the readings.
 
-    A reading that is not within `STEPS_ALLOWED` of its exact value raises CampaignError, an interrupted campaign
-    typer.Exit.
+    CampaignError: a reading is not within `STEPS_ALLOWED` of its exact value. typer.Exit: the campaign was
+    interrupted.
     """
     console, output = Terminal(soft_wrap=True), options.output
     began = time.perf_counter()
@@ -35,7 +35,7 @@ def run_demo(options: Demo) -> None:
         scene = load_scene(path)
     console.print(f"Scene: {scene.title}; {len(scene.sweep[0].values)} frequencies, up and down.")
     report = computed(scene, output)
-    console.print(_told(report, scene))
+    console.print(_summary(report, scene))
     with open_dataset(report.dataset) as dataset:
         figure = output / "bifurcation.png"
         figures.save(figures.draw(dataset, "bifurcation"), figure)
@@ -48,7 +48,7 @@ def run_demo(options: Demo) -> None:
     _refuse_far_readings(readings)
 
 
-def _told(report: CampaignReport, scene: Scene) -> str:
+def _summary(report: CampaignReport, scene: Scene) -> str:
     if not report.chunks:
         return f"All {report.runs} points were there already; delete the folder to compute them again."
     periods = (scene.record.transient_periods or 0) + (scene.record.recorded_periods or 0)

@@ -1,4 +1,4 @@
-"""What `vibroimpact fmu export` does: a component, a scene's body, or a contact law of the user's becomes an FMU."""
+"""The command `vibroimpact fmu export`: a component, a scene's body, or a user's contact law becomes an FMU."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ USER_CONTACT_LAW = "user-contact-law"
 
 
 def export_to_file(options: ExportFmu) -> None:
-    """Write an FMU and say where it is."""
+    """Write an FMU and print its path."""
     component, platform, law, output = options.component, options.platform, options.law, options.output
     counts = {name: getattr(options, name) for name in ("contacts", "modes", "masses", "sensors")}
     kinds = {
@@ -43,7 +43,7 @@ def export_to_file(options: ExportFmu) -> None:
 
 
 def _export_scene_file(options: ExportFmu, kinds: Mapping[str, bool]) -> None:
-    # half a second of libraries that a component needs none of
+    # these libraries take half a second to load, and a component needs none
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
     from vibroimpact.orchestrator.run.export import export_scene
     from vibroimpact.orchestrator.scene import load_scene

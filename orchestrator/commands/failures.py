@@ -1,4 +1,4 @@
-"""What the command line says of points: how many failed, the first of them with their messages, and warnings."""
+"""Messages of the command line on points: the number of failures, the first failed points, and warnings."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from vibroimpact.analysis.dataset import Outcome, open_dataset
 from vibroimpact.fmus.messages import counted
 
 FAILED = (Outcome.error, Outcome.crash, Outcome.timeout)
-"""Outcomes of points without a result; the others are physics."""
+"""Outcomes of points without a result; other outcomes are physics."""
 MOST_LISTED = 10
 MOST_WARNINGS = 3
-"""Different warnings that a command repeats."""
+"""Most different warnings that a command repeats."""
 MOST_RUNS_READ = 100_000
-"""Larger campaigns keep their warnings to the dataset."""
+"""Most runs of a campaign for which warnings are printed; larger ones keep them in the dataset."""
 LONGEST_MESSAGE = 400
 
 
 def outcome_lines(path: Path, runs: int) -> Iterator[str]:
-    """Yield what is to be said of a dataset's points: those that failed, and warnings of those that went well."""
+    """Yield the messages on a dataset's points: failures, and warnings of points that went well."""
     with open_dataset(path) as dataset:
         yield from failure_lines(dataset)
         if runs <= MOST_RUNS_READ:
@@ -31,7 +31,7 @@ def outcome_lines(path: Path, runs: int) -> Iterator[str]:
 
 
 def failure_lines(dataset: xr.Dataset) -> Iterator[str]:
-    """Yield one line for each outcome that failed points have, then one for each of the first points.
+    """Yield one line for each outcome of failed points, then one for each of the first failed points.
 
     Messages are read only when a point failed.
     """
@@ -53,7 +53,7 @@ def failure_lines(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _where(dataset: xr.Dataset, place: NDArray[np.intp]) -> str:
-    """Return the swept values of a point; nothing for the only point of a scene."""
+    """Return the swept values of a point; empty for the only point of a scene."""
     values = [
         f"{name} = {dataset[name].values[index]}"
         for name, index in zip(dataset.outcome.dims, place, strict=True)
@@ -62,7 +62,7 @@ def _where(dataset: xr.Dataset, place: NDArray[np.intp]) -> str:
 
 
 def _warning_lines(dataset: xr.Dataset) -> Iterator[str]:
-    """Yield the messages of runs that went well: such runs have one only where their body warned."""
+    """Yield the messages of runs that went well: such a message is a warning of the body."""
     fine = np.isin(dataset.outcome.values, [Outcome.ok, Outcome.stuck])
     messages = sorted({str(text) for text in dataset.message.values[fine] if text})
     for message in messages[:MOST_WARNINGS]:

@@ -1,4 +1,4 @@
-"""What `vibroimpact replay` does."""
+"""The command `vibroimpact replay`."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
 
 
 def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
-    # Dask takes a tenth of a second to load, and a replay into a dataset does not need it.
+    # Dask takes a tenth of a second to load, and a replay into a dataset does not need it
     from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
     from vibroimpact.orchestrator.commands.campaign import compute
 
@@ -88,14 +88,14 @@ def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | 
 
 def _to_dataset(scene: Scene, options: Replay, output: Path) -> None:
     began = time.perf_counter()
-    with _fitting(options.fit) as told:
+    with _fitting(options.fit) as progress:
         whole = replay_scene(
             scene,
             options.recordings or (),
             fit=options.fit,
             score=options.score or (),
             execution=options.execution,
-            told=told,
+            progress=progress,
         )
     console = Terminal()
     print_replays(console, whole)
@@ -109,7 +109,7 @@ def _to_dataset(scene: Scene, options: Replay, output: Path) -> None:
 
 @contextmanager
 def _fitting(fit: str | None) -> Iterator[Callable[[int, float], None]]:
-    """Show a line that says how far a fit is."""
+    """Show a line with the progress of a fit."""
     if fit is None:
         yield lambda count, error: None
         return
@@ -118,7 +118,7 @@ def _fitting(fit: str | None) -> Iterator[Callable[[int, float], None]]:
 
 
 def print_replays(console: Terminal, whole: WholeReplay) -> None:
-    """Print what replays have shown: the verdict, the numbers fitted, the scores of each recording."""
+    """Print the results of replays: the verdict, the fitted numbers, the scores of each recording."""
     if whole.verdict is not None:
         console.print(whole.verdict.words, soft_wrap=True, style="bold")
         for reason in whole.verdict.beside:
@@ -140,7 +140,7 @@ def print_replays(console: Terminal, whole: WholeReplay) -> None:
 
 def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: Path) -> None:
     text = fitted_scene_text(scene, fit, recordings, path.parent)
-    parse_scene(text, str(path))  # a number found may break a rule between two keys
+    parse_scene(text, str(path))  # a fitted number may break a rule between two keys
     with writing(path):
         write_atomically(path, text.encode())
 
@@ -149,7 +149,7 @@ def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
     try:
         write_results(dataset, output)
         if figure is not None:
-            # matplotlib takes half a second to import; a replay alone does not pay for it.
+            # matplotlib takes half a second to import, and a replay without a figure does not need it
             from vibroimpact.analysis import figures
             from vibroimpact.analysis.figures.measured.replay import draw_replay
 

@@ -1,4 +1,4 @@
-"""What `vibroimpact run` does."""
+"""The command `vibroimpact run`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.study.preparing import prepared
 
 
 def run_to_dataset(options: Run) -> None:
-    """Run a scene into a dataset and say what was run and what failed; typer.Exit if the only run failed."""
+    """Run a scene into a dataset and print its runs and failures; typer.Exit if a single run failed."""
     began = time.perf_counter()
     output = options.output
     loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)

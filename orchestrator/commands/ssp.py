@@ -1,4 +1,4 @@
-"""What `vibroimpact ssp` does: a scene of components becomes an SSP archive, an archive becomes a scene."""
+"""The commands `vibroimpact ssp`: a scene of components becomes an SSP archive, an archive becomes a scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.ssp import export_system, import_system, say_notes
 
 
 def export_to_archive(options: ExportSsp) -> None:
-    """Write an archive and say where it is."""
+    """Write an archive and print its path."""
     target = options.output or Path(f"{options.scene.stem}.ssp")
     refuse_outputs([options.scene], target, ending=".ssp")
     loaded = load_scene(options.scene, options.changes or ())
@@ -30,7 +30,7 @@ def export_to_archive(options: ExportSsp) -> None:
 
 
 def import_to_scene(options: ImportSsp) -> None:
-    """Write a scene with its FMUs, and say where it is and what the archive left open."""
+    """Write a scene with its FMUs, and print its path and the choices made for open values."""
     archive, parameters = options.archive, options.parameters or ()
     target = options.output or Path(f"{archive.stem}.toml")
     refuse_outputs([archive, *parameters], target, ending=".toml")

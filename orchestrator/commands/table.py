@@ -1,7 +1,7 @@
-"""Every command of the package: where its operation is declared, and where `--help` shows it.
+"""Every command of the package: the place of its operation, and its panel in `--help`.
 
-Commands stand in the order in which they are used. Their first lines are in `first_lines.json`, which
-`python -P tests/support/public_names.py` writes: a list of commands imports no operation.
+Commands stand in the order of use. Their first lines are in `first_lines.json`, which `python -P
+tests/support/public_names.py` writes: a list of commands imports no operation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ FIRST_LINES = Path(__file__).with_name("first_lines.json")
 
 
 class Group(NamedTuple):
-    """Commands with one word before them; `form` is the class of the group, where it is one of its own."""
+    """Commands with a common first word; `form` is the group's own class, if it has one."""
 
     words: str
     commands: Mapping[str, str]
@@ -123,18 +123,18 @@ PANELS: Mapping[str, tuple[str, ...]] = {
     "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),
 }
-"""Commands and groups as `--help` shows them; those of other packages come last."""
+"""Commands and groups in the order of `--help`; other packages' commands come last."""
 
 
 @functools.cache
 def first_lines() -> Mapping[str, str]:
-    """Return the first line of the help of each command, by the words of the command."""
+    """Return the first help line of each command, by the words of the command."""
     lines: dict[str, str] = json.loads(FIRST_LINES.read_text(encoding="utf-8"))
     return lines
 
 
 def paths() -> Mapping[str, str]:
-    """Return where the operation of each command is declared, by the words of the command."""
+    """Return the place of each command's operation, by the words of the command."""
     inner = {
         f"{name} {word}": place for name, group in GROUPS.items() for word, place in group.commands.items()
     }

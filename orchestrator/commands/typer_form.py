@@ -1,4 +1,4 @@
-"""Operations as commands of typer: its arguments and options are built from the declared ones."""
+"""Operations as commands of typer: arguments and options are built from the declared ones."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from vibroimpact.orchestrator.commands.table import COMMANDS, GROUPS, PANELS, fi
 
 _PANEL_OF = {name: panel for panel, names in PANELS.items() for name in names}
 ORDER = [name for names in PANELS.values() for name in names]
-"""Commands and groups as `--help` shows them."""
+"""Commands and groups in the order of `--help`."""
 
 
 def add_commands(app: typer.Typer, words: Sequence[str] | None = None) -> None:
     """Add the commands of the package to an app.
 
-    `words` are what was typed, options left out. The command that they name is added alone: typer builds one in 2 ms.
-    Where they name none, commands have their names and first lines alone. Without words all are added whole.
+    `words` are the typed words without options. The named command is added alone: typer builds one in 2 ms. If they
+    name none, commands get only their names and first lines. Without words all commands are added whole.
     """
     called = words[0] if words else ""
     for name in [called] if called in ORDER else ORDER:
@@ -39,7 +39,7 @@ def _add_group(app: typer.Typer, name: str, words: Sequence[str] | None) -> None
     group = GROUPS[name]
     form: type[TyperGroup] | None = pkgutil.resolve_name(f"{ROOT}.{group.form}") if group.form else None
     inner = typer.Typer(no_args_is_help=True, help=group.words, cls=form)
-    # a group of its own form looks at all of its commands
+    # a group with its own form looks at all of its commands
     called = words[0] if words and form is None else ""
     whole = words is None or form is not None
     for word in [called] if called in group.commands else group.commands:
@@ -56,11 +56,11 @@ def _add(app: typer.Typer, name: str, place: str, panel: str | None, words: str 
 
 
 def _not_called() -> None:
-    """Stand for a command that is not called."""
+    """Stands for a command that is not called."""
 
 
 def as_function(declared: type[Operation]) -> Callable[..., None]:
-    """Return a function that carries an operation out, with the signature that typer reads."""
+    """Return a function that carries out an operation, with a signature for typer."""
 
     def command(**given: Any) -> None:
         declared(**given).carry_out()
@@ -69,8 +69,8 @@ def as_function(declared: type[Operation]) -> Callable[..., None]:
     parameters, annotations = [], {}
     for name, kind, default, words in declared.fields():
         form = typer.Argument if isinstance(words, Positional) else typer.Option
-        said = form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)
-        annotations[name] = annotated[kind, said]
+        declaration = form(*words.names, help=words.help, metavar=words.metavar, min=words.min, max=words.max)
+        annotations[name] = annotated[kind, declaration]
         given_by = inspect.Parameter.empty if default is MISSING else default
         parameters.append(
             inspect.Parameter(

@@ -1,4 +1,4 @@
-"""What an FMU declares of itself: each capability flag of FMI 2.0 and 3.0, and what an importer here makes of it.
+"""The declared capabilities of an FMU: each capability flag of FMI 2.0 and 3.0, and its treatment by an importer here.
 
 A flag is heeded, or an FMU for which it matters is refused by the name of the flag. The test of the table walks the
 schemas of both versions.
@@ -23,7 +23,7 @@ VARIABLE, CLOCK = "variable", "clock"
 
 
 class Treatment(StrEnum):
-    """What is made of a flag."""
+    """Treatment of a flag."""
 
     heeded = "heeded"
     refused = "refused"
@@ -35,13 +35,13 @@ class Flag:
 
     name: str
     owner: str
-    """What has it: one of the interfaces, a variable, or a clock."""
+    """Its element: an interface, a variable, or a clock."""
     versions: str
-    """Versions of FMI that have it."""
+    """Versions of FMI with this flag."""
     treatment: Treatment
-    """Whether it is heeded."""
+    """Whether it is heeded or refused."""
     how: str
-    """In which way."""
+    """Details of the treatment."""
 
 
 def _heeded(name: str, versions: str, how: str, owner: str = CO_SIMULATION) -> Flag:
@@ -148,7 +148,7 @@ FLAGS: tuple[Flag, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What an FMU declares of its co-simulation.
+    """The declared capabilities of an FMU for co-simulation.
 
     Attributes
     ----------
@@ -159,17 +159,17 @@ class Capabilities:
     variable_steps : bool
         Its communication steps may have any size.
     internal_step : float
-        Step of its own solver, s; 0: it declares none.
+        Step of its own solver, s; 0 if it declares none.
     only_once : bool
         A process may have one instance of it.
     tool : str
-        The tool that must be there; empty where none must.
+        The required tool; empty without one.
     asynchronous : bool
-        Its steps may go on after they have returned.
+        Its step calls may return before the step is done.
     clocks : tuple of InputClock
-        Its input clocks that tick at instants that are known.
+        Its input clocks with known ticks.
     refusals : tuple of str
-        What no importer here can do with it, each as "an FMU with ...".
+        Needs that no importer here meets, each as "an FMU with ...".
     """
 
     restorable: bool = False
@@ -184,21 +184,21 @@ class Capabilities:
 
     @property
     def grid(self) -> str:
-        """What cuts of its steps are refused by; empty where they may be cut anywhere."""
+        """The attribute by which cuts of its steps are refused; empty if they may be cut anywhere."""
         if not self.variable_steps:
             return f"{VARIABLE_STEPS} = false"
         return f"{INTERNAL_STEP} = {self.internal_step:g}" if self.internal_step > 0.0 else ""
 
 
 def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities:
-    """Return what an FMU declares; of one without co-simulation nothing.
+    """Return the declared capabilities of an FMU; the defaults without co-simulation.
 
     Parameters
     ----------
     description : ModelDescription
         Its description, as FMPy reads it.
     folder : Path
-        Where it is unpacked: FMPy reads no intervals of clocks.
+        Folder of the unpacked FMU: FMPy reads no intervals of clocks.
     """
     interface = description.coSimulation
     if interface is None:

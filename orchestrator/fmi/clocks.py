@@ -1,4 +1,4 @@
-"""Input clocks of an FMU of FMI 3.0: which tick at instants that are known, and which others there are."""
+"""Input clocks of an FMU of FMI 3.0: clocks that tick at known instants, and other clocks."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from vibroimpact.fmus.safe_xml import root_of
 if TYPE_CHECKING:
     from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable
 
-#: Variabilities of an interval that is known before a run: the description says it, or the FMU at initialization.
+#: Variabilities of an interval that is known before a run: from the description, or from the FMU at initialization.
 CONSTANT, FIXED = "constant", "fixed"
 
 
 @dataclass(frozen=True, slots=True)
 class InputClock:
-    """An input clock that ticks at its start, and then at the multiples of its interval.
+    """An input clock that ticks at its start, and then at multiples of its interval.
 
     Attributes
     ----------
     name, reference
         Its name and value reference.
     interval : Fraction or None
-        Time between two ticks, s, > 0; None: the FMU says it when it is initialized (FMI 3.0, 2.2.8.3).
+        Time between two ticks, s, > 0; None: the FMU gives it at initialization (FMI 3.0, 2.2.8.3).
     shift : Fraction
         Time from the start of a run to the first tick, s, >= 0.
     """
@@ -38,7 +38,7 @@ class InputClock:
 
 
 def clocks_of(description: ModelDescription, folder: Path) -> tuple[tuple[InputClock, ...], tuple[str, ...]]:
-    """Return the input clocks of an FMU that can be ticked, and what is said of each other clock."""
+    """Return the input clocks of an FMU that can tick, and a description of each other clock."""
     clocks = [variable for variable in description.modelVariables if variable.type == "Clock"]
     if not clocks:
         return (), ()
@@ -68,11 +68,11 @@ def _attributes(folder: Path) -> dict[str, dict[str, str]]:
 
 
 def _input_clock(variable: ModelVariable, own: dict[str, str]) -> InputClock | None:
-    """Return a clock; None where its numbers are none."""
+    """Return a clock; None if its numbers are invalid."""
     resolution = own.get("resolution")
     parts = {"interval": own.get("intervalDecimal"), "shift": own.get("shiftDecimal")}
     numbers = {name: None if text is None else _number(text) for name, text in parts.items()}
-    if resolution is not None and int(resolution) > 0:  # exact, where the decimal number is rounded
+    if resolution is not None and int(resolution) > 0:  # exact, as the decimal number is rounded
         for name in parts:
             if f"{name}Counter" in own:
                 numbers[name] = Fraction(int(own[f"{name}Counter"]), int(resolution))
@@ -85,5 +85,5 @@ def _input_clock(variable: ModelVariable, own: dict[str, str]) -> InputClock | N
 
 
 def _number(text: str) -> Fraction | None:
-    """Return a finite number that XML writes; None for any other."""
+    """Return a finite number in the notation of XML, else None."""
     return Fraction(text.strip()) if math.isfinite(float(text)) else None

@@ -1,4 +1,4 @@
-"""What FMI 3.0 and FMI 2.0 instances have in common; the importer works on this alone."""
+"""The common interface of FMI 3.0 and FMI 2.0 instances; the importer uses it alone."""
 
 from __future__ import annotations
 
@@ -20,43 +20,43 @@ from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-#: noSetFMUStatePriorToCurrentPoint of every step. States are set that were saved where the step begins, or later: no
-#: importer here goes back before that. Some FMUs take false for a last step that is not accepted, and begin it again.
+#: noSetFMUStatePriorToCurrentPoint of every step. An importer here restores only states saved at the start of the step
+#: or later. With false, some FMUs repeat a last step that was not accepted.
 NO_STATE_PRIOR_TO_POINT = True
 STATUS_WORDS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
-#: Largest error of the time at which an FMU says that a step has ended: relative to 1 + |time|, and to the step.
+#: Largest error of the end time that an FMU reports for a step: relative to 1 + |time|, and to the step.
 TIME_ROUNDING = 1e-9
 STEP_ROUNDING = 1e-6
 
-#: Largest difference of a step from the one size that an FMU takes, relative: the rounding of long times.
+#: Largest relative difference of a step from the one size that an FMU accepts: the rounding of long times.
 SAME_SIZE = STEP_ROUNDING
 
-#: Wraps a function of an FMU, given its name: for a guard that notes which call is under way.
+#: Wraps a function of an FMU, given its name: for a guard that notes the call under way.
 Wrapper = Callable[[str, Function], Function]
 LogOf = Callable[[str], LogTail]
 WrapOf = Callable[[str], Wrapper]
-"""What gives a component, by its name, its log tail or the wrapper of its functions."""
+"""`LogOf` and `WrapOf` return a component's log tail, or the wrapper of its functions, by its name."""
 
 
 @runtime_checkable
 class CallNotes(Protocol):
-    """A wrapper that does nothing but note the call under way, which C code that makes calls can do itself.
+    """A wrapper that only notes the call under way; C code that makes calls can note it itself.
 
     Attributes
     ----------
     call_address, time_address : int
-        Where the number of a call is noted, a 64-bit integer, and the time at which a step begins, a double.
+        Addresses of a call's number, a 64-bit integer, and of the time of a step's start, a double.
     """
 
     call_address: int
     time_address: int
 
     def __call__(self, name: str, function: Function) -> Function:
-        """Return a function that is noted."""
+        """Return a function that notes its calls."""
 
     def number_of(self, name: str) -> int:
-        """Return the number that a function is noted by."""
+        """Return the number that stands for a function in the notes."""
 
 
 class Instance(ABC):
@@ -69,26 +69,26 @@ class Instance(ABC):
     name : str
         Instance name, used in messages.
     log : LogTail or None
-        Where its log lines go; None: a tail of its own.
+        Receives its log lines; None: a tail of its own.
     wrap : callable or None
         Wraps each function of the FMU that is bound.
 
     Attributes
     ----------
     state_word : str
-        FMI's word for a saved state in the names of its functions, which its versions write differently.
+        FMI's word for a saved state in the names of its functions; the versions spell it differently.
     time : float
         The time reached by the last `step`, s.
     internal_step : float
-        Step of the FMU's own solver that its description declares, s; 0: none. Its steps end at multiples of that.
+        Declared step of the FMU's own solver, s; 0: none. The FMU's steps end at multiples of it.
     only_step : float
-        The one size that its steps have, s; 0: any.
+        The only size of its steps, s; 0: any.
     changed_rounding : bool
-        It has changed the rounding mode of the process, or the treatment of subnormal numbers; it was set back.
+        The FMU has changed the rounding mode of the process, or the treatment of subnormal numbers; it was set back.
     is_fatal : bool
         A call returned fatal: no function of the FMU may be called any more.
     needs_event_mode, returned_early, wants_to_end : bool
-        What the last `step` said (in FMI 2.0 only `wants_to_end`).
+        Flags of the last `step` (in FMI 2.0 only `wants_to_end`).
     is_flagged : bool
         Any of these three.
     """
@@ -97,7 +97,7 @@ class Instance(ABC):
     prefix: ClassVar[str]
     state_word: ClassVar[str]
     type_names: ClassVar[Mapping[str, str]] = {}
-    """Names of types in the names of functions, where they are not those of FMI 3.0."""
+    """Names of types in the names of functions, if they differ from FMI 3.0's."""
 
     def __init__(
         self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
@@ -145,10 +145,10 @@ class Instance(ABC):
             self.fail(function, f"returned {word} at time {self.time:.17g}")
 
     def fail(self, function: str, what: str, kind: type[ComponentError] = ComponentError) -> NoReturn:
-        """Raise an error of a kind: what a function of the FMU did, and the last line that it logged."""
+        """Raise an error of a kind: the failure of a function of the FMU, and the last line that it logged."""
         lines = self.log.take()
         reason = lines[-1] if lines else "the component logged nothing"
-        # Our own components say who and where too: once is enough.
+        # our own components repeat instance and function in their messages
         reason = reason.removeprefix(f"{self.name}: {self.prefix}{function}: ")
         raise kind(
             f"{self.name}: {self.prefix}{function} {what}: {reason}",
@@ -201,7 +201,7 @@ class Instance(ABC):
         reference : int
             Value reference.
         text : str
-            Without null characters, at which it would end in C.
+            Text without null characters, which would end it in C.
         """
         values = (ctypes.c_char_p * 1)(text.encode())
         value_count = (ctypes.c_size_t(1),) if self.fmi_version == "3.0" else ()
@@ -238,9 +238,9 @@ class Instance(ABC):
         self.check(self._terminate(), "Terminate")
 
     def free(self) -> None:
-        """Give the instance's memory back; it must not be used afterwards.
+        """Free the instance's memory; it must not be used afterwards.
 
-        After a fatal error FMI allows no call at all: the memory is left.
+        After a fatal error FMI allows no call at all: the memory is not freed.
         """
         if self._pointer and not self.is_fatal:
             self._function("FreeInstance", None)(self._pointer)
@@ -261,13 +261,13 @@ class Instance(ABC):
         return self.take_step(self._do_step())
 
     def _one_size(self, time: float, size: float) -> float:
-        """Return the one size of its steps for a step that has it but for rounding; refuse any other."""
+        """Return the only step size for a step that has it up to rounding; refuse any other."""
         if abs(size - self.only_step) > SAME_SIZE * self.only_step:
             self.refuse_cut(time, size)
         return self.only_step
 
     def refuse_cut(self, time: float, size: float) -> NoReturn:
-        """Raise the error of a step at `time` that is cut to `size`, s, of an FMU that takes steps of one size."""
+        """Raise the error of a step at `time` that is cut to `size`, s, for an FMU with one step size."""
         self.time = time
         raise ComponentError(
             f"{self.name}: {self.prefix}DoStep: expected steps of {self.only_step:.12g} s, since "
@@ -281,27 +281,27 @@ class Instance(ABC):
 
     @abstractmethod
     def take_step(self, status: int) -> int:
-        """Take what the step just made has returned and said, as `step` does."""
+        """Read status and flags of the step just made; returns as `step` does."""
 
     @abstractmethod
     def take_time(self, time: float) -> None:
-        """Take where steps have come to that C code has made and found in order, s."""
+        """Set the time, s, that steps made and checked by C code have reached."""
 
     @property
     def step_memory(self) -> dict[str, int]:
-        """Addresses of what a step is given and answers, for C code that makes it."""
+        """Addresses of the inputs and outputs of a step, for C code that makes it."""
         return {
             "step_time": ctypes.addressof(self._step_time),
             "step_size": ctypes.addressof(self._step_size),
         }
 
     def step_undiscarded(self, time: float, size: float) -> None:
-        """Advance from `time` by `size`, s; a step that the FMU discards is an error."""
+        """Advance from `time` by `size`, s; a discarded step is an error."""
         if self.step(time, size) == DISCARD:
             self.check(DISCARD, "DoStep")
 
     def _refuse_end(self, rule: str, reached: float) -> NoReturn:
-        """Raise the error of a step that says it has ended where none can."""
+        """Raise the error of a step that reports an impossible end."""
         self.time = self._step_time.value
         self.fail(
             "DoStep",
@@ -320,7 +320,7 @@ class Instance(ABC):
 
     @property
     def step_start(self) -> float:
-        """Where the last step began, or the one under way, s."""
+        """Start of the last step, or of the step under way, s."""
         return self._step_time.value
 
     # ---- states ----
@@ -331,17 +331,17 @@ class Instance(ABC):
         self._free_state = f"Free{self.state_word}"
 
     def free_state(self, slot: c_void_p) -> None:
-        """Give a saved state's memory back."""
+        """Free a saved state's memory."""
         self.check(self._function(self._free_state)(self._pointer, ctypes.byref(slot)), self._free_state)
 
     def save(self, slot: c_void_p) -> None:
-        """Save the state into `slot`, which is allocated at first use and used again later."""
+        """Save the state into `slot`, which is allocated at first use and reused later."""
         status = self._get_state(self._pointer, ctypes.byref(slot))
         if status > WARNING:
             self.check(status, "GetFMUState")
 
     def restore(self, slot: c_void_p) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         status = self._set_state(self._pointer, slot)
         if status > WARNING:
             self.check(status, "SetFMUState")

@@ -36,18 +36,18 @@ class _Callbacks(ctypes.Structure):
     ]
 
 
-#: Instances that were freed and are used again, by the folder of their FMU and their name.
+#: Freed instances for reuse, by the folder of their FMU and their name.
 _kept: dict[tuple[Path, str], list[tuple[int, _Callbacks]]] = {}
 
 
 class Instance2(Instance):
-    """An instance of an FMI 2.0 FMU: no event mode, so steps end where they are asked to.
+    """An instance of an FMI 2.0 FMU: no event mode, so steps end at their requested end.
 
     Parameters
     ----------
     reuse : bool
-        Keep the FMU's instance when this one is freed, and reset it for the next one of this name: for FMUs of which
-        each instantiation costs memory that nothing gives back.
+        Keep the FMU's instance when this one is freed, and reset it for the next instance of this name. It is for FMUs
+        that leak memory at each instantiation.
     """
 
     fmi_version = "2.0"
@@ -89,14 +89,14 @@ class Instance2(Instance):
             c_char_p(location.encode()),
             ctypes.byref(self._callbacks),
             c_int(0),
-            c_int(1),  # loggingOn: some FMUs report even fatal errors only then
+            c_int(1),  # loggingOn: some FMUs report even fatal errors only with it
         )
         if not pointer:
             self.fail("Instantiate", f"made no instance of {self.fmu.source}", ComponentFileError)
         self._pointer.value = pointer
 
     def _take_kept(self) -> bool:
-        """Use a kept instance, if there is one that can be reset."""
+        """Take a kept instance, if one exists that can be reset."""
         kept = _kept.get((self.fmu.folder, self.name), []) if self._reuse else []
         while kept:
             self._pointer.value, self._callbacks = kept.pop()
@@ -107,7 +107,7 @@ class Instance2(Instance):
         return False
 
     def free(self) -> None:
-        """Give the instance's memory back, or keep it for the next one of this name."""
+        """Free the instance's memory, or keep the instance for the next one of this name."""
         if self._reuse and self._pointer and not self.is_fatal:
             place = (self.fmu.folder, self.name)
             _kept.setdefault(place, []).append((self._pointer.value or 0, self._callbacks))
@@ -115,7 +115,7 @@ class Instance2(Instance):
         super().free()
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
-        """Set the experiment up and enter initialization mode, as the abstract method says."""
+        """Set the experiment up and enter initialization mode: see the abstract method."""
         self.time = start_time
         given = (c_int(tolerance is not None), c_double(tolerance or 0.0))
         no_end = (c_int(0), c_double(0.0))
@@ -124,7 +124,7 @@ class Instance2(Instance):
         self.check(self._enter_initialization(self._pointer), "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:
-        """Take what the step just made has returned and said, as `step` does."""
+        """Read status and flags of the step just made; returns as `step` does."""
         end = self._step_time.value + self._step_size.value
         if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
             self._keep_rounding()
@@ -135,26 +135,26 @@ class Instance2(Instance):
             if not self._wants_to_end():
                 return status
             self.wants_to_end = self.is_flagged = True
-            self.time = self._end_told(end)
+            self.time = self._reported_end(end)
             return OK
         self.time = end
         return status
 
     def take_time(self, time: float) -> None:
-        """Take where steps have come to that C code has made and found in order, s."""
+        """Set the time, s, that steps made and checked by C code have reached."""
         self.time = time
         self.wants_to_end = self.is_flagged = False
 
     def _wants_to_end(self) -> bool:
-        """Does the FMU ask for the end of the simulation by a step that it has discarded?"""
+        """Does the FMU request the end of the simulation by a discarded step?"""
         terminated = c_int(0)
         status = self._function("GetBooleanStatus")(
             self._pointer, c_int(TERMINATED), ctypes.byref(terminated)
         )
         return status == OK and bool(terminated.value)
 
-    def _end_told(self, end: float) -> float:
-        """Return how far a discarded step to `end` has gone, s."""
+    def _reported_end(self, end: float) -> float:
+        """Return the end of a discarded step to `end`, s."""
         reached = c_double(math.nan)
         kind = c_int(LAST_SUCCESSFUL_TIME)
         self.check(

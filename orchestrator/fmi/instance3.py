@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD, NO_STATE_PRIOR_TO_POI
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
 
-#: What fmi3GetIntervalDecimal says of an interval that the FMU does not know yet.
+#: Qualifier of fmi3GetIntervalDecimal for an interval that the FMU does not know yet.
 INTERVAL_NOT_YET_KNOWN = 0
 
 
@@ -30,14 +30,14 @@ class Instance3(Instance):
     Attributes
     ----------
     may_return_early : bool
-        The FMU was told that it may end a step early.
+        The FMU was allowed to end a step early.
     enter_event_call, enter_step_call, update_call : callable
-        The bare calls, which return FMI's status: for paths that check it themselves.
+        The bare calls, which return FMI's status, for code that checks it itself.
     decisions : c_uint16
-        What the last `update_call` said, both at once: 0 when the FMU needs no other event iteration and does
-        not ask for the end.
+        Both answers of the last `update_call` at once: 0 if the FMU needs no other event iteration and does not
+        request the end.
     needs_update : c_bool
-        Of these: does the FMU need another event iteration?
+        The first answer: the FMU needs another event iteration.
     """
 
     fmi_version = "3.0"
@@ -84,7 +84,7 @@ class Instance3(Instance):
         self._next_event = c_double()
         flags = [ctypes.byref(flag) for flag in (self.needs_update, *self._event_flags)]
         self.update_call = self._bound("UpdateDiscreteStates", *flags, ctypes.byref(self._next_event))
-        self._flags = c_uint32()  # all three of a step at once: mostly there is none
+        self._flags = c_uint32()  # all three flags of a step at once: mostly there is none
         self._needs_event, self._ends, self._early = (c_bool.from_buffer(self._flags, i) for i in range(3))
         self._last_time = c_double()
         outputs = [ctypes.byref(flag) for flag in (self._needs_event, self._ends, self._early)]
@@ -99,7 +99,7 @@ class Instance3(Instance):
         self.check(self._function("SetClock")(self._pointer, places, c_size_t(count), ticks), "SetClock")
 
     def clock_times(self, reference: int) -> tuple[float, float]:
-        """Return interval and shift of a fixed input clock, s, in initialization mode; NaN for one not known yet."""
+        """Return interval and shift of a fixed input clock, s, in initialization mode; NaN if not known yet."""
         place, one = ctypes.byref(c_uint32(reference)), c_size_t(1)
         interval, shift, qualifier = c_double(math.nan), c_double(math.nan), c_int()
         get_interval, get_shift = self._function("GetIntervalDecimal"), self._function("GetShiftDecimal")
@@ -117,7 +117,7 @@ class Instance3(Instance):
         self.check(status, "EnterInitializationMode")
 
     def take_step(self, status: int) -> int:
-        """Take what the step just made has returned and said, as `step` does."""
+        """Read status and flags of the step just made; returns as `step` does."""
         if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
             self._keep_rounding()
         if status and status != DISCARD:
@@ -130,7 +130,7 @@ class Instance3(Instance):
         return status
 
     def take_time(self, time: float) -> None:
-        """Take where steps have come to that C code has made and found in order, s."""
+        """Set the time, s, that steps made and checked by C code have reached."""
         self.time = time
         if self._flags.value:
             self._take_flags()
@@ -139,14 +139,15 @@ class Instance3(Instance):
 
     @property
     def step_memory(self) -> dict[str, int]:
-        """Addresses of what a step is given and answers, for C code that makes it."""
+        """Addresses of the inputs and outputs of a step, for C code that makes it."""
         answers = {"last_time": ctypes.addressof(self._last_time), "flags": ctypes.addressof(self._flags)}
         return super().step_memory | answers
 
     def _check_end(self, reached: float, end: float) -> None:
-        """Refuse a step that has not ended where it was to, unless it has returned early or asks for the end.
+        """Refuse a step without the requested end, unless it has returned early or requests the end of the run.
 
-        A solver of fixed steps may be a part of one behind its communication point, which the step has reached.
+        A solver of fixed steps may be less than one step behind its communication point; the point then counts as
+        reached.
         """
         if not self._ends_inside(reached, end):
             self._refuse_end("a time of the step", reached)
@@ -168,5 +169,5 @@ class Instance3(Instance):
 
     @property
     def event_wants_to_end(self) -> bool:
-        """Did the last event iteration ask for the end of the simulation?"""
+        """Did the last event iteration request the end of the simulation?"""
         return self._event_flags[0].value

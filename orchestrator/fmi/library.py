@@ -17,9 +17,8 @@ Function = Callable[..., Any]
 class Library:
     """The functions of one FMU binary.
 
-    The functions have no argument types: their callers pass ready-made ctypes objects only, which takes two thirds of
-    the time of converted arguments. A binary that is not there for this machine, or does not load, raises
-    ComponentFileError.
+    The functions have no argument types: callers pass ready-made ctypes objects only. This takes two thirds of the
+    time of converted arguments. ComponentFileError: the binary for this machine is missing, or does not load.
     """
 
     def __init__(self, fmu: UnpackedFmu) -> None:
@@ -29,7 +28,7 @@ class Library:
     def function(self, name: str, result: Any = ctypes.c_int) -> Function:
         """Return a function by name; ComponentFileError if the binary does not export it."""
         try:
-            found = self._handle[name]  # a function object of our own; attributes of the handle are shared
+            found = self._handle[name]  # a function object of our own: attributes of the handle are shared
         except AttributeError as error:
             raise ComponentFileError(
                 f"{self.fmu.source}: expected a binary that exports {name}, got one without it."

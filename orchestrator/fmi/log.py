@@ -1,4 +1,4 @@
-"""The last lines that an instance logged, kept by C code in memory that may be shared with another process.
+"""The last log lines of an instance, kept by C code in memory that another process may share.
 
 A component that logs a million lines costs no memory and no call into Python.
 """
@@ -19,7 +19,7 @@ class _Ring(ctypes.Structure):
 
 RING_SIZE = ctypes.sizeof(_Ring)
 NO_LINES = bytes(_Ring.count.size)
-"""The first bytes of a ring in which nothing is logged."""
+"""The first bytes of an empty ring."""
 
 
 class LogTail:
@@ -28,7 +28,7 @@ class LogTail:
     Parameters
     ----------
     memory : memoryview or None
-        `RING_SIZE` writable bytes to keep them in, such as shared memory; None: memory of its own.
+        `RING_SIZE` writable bytes, such as shared memory; None: memory of its own.
     """
 
     def __init__(self, memory: memoryview | None = None) -> None:
@@ -40,7 +40,7 @@ class LogTail:
         return ctypes.c_void_p(ctypes.addressof(self._ring))
 
     def take(self) -> tuple[str, ...]:
-        """Return the last lines since the call before, oldest first."""
+        """Return the last lines since the previous call, oldest first."""
         count = int(self._ring.count)
         if count == 0:
             return ()

@@ -1,7 +1,7 @@
 """The rounding mode of the process, which an FMU may change for all components after it.
 
-Whether numbers are rounded to nearest, and subnormal ones kept, is seen from two sums and a product: far cheaper
-than a call of the C library.
+Two sums and a product show the rounding to nearest and the treatment of subnormal numbers. They are far cheaper than a
+call of the C library.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 import ctypes
 import sys
 
-#: ONE + TINY == ONE - TINY where numbers are rounded to nearest, and nowhere else.
+#: ONE + TINY == ONE - TINY only if numbers are rounded to nearest.
 ONE, TINY = 1.0, 1e-17
-#: SMALL * HALF > 0 where subnormal numbers are kept.
+#: SMALL * HALF > 0 only if subnormal numbers are kept.
 SMALL, HALF = sys.float_info.min, 0.5
 
 
@@ -21,8 +21,8 @@ def is_usual() -> bool:
 
 
 def set_usual() -> None:
-    """Go back to the default floating-point environment; elsewhere than on Linux only to rounding to nearest."""
-    # Python itself is linked with the mathematical library: `find_library` would start processes to find it.
+    """Restore the default floating-point environment; on other systems than Linux only the rounding to nearest."""
+    # Python itself is linked with the mathematical library; `find_library` would start processes to find it.
     library = ctypes.CDLL(None if sys.platform != "win32" else "ucrtbase")
     if sys.platform == "linux":
         library.fesetenv(ctypes.c_void_p(-1))  # FE_DFL_ENV of glibc and musl

@@ -14,19 +14,19 @@ Call = Callable[[], int]
 
 
 class Owner(Protocol):
-    """What variables belong to: an instance."""
+    """The owner of variables: an instance."""
 
     def check(self, status: int, function: str) -> None:
-        """Raise where a call ended with worse than a warning."""
+        """Raise unless a call ended with at most a warning."""
 
 
 class VariableGroup:
-    """Variables of one type of one instance, with a buffer that is used again at every call.
+    """Variables of one type of one instance, with a buffer that is reused at every call.
 
     Attributes
     ----------
     instance : Owner
-        The instance that they belong to.
+        The owner of the variables.
     name : str
         FMI's name of their type, in the version of the instance.
     references : tuple of int
@@ -34,7 +34,7 @@ class VariableGroup:
     values : ndarray
         The buffer: `get` fills it, `set` sends it. Its type is that of the variables in C.
     get_call, set_call : callable
-        The bare calls, which return FMI's status: for paths that check it themselves.
+        The bare calls, which return FMI's status, for code that checks it itself.
     """
 
     __slots__ = ("_array", "get_call", "instance", "name", "references", "set_call", "values")
@@ -70,7 +70,7 @@ class VariableGroup:
 
     @property
     def references_address(self) -> int:
-        """Where the value references are, for C code that makes the calls itself."""
+        """Address of the value references, for C code that makes the calls itself."""
         return ctypes.addressof(self._array)
 
     def get(self) -> NDArray[Any]:
@@ -87,7 +87,7 @@ class VariableGroup:
             self.instance.check(status, "Set" + self.name)
 
 
-#: C types of values by FMI type, for the versions that differ.
+#: C types of values by FMI type, for each version.
 DTYPES: dict[str, dict[str, Any]] = {
     "3.0": {
         "Float64": np.float64, "Float32": np.float32, "Boolean": np.bool_,

@@ -12,7 +12,7 @@ __all__ = ["GuardedRunner"]
 
 
 def __getattr__(name: str) -> Any:
-    # The supervisor comes through this door, and forks: nothing that may start a thread is loaded before.
+    # the supervisor imports this module and forks: no module that may start a thread is loaded before
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.guarded"), name)

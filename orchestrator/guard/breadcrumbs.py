@@ -1,9 +1,9 @@
-"""Notes that outlive a process: which FMI call is under way, at what time, and the last log lines.
+"""Notes that outlive a process: the FMI call under way, its time, and the last log lines.
 
-They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads
-what it was doing. The call is noted either before every call, which is exact and takes a quarter of the time of
-an impact where Python makes the calls (in C it is a store), or by looking at the frames of the running thread now
-and then, which tells what hangs and costs nothing.
+They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads the
+last call. A call is noted in one of two ways. A note before every call is exact; in Python it takes a quarter of the
+time of an impact, in C it is a store. Looking at the frames of the running thread now and then shows a hanging call,
+at no cost.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from vibroimpact.orchestrator.importer.wiring import CallList
 MOST_COMPONENTS = 32
 MOST_CALLS = 4096
 NAME_LENGTH = 96
-#: What is noted of a component whose FMU is being loaded, in place of a function.
+#: Noted function of a component while its FMU is being loaded.
 LOADING = "loading"
-#: FMI's functions by the methods of an instance that call them.
+#: FMI's functions, by the methods of an instance that call them.
 METHODS = {
     "step": "DoStep",
     "_instantiate": "Instantiate",
@@ -55,7 +55,7 @@ class _Notes(ctypes.Structure):
     ]
 
 
-#: The first two fields when there is no call.
+#: The first two fields without a call.
 _NO_CALL = struct.pack("=qd", 0, math.nan)
 SIZE = ctypes.sizeof(_Notes) + MOST_COMPONENTS * RING_SIZE
 
@@ -79,9 +79,9 @@ class Breadcrumbs:
     # ---- written by the process that runs FMUs ----
 
     def log(self, component: str) -> LogTail:
-        """Return a log tail for a component that both processes see: the same one for each of its instances.
+        """Return a log tail for a component that both processes see: one tail for all its instances.
 
-        It is asked for just before the component's FMU is loaded, which is noted.
+        It is called just before the component's FMU is loaded, which is noted.
         """
         index = self._known.setdefault(component, len(self._known))
         self._notes.components = len(self._known)
@@ -96,21 +96,21 @@ class Breadcrumbs:
         return self._tails[place]
 
     def wrap(self, component: str) -> Wrapper:
-        """Return what wraps the functions of a component: each call is noted before it is made."""
+        """Return the wrapper of a component's functions: each call is noted before it is made."""
 
         return _ComponentNotes(self, component)
 
     def noted(self, component: str, name: str, function: Function) -> Function:
-        """Return a component's function, noted before it is called."""
+        """Return a component's function that notes each call before it is made."""
         noting = self._noting_step if name.endswith("DoStep") else self._noting
         return noting(self.number_of(component, name), function)
 
     def address_of(self, field: str) -> int:
-        """Return where `call` and `time` are noted, for C code that makes calls itself."""
+        """Return the address of the note `call` or `time`, for C code that makes calls itself."""
         return ctypes.addressof(self._notes) + int(getattr(_Notes, field).offset)
 
     def number_of(self, component: str, name: str) -> int:
-        """Return the number that a component's function is noted by."""
+        """Return the number that stands for a component's function in the notes."""
         return self._register(component, name)
 
     def _register(self, component: str, name: str) -> int:
@@ -144,18 +144,19 @@ class Breadcrumbs:
         return noted
 
     def begin(self) -> None:
-        """Forget what the point before did: its last call, its time and its log lines.
+        """Forget the previous point: its last call, its time and its log lines.
 
-        The process that runs points does so before each of them; the other one may while that one waits.
+        The process that runs points calls this before each point; the other process may call it while the first one
+        waits.
         """
-        # bytes, not fields: this is done for each point, where all is cold and ctypes takes five times as long
+        # bytes, not fields: this runs once a point on cold memory, where ctypes takes five times as long
         self._memory[: len(_NO_CALL)] = _NO_CALL
         for place in range(min(int(self._notes.components), MOST_COMPONENTS)):
             start = ctypes.sizeof(_Notes) + place * RING_SIZE
             self._memory[start : start + len(NO_LINES)] = NO_LINES
 
     def note_frame(self, frame: FrameType | None) -> None:
-        """Note the FMI call that a thread is in, as its frames show it; without one the notes stay as they are."""
+        """Note the FMI call of a thread from its frames; without one the notes stay as they are."""
         while frame is not None:
             found = _call_in(frame)
             if found is not None:
@@ -169,7 +170,7 @@ class Breadcrumbs:
     # ---- read by the other process ----
 
     def last_call(self) -> tuple[str, str, float]:
-        """Return instance, function and time (s) of the last call noted; empty names when there is none."""
+        """Return instance, function and time (s) of the last noted call; empty names without one."""
         index = int(self._notes.call) - 1
         if index < 0:
             return "", "", math.nan
@@ -193,19 +194,19 @@ class _ComponentNotes:
         return self._notes.noted(self._component, name, function)
 
     def number_of(self, name: str) -> int:
-        """Return the number that a function is noted by."""
+        """Return the number that stands for a function in the notes."""
         return self._notes.number_of(self._component, name)
 
 
 def _time_of(instance: Instance, function: str) -> float:
-    """Time of a call, s; NaN for one before which no run has begun."""
+    """Return the time of a call, s; NaN for instantiation, before any run."""
     if function == METHODS["_instantiate"]:
         return math.nan
     return instance.step_start if function == METHODS["step"] else instance.time
 
 
 def _call_in(frame: FrameType) -> tuple[Instance, str, float] | None:
-    """Instance, function and time (s) of the FMI call that a frame makes, if it makes one."""
+    """Return instance, function and time (s) of the FMI call in a frame, or None."""
     owner, method = frame.f_locals.get("self"), frame.f_code.co_name
     if isinstance(owner, PlainLoop) and method == "advance":
         return owner.call_under_way()

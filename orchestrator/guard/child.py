@@ -1,4 +1,4 @@
-"""The process that `guard` lets points run in, since they may take it down. `supervisor` forks it."""
+"""The process in which `guard` runs points, since they may crash it; `supervisor` forks it."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from vibroimpact.orchestrator.guard.pipe import (
 )
 from vibroimpact.orchestrator.run import Runner, open_runner
 
-#: How often the child looks at its parent and at what it is doing itself, s: less than its parent waits for it (GRACE).
+#: Interval at which the child checks its parent and notes its own call, s: shorter than the parent's GRACE.
 LOOK = 0.25
 
 
 def _look_around(parent: int, notes: Breadcrumbs) -> None:
-    """End this process when its parent is gone, whatever the FMU is doing; until then note what that is.
+    """End this process if its parent is gone, even with a hanging FMU; until then note the call under way.
 
-    A hanging FMU must not become an orphan. The notes cost nothing but a look now and then; they are right for a
-    call that lasts.
+    A hanging FMU must not become an orphan. The notes cost nothing but a look now and then; they are right for a call
+    that lasts.
     """
     main = threading.main_thread().ident or 0
 
@@ -49,9 +49,9 @@ def _look_around(parent: int, notes: Breadcrumbs) -> None:
 
 
 class _Answers:
-    """The way of answers to the guard, which sleeps until the bell rings: waking it takes longer than an answer does.
+    """Sends answers to the guard, which sleeps until the bell rings: waking it takes longer than an answer.
 
-    Rung after the last answer of a batch, and when the pipe is full. What is in the pipe outlives this process.
+    The bell rings after the last answer of a batch, and for a full pipe. Data in the pipe outlive this process.
     """
 
     def __init__(self, pipe: int, bell: int | None) -> None:
@@ -63,7 +63,7 @@ class _Answers:
             os.set_blocking(pipe, False)
 
     def put(self, message: Any, *, last: bool = True) -> None:
-        """Answer; `last`: nothing more comes of what was to be run."""
+        """Send an answer; `last`: the batch has no further answer."""
         self._unread += 1
         left = packed(message, self.memory)
         with contextlib.suppress(BlockingIOError):
@@ -77,7 +77,7 @@ class _Answers:
             os.set_blocking(self._pipe, False)
 
     def _written(self, rows: list[memoryview]) -> list[memoryview]:
-        """Write what there is room for; return what is left."""
+        """Write as much as the pipe takes; return the rest."""
         count = os.writev(self._pipe, rows) if hasattr(os, "writev") else os.write(self._pipe, rows[0])
         for number, row in enumerate(rows):
             if count < len(row):
@@ -116,8 +116,9 @@ def _open(order: Order, notes: Breadcrumbs) -> Runner:
 
 
 def main(bell: int | None) -> None:
-    """Serve points until standard input ends; `bell`: where to ring it, None where the guard reads at once."""
-    # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
+    """Serve points until standard input ends; `bell` is the descriptor to ring, or None."""
+    # Ctrl-C reaches all processes of a terminal, but must not count as a crash of a point. The parent ends this
+    # process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = os.getppid()
     given, pipe = private_pipes()
@@ -135,7 +136,7 @@ def main(bell: int | None) -> None:
     except VibroimpactError as error:
         answers.put(Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
-    gc.freeze()  # what is there stays there: no collection need look at it
+    gc.freeze()  # present objects stay: no garbage collection need look at them
     answers.put(runner.identity)
     while (batch := receive(orders)) is not None:
         _serve(runner, batch, notes, answers)

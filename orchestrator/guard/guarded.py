@@ -1,13 +1,14 @@
-"""Runs points in a child process that an FMU may crash or hang without taking the campaign with it.
+"""Runs points in a child process that an FMU may crash or hang without ending the campaign.
 
-The child is used again for every point; only after a crash or a missed deadline a new one is made. Points that are
-announced are run in batches: waking two processes for each of them costs more than all else. What the child was doing
-is read from `breadcrumbs`. A hanging call is seen there at no cost. To see a call that crashes, every call
-must be noted before it is made: that is done from the first crash on.
+One child runs all points; only a crash or a missed deadline needs a new child. Announced points run in batches, as
+waking two processes for each costs more than all else. `breadcrumbs` shows the last call of a child. A hanging call is
+seen there at no cost. To see a call that crashes, every call must be noted before it is made; this starts after the
+first crash.
 
-A point is repeated once, in a new process, where its loss may be no fault of its own: a crash in a process that has
-run other points, or of which nobody knows the call; a hang in a call that puts an end to the point before. If it then
-goes well, the result counts. What an FMU starts ends with the child (`supervisor`).
+A point is repeated once, in a new process, if its loss may be no fault of its own. This holds for a crash with an
+unknown call, or in a process that has run other points. It also holds for a hang in a call that ends the previous
+point. If the repetition succeeds, its result counts. Processes that an FMU has started end with the child
+(`supervisor`).
 """
 
 from __future__ import annotations
@@ -33,15 +34,15 @@ from vibroimpact.orchestrator.run.points import PointColumns, State
 from vibroimpact.orchestrator.run.runner import Rows, Runner, RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
 
-#: Wall time that a guarded point may take where the scene names no deadline, s.
+#: Longest wall time of a guarded point in a scene without a deadline, s.
 DEFAULT_DEADLINE = 300.0
-#: What a child may take beyond the deadline to end the point by itself, s.
+#: Time beyond the deadline in which a child may end the point by itself, s.
 GRACE = 0.5
-#: Points that are announced together, in batches that are a small part of them.
+#: Points announced together; a batch is a small part of them.
 ANNOUNCED = 16 * MOST_POINTS
-#: Starting Python and loading the FMUs, s.
+#: Longest time to start Python and load the FMUs, s.
 START_TIME = 60.0
-#: Calls that end the life of the point before.
+#: Calls that end the previous point.
 AFTER_A_POINT = ("Reset", "FreeInstance", "Terminate")
 
 
@@ -49,7 +50,7 @@ AFTER_A_POINT = ("Reset", "FreeInstance", "Terminate")
 class _Loss:
     """A point that took its process down or did not answer.
 
-    `function`: the FMI call that was under way; `used`: its process had run other points; `seconds`: what it cost.
+    `function`: the FMI call under way; `used`: its process had run other points; `seconds`: the time it cost.
     """
 
     outcome: Outcome
@@ -65,15 +66,15 @@ class GuardedRunner(Runner):
     Raises
     ------
     ComponentError
-        The child cannot load the scene's components; its message says why.
+        The child cannot load the scene's components, for the reason in the message.
     """
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.scene = scene
-        self._wanted = execution
+        self._execution = execution
         self._folder = ScratchFolder("guard")
         self._child: PointProcess | None = None
-        self._points = 0  # that the child has run
+        self._points = 0  # number of points that the child has run
         self._announced: deque[PointTask] = deque()
         self._ready: deque[tuple[PointTask, RunRecord | Failure | _Loss]] = deque()
         self._batch_size = 1
@@ -95,7 +96,7 @@ class GuardedRunner(Runner):
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
         self._notes.begin()
-        self._child = PointProcess(Order(self.scene, self._wanted, str(path), self._noting))
+        self._child = PointProcess(Order(self.scene, self._execution, str(path), self._noting))
         try:
             (answer,), _ = self._child.answers(START_TIME)
         except TimeoutError:
@@ -109,7 +110,7 @@ class GuardedRunner(Runner):
         raise ComponentError(self._what_happened(f"the process {ending(code)}"))
 
     def rows(self, points: PointColumns, start: State | None = None, deadline: float = math.inf) -> Rows:
-        """Run points in batches where none waits for the one before, see `Runner.rows`."""
+        """Run independent points in batches: see `Runner.rows`."""
         if start is not None or not points.are_independent:
             return super().rows(points, start, deadline)
         records: list[RunRecord] = []
@@ -123,11 +124,11 @@ class GuardedRunner(Runner):
         return records, None
 
     def announce(self, points: Sequence[PointTask]) -> None:
-        """Say which points `run` will be asked for next, with the very objects that it will be given."""
+        """Announce the next points of `run`; the same objects must be given to it."""
         self._announced = deque(points if HAS_BELL else ())
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
-        """Run one point, and some of those announced after it; a crash or a missed deadline is its outcome.
+        """Run one point, and some of the points announced after it; a crash or a missed deadline is its outcome.
 
         Raises
         ------
@@ -150,14 +151,14 @@ class GuardedRunner(Runner):
         return found
 
     def _batch_from(self, point: PointTask) -> list[PointTask]:
-        """Return a point with those announced after it that fit into the time of a batch."""
+        """Return a point with the points announced after it that fit into the time of a batch."""
         if not self._announced or not _are_same(self._announced[0], point):
             self._announced.clear()
             return [point]
         return list(islice(self._announced, self._batch_size))
 
     def _attempt(self, batch: Sequence[PointTask]) -> list[RunRecord | Failure | _Loss]:
-        """Run points in the child, or in a new one; returns what became of them, up to a loss or the end of a batch."""
+        """Run points in the child, or in a new one; returns their results up to a loss or the end of a batch."""
         if self._child is None:
             self._start()
         assert self._child is not None
@@ -166,7 +167,7 @@ class GuardedRunner(Runner):
         self._child.say(tuple((dict(values), start) for values, start in batch))
         try:
             found, loss = self._answers_to(batch)
-        except BaseException:  # Ctrl-C: what would be answered next is no longer asked for
+        except BaseException:  # Ctrl-C: nobody waits for the next answers
             self._end_child(at_once=True)
             raise
         seconds = time.perf_counter() - began
@@ -178,9 +179,9 @@ class GuardedRunner(Runner):
         return found
 
     def _answers_to(self, batch: Sequence[PointTask]) -> tuple[list[Any], _Loss | None]:
-        """Wait for the answers to a batch; returns them, and why they ended early if the child is lost."""
+        """Wait for the answers to a batch; returns them, and the loss if the child was lost."""
         assert self._child is not None
-        # the last point of several begins before BATCH_TIME is over
+        # the last of several points starts before BATCH_TIME is over
         most = self._deadline + GRACE + (BATCH_TIME if len(batch) > 1 else 0.0)
         found, last = [], False
         try:
@@ -188,7 +189,7 @@ class GuardedRunner(Runner):
                 answers, last = self._child.answers(most)
                 found += answers
         except TimeoutError:
-            _, unread = self._end_child(at_once=True)  # first: it may still be writing what is read then
+            _, unread = self._end_child(at_once=True)  # first: the child may still be writing
             return found + unread, self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
         if found[-1] is not None:
             return found, None
@@ -196,12 +197,12 @@ class GuardedRunner(Runner):
         return found[:-1] + unread, self._lost(Outcome.crash, f"the process {ending(code)}")
 
     def _second_attempt(self, point: PointTask, loss: _Loss) -> RunRecord | Failure | _Loss:
-        """Repeat a lost point in a new process where that may help, or tell which call crashes."""
+        """Repeat a lost point in a new process if that may help, or to find the call that crashes."""
         if loss.outcome is Outcome.crash:
             helps = loss.used or not self._noting
             self._noting = True
         else:
-            # no call known: the process was stopped, perhaps by what the point before has left
+            # unknown call: the process was stopped, perhaps by an effect of the previous point
             helps = loss.used and (not loss.function or loss.function.endswith(AFTER_A_POINT))
         if not helps:
             return loss
@@ -217,7 +218,7 @@ class GuardedRunner(Runner):
         return replace(again, message="; ".join(filter(None, (again.message, remark))), seconds=seconds)
 
     def _lost(self, outcome: Outcome, what: str) -> _Loss:
-        """Say what a child was doing that is gone or did not answer."""
+        """Return the loss of a child that is gone or did not answer, with its last call."""
         known = self._noting or outcome is Outcome.timeout
         message = self._what_happened(what) if known else f"guard: {what}"
         return _Loss(outcome, message, self._notes.last_call()[1], used=False, seconds=0.0)
@@ -232,11 +233,11 @@ class GuardedRunner(Runner):
         if not instance:
             return f"guard: expected an answer of the child process, got {what}."
         if math.isnan(at):
-            # no run has begun: the file is what a user can do something about
+            # before any run: a user can act on the file
             function = f"{function} of {self._file_of(instance) or instance}"
         lines = [
             line for line in self._notes.last_lines() if line
-        ]  # one was perhaps cut off before its first letter
+        ]  # a line may be cut off before its first letter
         logged = " | ".join(lines[-5:]) if lines else "nothing"
         when = "" if math.isnan(at) else f" at time {at:.17g}"
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
@@ -252,5 +253,5 @@ class GuardedRunner(Runner):
 
 
 def _are_same(one: PointTask, other: PointTask) -> bool:
-    """Whether two points are one and the same: values may be equal and differ in the sign of a zero."""
+    """Whether two points are the same object: equal values may differ in the sign of a zero."""
     return one[0] is other[0] and one[1] == other[1]

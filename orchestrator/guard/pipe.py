@@ -1,9 +1,9 @@
-"""What a guard and its child say to each other: messages with their length in front.
+"""The messages between a guard and its child, each with its length in front.
 
-Both ends are this package in processes of one user; nothing else can write to these pipes. Messages are pickled,
-but for records, of which there is one for each point: their arrays come after them as they lie in memory, or, where
-they are large and the system has files in memory, in such a file, whose pages are there already: a pipe finds new ones
-for all that crosses it. The child writes the file and does not map it: like the pipe it is out of an FMU's reach.
+Both ends are this package in processes of one user; nobody else can write to these pipes. Messages are pickled, except
+the one record of each point. Its arrays follow in the pipe as they lie in memory. Large arrays go by a file in memory,
+if the system has such files. Its pages exist already; a pipe needs new pages for all its data. The child writes the
+file and does not map it, so that an FMU cannot reach it.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.scene import Scene
 
-#: Stands before each message: its length, without the arrays of a record, and where those are: a place in the memory
-#: that both share, or one of the two below.
+#: Head of each message: its length without the arrays of a record, and the place of the arrays. The place is an offset
+#: in the shared memory, or one of the two values below.
 HEAD = struct.Struct("<Qq")
 NO_RECORD, FOLLOWING = -1, -2
-#: Arrays of a record that are smaller go through the pipe; those of a batch share so much memory, bytes.
+#: Bytes of a record's arrays, below which they go through the pipe, and bytes of memory for the arrays of a batch.
 LARGE, MEMORY_ROOM = 1 << 14, 1 << 24
-#: What a child says on its bell: how many answers there are to read, and whether they end what it was given to run.
+#: Message on a child's bell: the number of answers to read, and whether they are the last of the batch.
 BELL = struct.Struct("<B?")
-#: Points that a child is given at a time, at most: their number is one byte on the bell.
+#: Most points in a batch: their number is one byte on the bell.
 MOST_POINTS = 64
-#: A child begins no further one of the points that it was given once it has been at them for so long, s.
+#: Time in a batch after which a child starts no further point, s.
 BATCH_TIME = 0.25
 
 PointTask = tuple[Mapping[str, float], tuple[float, ...] | None]
-"""One point to run: its values, and the state that it starts from. A child is given a tuple of them."""
+"""One point to run: its values, and its start state. A child is given a tuple of points."""
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the child shall run: a scene, its execution, the file of notes, and whether to note every call there.
+    """The child's order: a scene, its execution, the file of notes, and whether to note every call there.
 
-    `memory`: the descriptor of the file in memory for arrays; None: there is none.
+    `memory`: the descriptor of the file in memory for arrays, or None.
     """
 
     scene: Scene
@@ -58,7 +58,7 @@ class Order:
 class Failure:
     """The point (or the scene) failed with this message; the child lives on.
 
-    `misuse`: what was given is at fault (an FMU file for another machine), not the run.
+    `misuse`: the input is at fault (an FMU file for another machine), not the run.
     """
 
     message: str
@@ -72,17 +72,17 @@ _arrays_of = attrgetter(*_ARRAYS)
 
 
 class Memory:
-    """The file in memory that a child writes arrays of records to, one after the other until a batch has been read."""
+    """The file in memory for arrays of records; a child writes one after the other until a batch has been read."""
 
     def __init__(self, file: int | None) -> None:
         self._file, self._used = file, 0
 
     def clear(self) -> None:
-        """Begin again at its start: all that is in it has been read."""
+        """Start again at the beginning: all contents have been read."""
         self._used = 0
 
     def place(self, arrays: Sequence[memoryview]) -> int | None:
-        """Write arrays and return where they are; None where they are to go through the pipe."""
+        """Write arrays and return their place; None if they must go through the pipe."""
         size = sum(len(array) for array in arrays)
         if self._file is None or size < LARGE or self._used + size > MEMORY_ROOM:
             return None
@@ -96,7 +96,7 @@ class Memory:
 
 
 def _packed_record(record: RunRecord, memory: Memory | None) -> list[memoryview]:
-    """Return what a record is sent as: its head with its numbers and what else there is, then its arrays of float64."""
+    """Return the rows of a record's message: its head with its numbers, then its arrays of float64."""
     arrays = [None if array is None else np.ascontiguousarray(array) for array in _arrays_of(record)]
     shapes = [None if array is None else array.shape for array in arrays]
     numbers = _NUMBERS.pack(*_numbers_of(record))
@@ -113,7 +113,7 @@ def _bytes_of(array: NDArray[np.float64]) -> memoryview:
 
 
 def _received_record(data: bytes, place: int, pipe: IO[bytes], memory: int | None) -> RunRecord | None:
-    """Return the record that begins with `data`, its arrays read from where they are; None where they are not whole."""
+    """Return the record that begins with `data`, with its arrays from `place`; None if they are incomplete."""
     numbers, message, residual, shapes = marshal.loads(data)
     outcome, displacement, velocity, phase, seconds = _NUMBERS.unpack(numbers)
     arrays = {
@@ -140,9 +140,9 @@ def _received_record(data: bytes, place: int, pipe: IO[bytes], memory: int | Non
 
 
 def packed(message: Any, memory: Memory | None = None) -> list[memoryview]:
-    """Return the bytes of a message, in rows: of a record, an object of this module, or a tuple of points.
+    """Return the bytes of a message, in rows: a record, an object of this module, or a tuple of points.
 
-    `memory`: where large arrays are put; None: with the rest.
+    `memory`: the file for large arrays; None: they follow in the message.
     """
     if isinstance(message, RunRecord):
         return _packed_record(message, memory)
@@ -157,9 +157,9 @@ def send(pipe: IO[bytes], message: Any) -> None:
 
 
 def receive(pipe: IO[bytes], memory: int | None = None) -> Any:
-    """Read one message; None when the other end is gone, or, of a pipe that does not block, where none is whole.
+    """Read one message; None if the other end is gone, or if a pipe that does not block has no whole message.
 
-    `memory`: the descriptor of the file in memory that the other end has.
+    `memory`: the descriptor of the file in memory that both ends have.
     """
     head = pipe.read(HEAD.size) or b""
     if len(head) < HEAD.size:

@@ -1,4 +1,4 @@
-"""The child process of a guard, as the guard sees it: what it is told, what it answers, and how it ends."""
+"""The child process of a guard, as the guard sees it: orders, answers, and its end."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from typing import IO, Any
 from vibroimpact.fmus.processes.process import Process
 from vibroimpact.orchestrator.guard.pipe import BELL, Order, receive, send
 
-#: A process that can wait for a bell runs points in batches; elsewhere a thread reads the answers one by one.
+#: Whether the system can wait for a bell, so that points run in batches; elsewhere a thread reads single answers.
 HAS_BELL = os.name == "posix"
-#: Of the pipe of answers, bytes: what Linux allows to everybody.
+#: Size of the pipe of answers, bytes: the most that Linux allows to every user.
 PIPE_SIZE = 1 << 20
-#: What a child that is to end may take, s: longer than its supervisor takes to end all that an FMU has started.
+#: Longest time for a child to end, s: longer than its supervisor takes to kill all processes of an FMU.
 END_TIME = 10.0
 
 
 def _enlarge(pipe: IO[bytes]) -> None:
-    """Let a pipe hold many answers, where the system allows it: who writes to a full one waits for its reader."""
+    """Let a pipe hold many answers, if the system allows it: a full pipe blocks its writer."""
     if sys.platform == "linux":
         import fcntl  # POSIX only
 
@@ -33,7 +33,7 @@ def _enlarge(pipe: IO[bytes]) -> None:
 
 
 class PointProcess:
-    """A running child process; there are at most the answers of one batch on their way."""
+    """A running child process; at most the answers of one batch are under way."""
 
     def __init__(self, order: Order) -> None:
         self._bell, bell = os.pipe() if HAS_BELL else (-1, -1)
@@ -58,15 +58,15 @@ class PointProcess:
         self._answers.put(None)
 
     def say(self, message: Any) -> None:
-        """Send a message; a child that is gone shows in its answer."""
+        """Send a message; a dead child shows in its answer."""
         with contextlib.suppress(BrokenPipeError):
             send(self._process.stdin, message)
 
     def answers(self, seconds: float) -> tuple[list[Any], bool]:
-        """Wait until there is something to read; return the answers, and whether no more of them come.
+        """Wait for answers; return them, and whether they are the last of the batch.
 
-        The last answer of a child that is gone is None. TimeoutError: the child has not rung its bell; what it had
-        answered is among `end`'s answers.
+        The last answer of a dead child is None. TimeoutError: the child has not rung its bell; `end` returns its
+        answers so far.
         """
         if self._reader is not None:
             try:

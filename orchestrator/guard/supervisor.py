@@ -1,12 +1,12 @@
-"""Stands between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
+"""A process between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
 
-Started as `python -m` with the descriptor of the bell (`pipe`), it forks before anything of size is imported. The fork
-runs the points (`child`) in a process group of its own; the supervisor runs no code of an FMU, so none can take it
-down. When the fork ends, or the guard closes its pipe, dies, or says so, the supervisor kills all that is left and
-ends as the fork has ended.
+It is started as `python -m` with the descriptor of the bell (`pipe`), and forks before any large import. The fork runs
+the points (`child`) in a process group of its own. The supervisor runs no code of an FMU, so none can crash it. It
+kills all remaining processes if the fork ends, or if the guard closes its pipe, dies, or sends SIGTERM. Then it ends
+as the fork has ended.
 
-On Linux it is the reaper of its descendants: those that left the process group (setsid) come back to it. Elsewhere
-it knows the process group only.
+On Linux it is the reaper of its descendants: processes that left the group (setsid) come back to it. Elsewhere it
+knows only the process group.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-#: What the fork may take to end by itself once the guard has closed its pipe, s.
+#: Time in which the fork may end by itself after the guard has closed its pipe, s.
 ENDING_TIME = 0.2
 #: Longest time spent on killing descendants, s: an FMU may start them faster than they can be killed.
 KILLING_TIME = 5.0
-#: How often the supervisor looks whether the guard lives, if its pipe has not said so, s.
+#: Interval at which the supervisor checks that the guard lives, besides its pipe, s.
 LOOK = 0.5
 #: Options of Linux' prctl.
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def _serve(bell: int | None) -> None:
-    from vibroimpact.orchestrator.guard.child import main  # heavy, and nothing that the supervisor needs
+    from vibroimpact.orchestrator.guard.child import main  # heavy, and not needed by the supervisor
 
     main(bell)
 
@@ -80,7 +80,7 @@ def _wakeup_pipe() -> int:
 
 
 def _close_output(bell: int) -> None:
-    """Leave answers and bell to the fork: the guard shall see these pipes end when the fork does."""
+    """Leave answers and bell to the fork: the guard must see these pipes end with the fork."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)
@@ -91,16 +91,16 @@ def _wait_for_end(fork: int, guard: int, wakeup: int) -> int | None:
     """Wait until the fork has ended (returns its status) or must be ended (None)."""
     poll = select.poll()
     poll.register(wakeup, select.POLLIN)
-    # Of the guard's pipe only that it is closed (or the guard dead): the orders are the fork's to read.
+    # only the end of the guard's pipe matters: the fork reads the orders
     poll.register(0, 0)
     end = float("inf")
     while (left := end - time.monotonic()) > 0.0:
         ready = dict(poll.poll(1e3 * min(LOOK, left)))
-        told = os.read(wakeup, 4096) if wakeup in ready else b""
+        signals = os.read(wakeup, 4096) if wakeup in ready else b""
         status, _ = _reap(fork)
         if status is not None:
             return status
-        if signal.SIGTERM in told or os.getppid() != guard:
+        if signal.SIGTERM in signals or os.getppid() != guard:
             return None
         if 0 in ready:
             poll.unregister(0)
@@ -109,7 +109,7 @@ def _wait_for_end(fork: int, guard: int, wakeup: int) -> int | None:
 
 
 def _reap(fork: int) -> tuple[int | None, bool]:
-    """Take note of the children that have ended; returns the status of the fork if it is one, and if others live."""
+    """Reap the children that have ended; returns the fork's status if it has ended, and whether others live."""
     found = None
     while True:
         try:
@@ -123,7 +123,7 @@ def _reap(fork: int) -> tuple[int | None, bool]:
 
 
 def _kill_descendants(fork: int, status: int | None) -> int | None:
-    """Kill all children, and those that then become children; returns the status of the fork."""
+    """Kill all children, and processes that then become children; returns the status of the fork."""
     end = time.monotonic() + KILLING_TIME
     while time.monotonic() < end:
         found, some_live = _reap(fork)
@@ -138,7 +138,7 @@ def _kill_descendants(fork: int, status: int | None) -> int | None:
 
 
 def _children() -> Iterator[int]:
-    """Yield the living and dead children of this process; none where there is no /proc."""
+    """Yield the living and dead children of this process; none without /proc."""
     own = str(os.getpid())
     for entry in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""What breaks solvers of impacts, measured on the machine of whoever asks."""
+"""Hard cases for solvers of impacts, measured on the user's machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a hard case is, and what was measured of one."""
+"""A hard case, and its measurement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """What is drawn of a case."""
+    """The curve of a case, to be drawn."""
 
     x: Floats
     y: Floats
@@ -24,39 +24,39 @@ class Curve:
     x_log: bool = False
     y_log: bool = True
     is_bounded: bool = True
-    """Whether the bound of the case is one of `y`, and drawn."""
+    """Whether the bound of the case is a value of `y`, and drawn."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What was measured of a case."""
+    """The measurement of a case."""
 
     figure: float
-    """How far the claim is from being exact, in what the case says; NaN: it could not be measured."""
+    """Deviation from the claim, as `of` defines it; NaN if it could not be measured."""
     curve: Curve
 
 
 @dataclass(frozen=True, slots=True)
 class HardCase:
-    """What breaks solvers of impacts, and a claim about it that is measured."""
+    """A claim about a motion that is hard for solvers of impacts, and how to measure it."""
 
     name: str
-    """As `--only` and the page have it."""
+    """The name in `--only` and on the page."""
     theme: str
     """Heading of the page."""
     title: str
     """The case in a few words."""
     claim: str
-    """What is to hold."""
+    """The claim to verify."""
     reference: str
-    """What the figure is measured against."""
+    """The reference for the figure."""
     of: str
-    """What the figure is."""
+    """Definition of the figure."""
     bound: float
-    """Of the figure: 30 times what was measured where it is an error, and 4 units in the last place at least."""
+    """Bound of the figure: for an error, 30 times the measured one, and at least 4 units in the last place."""
     measure: Callable[[], Found]
     is_time: bool = False
-    """The figure is processor time, s: beyond its bound the machine is slow, and nothing is wrong."""
+    """The figure is processor time, s: beyond its bound the machine is slow, and no result is wrong."""
 
 
 def relative(found: Floats | float, expected: Floats | float) -> Floats:
@@ -66,5 +66,5 @@ def relative(found: Floats | float, expected: Floats | float) -> Floats:
 
 
 def largest(errors: Floats) -> float:
-    """Return the largest error; NaN where there is none, or one is NaN."""
+    """Return the largest error; NaN if there is none, or one is NaN."""
     return float(np.max(errors)) if errors.size else float("nan")

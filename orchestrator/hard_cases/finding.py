@@ -1,4 +1,4 @@
-"""Finding the contact: grazes, ripples, resonance, all dampings, rates that are equal."""
+"""Finding the contact: grazes, ripples, resonance, all dampings, equal rates."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from vibroimpact.orchestrator.hard_cases.runs import IMPACT_TIME, IMPACT_VELOCIT
 THEME = "Finding the contact"
 LEVELS = 10.0 ** -np.arange(2.0, 13.0)
 TRUSTED = 1e-8
-"""Excess below which the rounding of the stop's own position shows in the speed."""
+"""Peak over the stop, below which the rounding of the stop's own position shows in the speed."""
 SCANNED = 20_000
-"""Points on which a closed form is looked at before its root is found."""
+"""Grid points of a closed form in the search of its root."""
 
 
 def _grazing_impacts(excess: float) -> Floats:
-    """Return the impacts of a free motion whose peak passes the stop at 1 by so much, in 50 periods."""
+    """Return the impacts, in 50 periods, of a free motion whose peak passes the stop at 1 by `excess`."""
     body = PLAIN | {"displacement_start": -1.0 - excess}
     record = run(body=body, stop=[restitution(1.0, 1.0)], record={"recorded_time": 100.0 * math.pi})
     assert record.impacts is not None
@@ -51,7 +51,7 @@ def _from_below() -> Found:
 
 
 def first_root(function: Callable[[Floats], Floats], end: float) -> float:
-    """Return the first root of a function that begins below 0, looked for on an even grid."""
+    """Return the first root of a function that starts below 0, from an even grid."""
     from scipy.optimize import brentq
 
     times = np.linspace(0.0, end, SCANNED)
@@ -71,13 +71,13 @@ def _off_time(expected: float, **tables: Any) -> float:
 
 
 def _by_number(off: Floats, words: str) -> Found:
-    """Return what was measured of some settings, drawn one beside the other."""
+    """Return the measurement of several settings, drawn side by side."""
     places = np.arange(len(off), dtype=np.float64)
     return Found(largest(off), Curve(places, off, words, "relative error of the time (-)"))
 
 
 def _ripple() -> Found:
-    """A beam whose slow mode carries a fast one past its stop: which ripple meets it first?"""
+    """A beam whose slow mode carries a fast one past its stop: the first ripple to touch must be found."""
     modes = beam_modes("clamped_free", 8)
     rates, shapes = modes.eigenvalues**2, modes.shapes(1.0)[0]
     sizes = np.array([0.0, 0.0, 0.0, 1e-2, 1e-3, 1e-4, 1e-4])
@@ -95,8 +95,8 @@ def _ripple() -> Found:
             **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0, "modes": 8},
             "displacement_start": start.tolist(),
         }
-        asked = {"recorded_time": 1.01 * expected}
-        errors.append(_off_time(expected, body=body, stop=[restitution(0.9, 0.5)], record=asked))
+        record = {"recorded_time": 1.01 * expected}
+        errors.append(_off_time(expected, body=body, stop=[restitution(0.9, 0.5)], record=record))
         ratios.append(rates[fast] / rates[0])
     off = np.array(errors)
     curve = Curve(
@@ -135,7 +135,7 @@ RATIOS = np.array([0.0, 1e-9, 0.5, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 3.0, 100.0])
 
 
 def _released(ratio: float, t: Floats) -> Floats:
-    """Return the free motion from -1 at rest, natural frequency 1: equations.md 1.2, with one root of its own."""
+    """Return the free motion from -1 at rest with natural frequency 1, equations.md 1.2, by independent formulas."""
     square = ratio**2 - 1.0
     if abs(square) < 1e-6:  # the series of cosh and sinh about critical damping
         x = square * t**2
@@ -150,7 +150,7 @@ def _released(ratio: float, t: Floats) -> Floats:
 
 
 def _above(ratio: float, t: Floats) -> Floats:
-    """Return how far the free motion has passed -0.3."""
+    """Return the excess of the free motion over -0.3."""
     return _released(ratio, t) + 0.3
 
 
@@ -171,16 +171,16 @@ def _dampings() -> Found:
 OFFSETS = np.array([-1e-4, -1e-8, -1e-12, 0.0, 1e-12, 1e-8, 1e-4])
 """Relative change of the damping at which two rates are equal."""
 COUPLING = 0.25
-"""Stiffness k between two masses of 1: with springs of 1 + k^2 and 1 at them, and a dashpot of 2 k at the first, the
+"""Stiffness k between two masses of 1, with springs of 1 + k^2 and 1 at them, and a dashpot of 2 k at the first. Their
 characteristic polynomial is (s^2 + k s + 1)^2."""
 COMPARED = 6
-"""Impacts of a run that are compared with the power series."""
+"""Number of impacts of a run, compared with the power series."""
 DIGITS, TERMS, STRIDE = 30, 24, 0.5
-"""Digits and terms of the power series, and the time after which a new one begins: the last term is below 1e-23."""
+"""Digits and terms of the power series, and the length of one series in time: its last term is below 1e-23."""
 
 
 def _near_defective() -> Found:
-    """A critically damped oscillator and a chain with Jordan blocks, forced against a stop, and both beside that."""
+    """A critically damped oscillator and a chain with Jordan blocks, forced against a stop; also close to both."""
     k = COUPLING
     springs = {"stiffnesses": [1.0 + k**2 - k, k], "far_stiffness": 1.0 - k}
     coupled = np.array([[1.0 + k**2, -k], [-k, 1.0]])
@@ -227,7 +227,7 @@ def impacts_by_series(stiffness: Floats, damping: float, w: float, stop: float, 
     exact = np.vectorize(Decimal, otypes=[object])
     rates, state = exact(matrix), exact(np.eye(2 * n + 2)[2 * n])
     grid = np.linspace(0.0, STRIDE, 11)[1:]
-    begun = Decimal(0)
+    start = Decimal(0)
     impacts: list[list[float]] = []
     with localcontext() as context:
         context.prec = DIGITS
@@ -240,12 +240,12 @@ def impacts_by_series(stiffness: Floats, damping: float, w: float, stop: float, 
             step = Decimal(float(grid[beyond[0] if len(beyond) else -1]))
             state = _summed(series, step)
             if len(beyond):
-                for _ in range(6):  # of Newton's method
+                for _ in range(6):  # steps of Newton's method
                     step -= (state[0] - Decimal(stop)) / state[n]
                     state = _summed(series, step)
-                impacts.append([float(begun + step), float(state[n])])
+                impacts.append([float(start + step), float(state[n])])
                 state[0], state[n] = Decimal(stop), -Decimal(r) * state[n]
-            begun += step
+            start += step
     return np.array(impacts)
 
 
@@ -261,7 +261,7 @@ CASES = (
     HardCase(
         "grazing-from-above",
         THEME,
-        "a peak that passes the stop by 1e-2 to 1e-12",
+        "a peak 1e-2 to 1e-12 beyond the stop",
         "each is an impact, with the speed of the closed form",
         "energy of the free motion, closed form",
         "relative error of the speed, down to a peak of 1e-8",
@@ -271,7 +271,7 @@ CASES = (
     HardCase(
         "grazing-from-below",
         THEME,
-        "a peak that misses the stop by 1e-2 to 1e-12",
+        "a peak 1e-2 to 1e-12 below the stop",
         "no impact in 50 periods",
         "closed form",
         "impacts",
@@ -292,7 +292,7 @@ CASES = (
         "resonance",
         THEME,
         "undamped resonance, detuned by 0 to 1e-3",
-        "the instant at which the growing motion meets the stop",
+        "the instant of contact of the growing motion",
         "closed form with the beat as a sinc",
         "relative error of the time",
         4e-15,
@@ -301,8 +301,8 @@ CASES = (
     HardCase(
         "dampings",
         THEME,
-        "damping ratios 0, 1e-9, 0.5, 1 and next to it, 3, 100",
-        "the instant at which the motion from -1 comes to -0.3",
+        "damping ratios 0, 1e-9, 0.5, close to 1, 1, 3, 100",
+        "the instant at which the motion from -1 reaches -0.3",
         "closed form",
         "relative error of the time",
         7e-15,
@@ -311,9 +311,9 @@ CASES = (
     HardCase(
         "near-defective",
         THEME,
-        "a critically damped oscillator, a chain with Jordan blocks, and dampings 1e-12 to 1e-4 beside",
+        "a critically damped oscillator, a chain with Jordan blocks, and dampings off by 1e-12 to 1e-4",
         "the first six impacts",
-        "power series of the equations of motion in 30 digits",
+        "power series of the equations of motion with 30 digits",
         "relative error of times and speeds",
         1.2e-13,
         _near_defective,

@@ -1,4 +1,4 @@
-"""Flights of a free mass between its bounces, under a load that turns: mass, force and frequency 1, in closed form."""
+"""Flights of a free mass between its bounces, under a turning load: mass, force and frequency 1, in closed form."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ import math
 from dataclasses import dataclass
 
 QUARTER = 0.5 * math.pi
-"""Phase at which the load cos(t) turns round."""
+"""Phase at which the load cos(t) changes sign."""
 SERIES_BELOW = 0.5
-"""Angle u, rad, below which u - sin u is summed as a series; the difference would cancel."""
+"""Angle u, rad, below which u - sin u is summed as a series, as the difference would cancel."""
 MOST_STEPS = 60
-"""Steps of Newton's method at most: six are usual, next to a double root it takes more."""
+"""Most steps of Newton's method: six are usual, near a double root more."""
 NOTHING_LEFT = 1e-18
 """Length of a flight over its phase, below which the bounces have come to rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounces:
-    """Impacts of a mass on its stop, and how they end."""
+    """Impacts of a mass on its stop, and their end."""
 
     phases: list[float]
-    """Of the impacts, after the turn of the load."""
+    """Phases of the impacts, after the turn of the load."""
     speeds: list[float]
     rest: float
     """Phase at which infinitely many bounces have come to rest; NaN: the mass leaves before."""
 
 
 def gained(load: float, slope: float, angle: float) -> tuple[float, float]:
-    """Return the speed and the way that the load a cos(u) + b sin(u) gives a mass at rest."""
+    """Return the speed and the displacement that the load a cos(u) + b sin(u) gives a mass at rest."""
     versed = 2.0 * math.sin(0.5 * angle) ** 2
     if angle < SERIES_BELOW:
         rest, term = 0.0, angle
@@ -40,9 +40,9 @@ def gained(load: float, slope: float, angle: float) -> tuple[float, float]:
 
 
 def flight(load: float, slope: float, rebound: float) -> tuple[float, float] | None:
-    """Return length of a flight and speed at its end; None where the load lets the mass go.
+    """Return length of a flight and speed at its end; None if the load lets the mass go.
 
-    Newton's method comes from one side: the way over the time is convex, or concave, in the time.
+    Newton's method converges from one side: displacement over time is convex, or concave, in the time.
     """
     if load <= 0.0:
         return None
@@ -78,12 +78,12 @@ def bounces(phase: float, speed: float, restitution: float) -> Bounces:
 
 
 def start_that_ends_at_the_turn(restitution: float, beside: float = 0.0) -> tuple[float, float]:
-    """Return displacement and velocity at phase -pi/2 from which the bounces end exactly as the load turns.
+    """Return displacement and velocity at phase -pi/2 from which the bounces end exactly at the load's turn.
 
-    A change of the velocity may be added, with which they end earlier, or the mass leaves.
+    `beside` is added to the velocity: the bounces then end earlier, or the mass leaves.
 
-    Next to the turn the load is linear, and such bounces are similar: each is at q times the time before the turn,
-    with q^2 times the speed, and r = q^2 (2 + q) / (1 + 2 q). They are followed back from there, where errors shrink.
+    Near the turn the load is linear, and the bounces are similar. Each is at q times the time before the turn, with
+    q^2 times the speed, and r = q^2 (2 + q) / (1 + 2 q). They are followed backwards, where errors shrink.
     """
     from scipy.optimize import brentq
 
@@ -102,10 +102,10 @@ def start_that_ends_at_the_turn(restitution: float, beside: float = 0.0) -> tupl
 def first_impact(
     displacement: float, velocity: float, load: float = 1.0, slope: float = 0.0
 ) -> tuple[float, float]:
-    """Return the phase after the turn, and the speed, of the first impact of a mass that begins off its stop, at 0.
+    """Return the phase after the turn, and the speed, of the first impact of a mass that starts off its stop at 0.
 
-    A load of cos(u) begins at phase -pi/2, one of sin(u) at the turn. Newton's method comes from beyond the impact,
-    where the displacement is convex.
+    A load of cos(u) starts at phase -pi/2, a load of sin(u) at the turn. Newton's method converges from beyond the
+    impact, where the displacement is convex.
     """
     time, change = QUARTER, math.inf
     for _ in range(MOST_STEPS):

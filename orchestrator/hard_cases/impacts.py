@@ -1,4 +1,4 @@
-"""Impacts: a million of them, next to no room, several at one instant, several stops at one place."""
+"""Impacts: a million of them, in narrow gaps, several at one instant, several stops at one place."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _elastic() -> Found:
 
 
 def _nearly_elastic() -> Found:
-    """A mass that a force presses: flights of 2 r^n v / g that add up, equations.md 3.1."""
+    """A mass under a constant force: flights of 2 r^n v / g in a convergent sum, equations.md 3.1."""
     r, start = 0.999, -1.0
     record = run(
         body={"mass": 1.0, "stiffness": 0.0, "displacement_start": start},
@@ -115,7 +115,7 @@ COEFFICIENTS = (0.3, 0.7, 0.95)
 
 
 def _absolute_restitution() -> Found:
-    """What each impact gives a mass of a chain, or the tip of a clamped beam, whose shapes are 2 there."""
+    """Relative change of velocity at impacts of a chain's masses, and of a clamped beam's tip, whose shapes are 2."""
     errors = []
     for place, r in enumerate(COEFFICIENTS):
         chain = {"kind": "chain", "masses": list(MASSES), "stiffnesses": 1.0, "dampings": 0.05}
@@ -149,7 +149,7 @@ FALLS = np.array([0.25, 1.0, 3.0, 1024.0])
 
 
 def _at_a_border() -> Found:
-    """A free mass that meets its stop where one recording ends and the next begins, to the last bit or one beside."""
+    """A free mass meets its stop at the border of two recordings, exactly or one bit off."""
     wrong = []
     for fall in FALLS:
         body = {"mass": 1.0, "stiffness": 0.0, "displacement_start": -float(fall), "velocity_start": 1.0}
@@ -174,7 +174,7 @@ SMALLEST = np.array([1e-300, 1e-100, 1e-20])
 
 
 def _dead_stop() -> Found:
-    """A restitution next to 0: the motion is that with a dead stop."""
+    """A restitution near 0: the motion is the same as with a dead stop."""
 
     def end_of(r: float) -> tuple[float, float]:
         record = run(
@@ -187,7 +187,9 @@ def _dead_stop() -> Found:
 
     dead = np.array(end_of(0.0))
     off = np.array([np.abs(np.array(end_of(float(r))) - dead).max() for r in SMALLEST])
-    return Found(largest(off), Curve(SMALLEST, off, "restitution (-)", "change of the end (-)", x_log=True))
+    return Found(
+        largest(off), Curve(SMALLEST, off, "restitution (-)", "change of the final state (-)", x_log=True)
+    )
 
 
 def _in_lanes() -> Found:
@@ -238,7 +240,7 @@ CASES = (
         "elastic-million",
         THEME,
         "a million elastic impacts",
-        "the energy stays",
+        "the energy is conserved",
         "conservation",
         "relative error of the energy",
         3e-14,
@@ -247,7 +249,7 @@ CASES = (
     HardCase(
         "nearly-elastic",
         THEME,
-        "restitution 0.999 under a force: flights that add up to rest",
+        "restitution 0.999 under a force: flights that end at rest",
         "impacts and the instant of rest",
         "geometric sums in closed form",
         "relative error of times and speeds",
@@ -258,7 +260,7 @@ CASES = (
         "narrow-gap",
         THEME,
         "1000 impacts between two elastic stops 1e-3 to 1e-12 apart",
-        "each found, the speed kept",
+        "each is found, the speed is conserved",
         "free flight",
         "relative error of times and speeds",
         9e-16,
@@ -267,8 +269,8 @@ CASES = (
     HardCase(
         "simultaneous",
         THEME,
-        "two masses that hit at one instant",
-        "the energy stays, and so does the symmetry",
+        "two masses that impact at one instant",
+        "energy and symmetry are conserved",
         "conservation, mirror symmetry",
         "asymmetry, or relative error of the energy",
         1.2e-12,
@@ -278,8 +280,8 @@ CASES = (
         "absolute-restitution",
         THEME,
         "masses of a chain and the tip of a beam, restitution 0.3, 0.7 and 0.95",
-        "each impact turns its speed round by the restitution itself",
-        "mass, or shapes of the tip, in closed form",
+        "each impact multiplies the speed by minus the restitution",
+        "mass, or mode shapes at the tip, in closed form",
         "relative error of 1 + r",
         2e-14,
         _absolute_restitution,
@@ -298,18 +300,18 @@ CASES = (
         "next-to-dead",
         THEME,
         "restitution 1e-300 to 1e-20",
-        "the motion is that with restitution 0",
+        "the motion equals that with restitution 0",
         "the dead stop",
-        "change of the end",
+        "change of the final state",
         9e-16,
         _dead_stop,
     ),
     HardCase(
         "in-lanes",
         THEME,
-        "60 points of a mass, a chain and a beam, many at once",
-        "have the impacts that they have one by one",
-        "each point run alone",
+        "60 points of a mass, a chain and a beam, computed together",
+        "have the same impacts as one by one",
+        "each point alone",
         "relative error of times and speeds",
         7e-14,
         _in_lanes,

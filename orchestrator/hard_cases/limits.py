@@ -1,4 +1,4 @@
-"""Long steps and numbers beyond all bounds: deadlines that are kept, one error, limits that change nothing."""
+"""Long steps and numbers beyond all bounds: deadlines hold, one error, limits do not change the motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONG_RUN: dict[str, Any] = {"transient_periods": 10**7, "recorded_periods": 1}
 
 
 def _deadlines() -> Found:
-    """Motions that one step would follow for minutes: each ends within its deadline, or says so."""
+    """Motions that would take minutes in one step: each run ends within its deadline and reports it."""
     scenes: list[dict[str, Any]] = [
         {  # two masses, a dashpot of 1e5 between the first and the ground
             "body": {
@@ -80,7 +80,7 @@ LIMITS = np.array([1, 10, 100, 1000])
 
 
 def _impact_limits() -> Found:
-    """A limit on impacts ends the run at that impact, whatever is recorded."""
+    """A limit on impacts ends the run at that impact, with any recording."""
 
     def end_of(limit: int, record: dict[str, Any]) -> np.ndarray[Any, Any]:
         found = recorded(
@@ -102,7 +102,8 @@ def _impact_limits() -> Found:
         errors.append(max(float(np.abs(other - reference).max()) for other in others))
     off = np.array(errors)
     return Found(
-        largest(off), Curve(LIMITS.astype(float), off, "limit (-)", "change of the end (-)", x_log=True)
+        largest(off),
+        Curve(LIMITS.astype(float), off, "limit (-)", "change of the final state (-)", x_log=True),
     )
 
 
@@ -110,7 +111,7 @@ PERIODS = np.array([1, 16, 128, 512])
 
 
 def _long_free_motion() -> Found:
-    """An undamped oscillator that meets nothing: its energy after 512 periods, with samples and without."""
+    """An undamped oscillator without contact: its energy after 512 periods, with samples and without."""
     errors = []
     for count in PERIODS:
         for rate in (None, 10.0):
@@ -132,7 +133,7 @@ CASES = (
     HardCase(
         "deadlines",
         THEME,
-        "a dashpot of 1e5, stops 1e-300 off, springs of 1e12 N/m with 1e-5 m of room, 10^7 periods in one step",
+        "a dashpot of 1e5, stops at a distance of 1e-300, springs of 1e12 N/m at 1e-5 m, 10^7 periods in one step",
         "the deadline is kept within the step",
         "-",
         "processor time after the deadline in s",
@@ -146,17 +147,17 @@ CASES = (
         "a force of 1e300 on 1e-9 kg, a mass of 5e-324, a stiffness of 1e200",
         "one error that names the time",
         "-",
-        "1 where there is none",
+        "1 without such an error",
         0.0,
         _beyond_numbers,
     ),
     HardCase(
         "impact-limits",
         THEME,
-        "a motion that ends by its limit on impacts, with their record, without, with samples",
-        "the same end",
+        "a motion that ends by its limit on impacts, with or without their record, with samples",
+        "the same final state",
         "each other",
-        "change of the end",
+        "change of the final state",
         4e-14,
         _impact_limits,
     ),

@@ -1,4 +1,4 @@
-"""The list of hard cases, and what was measured of those that were asked for."""
+"""The list of hard cases, and the measurement of selected cases."""
 
 from __future__ import annotations
 
@@ -73,22 +73,22 @@ _PATHS = {
     "x_label": "found.curve.x_label",
     "y_label": "found.curve.y_label",
 }
-"""Where `Measured` has the value of a variable."""
+"""Path of each variable's value in `Measured`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A hard case with what was measured.
+    """A hard case with its measurement.
 
     Attributes
     ----------
     case : HardCase
     found : Found
-        Its figure is NaN where the case did not run.
+        Its figure is NaN if the case did not run.
     seconds : float
         Processor time, s.
     failure : str
-        Why it did not run; empty where it did.
+        Reason why it did not run; empty if it ran.
     """
 
     case: HardCase
@@ -103,34 +103,34 @@ class Measured:
 
     @property
     def verdict(self) -> str:
-        """What the figure says: `met`, `wrong`, or `slow` of a time on a machine that is busy or old."""
+        """Verdict on the figure: `met`, `wrong`, or `slow` for a time on a busy or old machine."""
         if self.is_met:
             return "met"
         return "slow" if self.case.is_time and self.found.figure < math.inf else "wrong"
 
 
 def cases_named(names: Sequence[str]) -> list[HardCase]:
-    """Return the cases of these names, in the order of the list; all of them for no name.
+    """Return the cases of these names, in the order of the list; all cases without names.
 
     Raises
     ------
     UsageError
-        There is no such case, or one is named twice.
+        A name is unknown, or occurs twice.
     """
     known = {case.name: case for case in CASES}
-    asked = _as_texts(names)
-    for name, times in Counter(asked).items():
+    chosen = _as_texts(names)
+    for name, times in Counter(chosen).items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"Did you mean {near[0]}?" if near else f"There are {', '.join(known)}."
             raise UsageError(message(_ONLY, f": expected the name of a hard case, got {name!r}. {hint}"))
         if times > 1:
             raise UsageError(message(_ONLY, f": expected each name once, got {name!r} {times} times."))
-    return [case for case in CASES if not asked or case.name in asked]
+    return [case for case in CASES if not chosen or case.name in chosen]
 
 
 def _as_texts(names: object) -> list[str]:
-    """Return names as a list; raise UsageError where one is no text."""
+    """Return names as a list; UsageError if one is no text."""
     listed: list[str] = []
     for name in names if isinstance(names, Iterable) else [names]:
         if not isinstance(name, str):
@@ -147,7 +147,7 @@ def measured_cases(
     Parameters
     ----------
     names : sequence of str
-        Those to run; none: all.
+        Cases to run; without names all.
     clock : callable
         Returns the processor time since some instant, s.
 
@@ -171,7 +171,7 @@ def _measured(case: HardCase, clock: Callable[[], float]) -> Measured:
 
 
 def dataset_of(measured: Sequence[Measured]) -> xr.Dataset:
-    """Return what was measured as a dataset of kind `hard_cases`."""
+    """Return the measurements as a dataset of kind `hard_cases`."""
     points = max((len(one.found.curve.x) for one in measured), default=0)
     x, y = (np.full((len(measured), points), np.nan) for _ in range(2))
     for place, one in enumerate(measured):

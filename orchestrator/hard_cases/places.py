@@ -1,4 +1,4 @@
-"""Stops in awkward places: at nodes, at the start, two of them for one motion to rest on."""
+"""Stops in awkward places: at nodes, at the start, two of them under one resting motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MIRRORED: dict[str, Any] = {
 
 
 def _at_a_node() -> Found:
-    """The outer masses swing against each other, sqrt(2) rad/s: the middle one, at its stop, stays."""
+    """The outer masses swing against each other at sqrt(2) rad/s: the middle mass stays at its stop."""
     end, samples = 100.0, 100
     record = run(
         body=MIRRORED | {"displacement_start": [0.3, 0.0, -0.3]},
@@ -43,7 +43,7 @@ def _at_a_node() -> Found:
 
 
 def _driven_at_a_node() -> Found:
-    """A force that is the same on both sides: the masses part at the first impact, and not before."""
+    """A force that is equal on both sides: the masses part at the first impact, and not before."""
     periods, rate = 5, 10.0
     record = run(
         body=MIRRORED,
@@ -90,7 +90,7 @@ def _starts() -> Found:
 
 
 def _rocking() -> Found:
-    """Two masses on dead stops that a spring makes rock: at rest on both after infinitely many impacts, in 10 s."""
+    """Two masses on dead stops, rocked by a spring: at rest on both after infinitely many impacts, in 10 s."""
     loads = 10.0 ** np.arange(-3.0, 4.0)
     errors = []
     for load in loads:
@@ -106,26 +106,26 @@ def _rocking() -> Found:
         assert record.final_state is not None
         errors.append(float(np.abs(record.final_state).max()))
     off = np.array(errors)
-    return Found(largest(off), Curve(loads, off, "load (-)", "what is left of the motion (-)", x_log=True))
+    return Found(largest(off), Curve(loads, off, "load (-)", "residual motion (-)", x_log=True))
 
 
-BESIDE = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
+OFFSETS = np.array([-1e-13, 1e-15, 1e-13, 1e-11, 1e-9])
 """Distances of the stop from the middle of a pinned beam, over its length."""
 COMPARED = 6
-"""Impacts of each run."""
+"""Compared impacts of each run."""
 OFF_THE_STOP = 1e-4
-"""Time after an impact at which the mode is off the stop, whatever the rounding."""
+"""Time after an impact at which the mode has left the stop, with any rounding."""
 
 
 def _beside_a_node() -> Found:
     """A pinned beam swings in mode 2, and touches a stop next to its middle, where it hardly moves."""
-    off = np.array([_off_beside(0.5 + float(distance)) for distance in BESIDE])
+    off = np.array([_error_at(0.5 + float(distance)) for distance in OFFSETS])
     words = "stop beside the node, each distance"
     return Found(largest(off), Curve(np.arange(1.0, 1.0 + len(off)), off, words, "relative error (-)"))
 
 
-def _off_beside(location: float) -> float:
-    """Return the largest error of time and speed of the first impacts: mode 1 begins at rest, each impact moves it."""
+def _error_at(location: float) -> float:
+    """Return the largest error of time and speed of the first impacts. Mode 1 starts at rest; each impact moves it."""
     angle, r = math.pi * (location - 0.5), 0.8
     shapes = math.sqrt(2.0) * np.array([math.cos(angle), -math.sin(2.0 * angle)])
     rates = math.pi**2 * np.array([1.0, 4.0])
@@ -162,8 +162,8 @@ CASES = (
     HardCase(
         "stop-at-a-node",
         THEME,
-        "a stop at the node of a chain that swings",
-        "changes nothing",
+        "a stop at a node of a swinging chain",
+        "does not change the motion",
         "closed form",
         "relative error of the motion",
         1e-12,
@@ -172,8 +172,8 @@ CASES = (
     HardCase(
         "beside-a-node",
         THEME,
-        "a stop 1e-15 to 1e-9 of the length beside a node of the mode that swings",
-        "the first six impacts of the motion that is left there",
+        "a stop 1e-15 to 1e-9 of the length off a node of the swinging mode",
+        "the first six impacts of the residual motion there",
         "both modes in closed form",
         "relative error of times and speeds",
         2e-14,
@@ -182,8 +182,8 @@ CASES = (
     HardCase(
         "driven-at-a-node",
         THEME,
-        "a symmetric force on a symmetric chain, one stop on one side",
-        "the masses move alike until the first impact",
+        "a symmetric force on a symmetric chain, a stop on one side",
+        "the masses move equally until the first impact",
         "symmetry",
         "asymmetry before the impact",
         1e-14,
@@ -192,10 +192,10 @@ CASES = (
     HardCase(
         "starts",
         THEME,
-        "on the stop from the start, moving into it, pulled off it, pressed to it",
-        "an impact at time 0; leaves without one; holds",
+        "on the stop at the start: moving into it, pulled off it, pressed to it",
+        "an impact at time 0; leaves without impact; stays",
         "closed forms",
-        "error of time, speed or place",
+        "error of time, speed or position",
         9e-16,
         _starts,
     ),
@@ -205,7 +205,7 @@ CASES = (
         "a beam of two modes that a load of 1e-3 to 1e3 presses to two dead stops",
         "comes to rest on both after infinitely many impacts",
         "statics",
-        "what is left of the motion",
+        "residual motion",
         9e-16,
         _rocking,
     ),

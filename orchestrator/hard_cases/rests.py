@@ -1,4 +1,4 @@
-"""Chatter, sticking, release: beams that come to rest, loads that turn round, rests that last."""
+"""Chatter, sticking, release: beams that come to rest, loads that change sign, long rests."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BEAM = {"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_lengt
 
 
 def _pressed_beam() -> Found:
-    """A beam that a constant force presses to its stop: the force of the stop is that of statics."""
+    """A beam pressed to its stop by a constant force: the force of the stop is the static one."""
     modes, load, limit = 6, 5.0, 0.05
     shapes = beam_modes("clamped_free", modes)
     flexibility = shapes.shapes([0.5, 1.0]) / shapes.eigenvalues**2
@@ -53,7 +53,7 @@ def _pressed_beam() -> Found:
 
 
 def _turning_load() -> Found:
-    """A mass without a spring, at rest on its stop, under F cos(w t): it leaves where the force turns round."""
+    """A mass without a spring, at rest on its stop, under F cos(w t): it leaves where the force changes sign."""
     frequencies = 10.0 ** np.arange(-3.0, 4.0)
     errors = []
     for w in frequencies:
@@ -73,7 +73,7 @@ def _turning_load() -> Found:
 
 
 def _undamped_rest() -> Found:
-    """Four undamped modes whose point rests on a dead stop, in 1000 steps: the others keep their energy."""
+    """Four undamped modes with their point at rest on a dead stop, in 1000 steps: the others keep their energy."""
     end, samples = 1000.0, 1000
     record = run(
         body={**BEAM, "modes": 4, "displacement_start": [0.0, 0.1, 0.0, 0.0]},
@@ -108,7 +108,7 @@ def _stiff_rest() -> Found:
             record={"recorded_periods": 1},
         )
         assert record.impacts is not None
-        # the first contact ends where its force does: at a quarter of the period
+        # the first contact ends at the zero of its force: at a quarter of the period
         released = record.impacts[0, 0] + record.impacts[0, 6]
         errors.append(float(relative(released, 0.5 * math.pi / w)))
     off = np.array(errors)
@@ -119,7 +119,7 @@ def _stiff_rest() -> Found:
 
 
 def _chatter() -> Found:
-    """A mass that falls on a stop: the instant at which infinitely many bounces end, for every restitution."""
+    """A mass falls on a stop: the instant at which infinitely many bounces end, for every restitution."""
     coefficients = np.array([0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99])
     errors = []
     for r in coefficients:
@@ -140,17 +140,17 @@ FREE = {"mass": 1.0, "stiffness": 0.0}
 RELEASE_OFFSETS = np.array([-1e-2, -1e-5, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-5, 1e-2])
 """Change of the velocity at the start: the bounces end before the release, at it, or not at all."""
 RESOLVED_OFFSET = 1e-9
-"""Offset from which on rounding does not decide whether the mass comes to rest."""
+"""Offset above which rounding does not decide whether the mass comes to rest."""
 WELL_BEFORE = 1e-2
-"""Offset from which on the instant of rest is well-conditioned."""
+"""Offset above which the instant of rest is well-conditioned."""
 BOUNCING = (0.3, 0.5, 0.7, 0.95)
 """Restitutions."""
 COMPARED = 3
-"""First impacts that are compared: each multiplies an error by 1 to 5."""
+"""Compared first impacts: each multiplies an error by 1 to 5."""
 
 
 def _end_at_release() -> Found:
-    """A free mass under cos(t) bounces to rest as the load turns round, and next to it: where is it then?"""
+    """A free mass under cos(t) bounces to rest at the turn of the load, or near it; its later motion is compared."""
     errors = [
         [
             _off_bounces(r, abs(float(offset)), *start_that_ends_at_the_turn(r, float(offset)))
@@ -174,19 +174,21 @@ def _off_bounces(r: float, offset: float, place: float, velocity: float) -> floa
     assert record.impacts is not None
     assert record.sticks is not None
     expected = bounces(*first_impact(place, velocity), r)
-    rests = not math.isnan(expected.rest)
+    comes_to_rest = not math.isnan(expected.rest)
     first = record.impacts[:COMPARED, [IMPACT_TIME, IMPACT_VELOCITY]]
     impacts = np.stack([QUARTER + np.array(expected.phases), expected.speeds], axis=1)[:COMPARED]
-    if first.shape != impacts.shape or (offset >= RESOLVED_OFFSET and bool(len(record.sticks)) != rests):
+    if first.shape != impacts.shape or (
+        offset >= RESOLVED_OFFSET and bool(len(record.sticks)) != comes_to_rest
+    ):
         return math.inf
-    last = (0.0, 0.0) if rests else (expected.phases[-1], r * expected.speeds[-1])
+    last = (0.0, 0.0) if comes_to_rest else (expected.phases[-1], r * expected.speeds[-1])
     end = np.array(released(*last, 3.0 * QUARTER))
     off = [
         relative(first, impacts),
         relative(np.array([record.final_displacement, record.final_velocity]), end),
     ]
     off.append(relative(record.sticks[:1, STICK_END], QUARTER))
-    if rests and offset >= WELL_BEFORE:
+    if comes_to_rest and offset >= WELL_BEFORE:
         off.append(relative(record.sticks[:1, STICK_START], QUARTER + expected.rest))
     return largest(np.concatenate(off, axis=None))
 
@@ -196,14 +198,14 @@ TURNS = 10
 
 
 def _pressed_in_turn() -> Found:
-    """A free mass that cos(t) presses to two stops in turn: how far beside the stops are its impacts?"""
+    """A free mass that cos(t) presses to two stops in turn: distance of its impacts from the stops."""
     off = np.array([[_off_turns(float(room), r) for r in (0.3, 0.8)] for room in ROOMS]).max(axis=1)
-    curve = Curve(ROOMS, off, "room (-)", "error of impacts and rests as a way (-)", x_log=True)
+    curve = Curve(ROOMS, off, "gap (-)", "error of impacts and rests as a distance (-)", x_log=True)
     return Found(largest(off), curve)
 
 
 def _off_turns(room: float, r: float) -> float:
-    """Return the largest error of a time, times the speed of the first impact there: a way, that of cos(t) being 1."""
+    """Return the largest error of a time, times the first impact's speed there: a length; cos(t)'s path is 1."""
     record = run(
         body=FREE,
         forcing=TURNING,
@@ -242,7 +244,7 @@ def _fourth_order() -> Found:
 
 
 def _off_return(amplitude: float, w: float, ratio: float) -> float:
-    """Return the error of the next impact of a body that is at its stop, at 1, as the force is largest."""
+    """Return the error of the next impact of a body that is at its stop, at 1, at the largest force."""
     held = math.atan2(math.sqrt(max(0.0, (amplitude - 1.0) * (amplitude + 1.0))), 1.0) / w
     steady = amplitude / complex(1.0 - w**2, 2.0 * ratio * w)
     turned = steady * cmath.exp(1j * w * held)
@@ -278,8 +280,8 @@ def _off_touch(amplitude: float, w: float) -> float:
         record={"recorded_periods": periods},
     )
     assert record.sticks is not None
-    rests = periods + 1 if amplitude > 1.0 else 1
-    if len(record.sticks) != rests:
+    rest_count = periods + 1 if amplitude > 1.0 else 1
+    if len(record.sticks) != rest_count:
         return math.inf
     return largest(np.abs([record.final_displacement + 1.0, record.final_velocity]))
 
@@ -298,8 +300,8 @@ CASES = (
     HardCase(
         "pressed-beam",
         THEME,
-        "a beam of 6 modes pressed to its stop, chatter and all",
-        "comes to rest; the force of the stop",
+        "a beam of 6 modes pressed to its stop after chatter",
+        "comes to rest; the force at the stop",
         "static flexibility of its modes",
         "relative error of the force at the end",
         1.7e-13,
@@ -308,7 +310,7 @@ CASES = (
     HardCase(
         "turning-load",
         THEME,
-        "a load that turns round at 1e-3 to 1e3 rad/s",
+        "a load that changes sign at 1e-3 to 1e3 rad/s",
         "the mass lifts off at that instant",
         "zero of the load",
         "relative error of the time",
@@ -319,7 +321,7 @@ CASES = (
         "undamped-rest",
         THEME,
         "an undamped beam of 4 modes at rest on a dead stop, in 1000 steps",
-        "the motion of the rest of it keeps its energy",
+        "the remaining motion keeps its energy",
         "conservation",
         "relative error of the energy",
         3e-13,
@@ -338,30 +340,30 @@ CASES = (
     HardCase(
         "end-at-release",
         THEME,
-        "bounces that end as their load turns round; starts 1e-12 to 1e-2 beside that",
+        "bounces that end as their load changes sign; starts off by 1e-12 to 1e-2",
         "come to rest before the release, or leave; the motion after it",
-        "flights in closed form, followed back from the release",
-        "relative error of impacts, rest, release and end",
+        "flights in closed form, backwards from the release",
+        "relative error of impacts, rest, release and final state",
         7e-13,
         _end_at_release,
     ),
     HardCase(
         "pressed-in-turn",
         THEME,
-        "a load that presses a mass to two stops in turn, 1e-3 to 1e-12 apart",
-        "crosses the room at each turn, and bounces to rest",
+        "a load that presses a mass alternately to two stops 1e-3 to 1e-12 apart",
+        "crosses the gap at each change of sign, and bounces to rest",
         "flights in closed form",
-        "error of times as a way, over the way of the load",
+        "error of times as a distance, relative to that of the load",
         5e-14,
         _pressed_in_turn,
     ),
     HardCase(
         "fourth-order",
         THEME,
-        "a stop whose force is 0 together with its slope, or 1e-12 to 1e-3 beside that",
-        "the body leaves by the fourth power of time; or it stays, where the force only touches 0",
+        "a stop force that is 0 with zero slope, or off by 1e-12 to 1e-3",
+        "the body leaves with the fourth power of time; or it stays, if the force only touches 0",
         "closed form; statics",
-        "relative error of the next impact, or of the place of rest",
+        "relative error of the next impact, or of the rest position",
         9e-14,
         _fourth_order,
     ),

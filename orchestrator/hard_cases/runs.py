@@ -17,13 +17,13 @@ from vibroimpact.orchestrator.scene import Scene
 IMPACT_TIME, IMPACT_VELOCITY, IMPACT_IMPULSE, IMPACT_RESTITUTION, IMPACT_DURATION = 0, 2, 3, 5, 6
 """Columns of the impacts of a record."""
 STICK_START, STICK_END = 0, 1
-"""Columns of its sticks."""
+"""Columns of the sticks of a record."""
 PLAIN: dict[str, Any] = {"mass": 1.0, "stiffness": 1.0}
 """An oscillator with a natural frequency of 1 rad/s."""
 
 
 def recorded(**tables: Any) -> RunRecord:
-    """Run a nondimensional scene, fused, to whatever end it comes."""
+    """Run a nondimensional scene, fused, to its end of any kind."""
     scene = Scene.from_dict({"scene": {"units": "nondimensional"}, **tables}, "hard case")
     runner = open_runner(scene, "fused")
     try:
@@ -33,7 +33,7 @@ def recorded(**tables: Any) -> RunRecord:
 
 
 def run(**tables: Any) -> RunRecord:
-    """Run a nondimensional scene, fused, to its end; one that ends early raises ComponentError."""
+    """Run a nondimensional scene, fused, to its end; ComponentError if it ends early."""
     record = recorded(**tables)
     if record.outcome not in (Outcome.ok, Outcome.stuck):
         raise ComponentError(
@@ -43,7 +43,7 @@ def run(**tables: Any) -> RunRecord:
 
 
 def impacts_of_points(how: str, **tables: Any) -> list[NDArray[np.float64]]:
-    """Return times and speeds of the impacts of each point of a sweep, shape (impact, 2), run in this way."""
+    """Return times and speeds of the impacts of each point of a sweep, shape (impact, 2), run with `execution.how`."""
     from vibroimpact.analysis.dataset import read_flat
     from vibroimpact.orchestrator.running import run_scene
 

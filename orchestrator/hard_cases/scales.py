@@ -1,4 +1,4 @@
-"""Scales and steps: units from nano to giga, one step of a million periods, samples that change nothing."""
+"""Scales and steps: units from nano to giga, one step of a million periods, samples without effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCALES = np.array([1e-9, 1e-6, 1e-3, 40.0, 1e3, 1e6, 1e9])
 
 
 def _units() -> Found:
-    """A chain on a rigid and a Kelvin-Voigt stop, all displacements times a number: the same motion."""
+    """A chain on a rigid and a Kelvin-Voigt stop, all displacements times a factor: the same motion."""
 
     def end_of(scale: float) -> np.ndarray[Any, Any]:
         record = run(
@@ -72,7 +72,7 @@ def _one_step() -> Found:
     off = np.array(errors)
     return Found(
         float(off[-1]),
-        Curve(PERIODS, off, "periods in one step (-)", "relative error of the end (-)", x_log=True),
+        Curve(PERIODS, off, "periods in one step (-)", "relative error of the final state (-)", x_log=True),
     )
 
 
@@ -80,7 +80,7 @@ RATES = np.array([0.0, 1.0, 10.0, 97.0])
 
 
 def _samples() -> Found:
-    """An undamped beam that swings freely: however often it is sampled, it ends in the same place."""
+    """A free undamped beam ends in the same place at any sampling rate."""
     end = 1000.0
 
     def run_at(rate: float) -> tuple[np.ndarray[Any, Any], float]:
@@ -112,7 +112,7 @@ def _samples() -> Found:
     off = np.array([max(np.abs(state - reference).max() / scale, drift) for state, drift in ends])
     return Found(
         largest(off),
-        Curve(RATES[1:], off, "samples a second (-)", "energy, change of the end (-)", x_log=True),
+        Curve(RATES[1:], off, "samples per second (-)", "energy, change of the final state (-)", x_log=True),
     )
 
 
@@ -120,7 +120,7 @@ MODES = np.array([1, 2, 4, 8, 16, 32, 64])
 
 
 def _many_modes() -> Found:
-    """Undamped beams of up to 64 modes between elastic stops: bounded, outside of the stops, energy kept."""
+    """Undamped beams of up to 64 modes between elastic stops: bounded, outside the stops, energy kept."""
     errors, room, end, samples = [], 0.02, 10.0, 200
     for modes in MODES:
         record = run(
@@ -156,7 +156,7 @@ CASES = (
         "displacements of 1e-9 to 1e9",
         "the same motion on rigid and yielding stops",
         "the motion at 1",
-        "relative change of the state at the end",
+        "relative change of the final state",
         1.6e-13,
         _units,
     ),
@@ -166,17 +166,17 @@ CASES = (
         "one step of 100 to 10^6 periods",
         "ends in the steady motion",
         "closed form",
-        "relative error of the end after 10^6 periods",
+        "relative error of the final state after 10^6 periods",
         5e-15,
         _one_step,
     ),
     HardCase(
         "samples",
         THEME,
-        "an undamped free beam, 0 to 97 samples a second for 1000 s",
-        "the same end, the energy kept",
+        "an undamped free beam, 0 to 97 samples per second for 1000 s",
+        "the same final state, the energy is conserved",
         "the run without samples; conservation",
-        "relative change of the end, or of the energy",
+        "relative change of the final state, or of the energy",
         1e-11,
         _samples,
     ),
@@ -184,7 +184,7 @@ CASES = (
         "many-modes",
         THEME,
         "undamped beams of 1 to 64 modes between elastic stops",
-        "outside of the stops, the energy kept",
+        "stays outside of the stops, the energy is conserved",
         "conservation",
         "relative distance beyond the stops, or error of the energy",
         2e-12,

@@ -1,4 +1,4 @@
-"""Several stops, of several laws: what one does while another is touched, and what all of them leave of the energy."""
+"""Several stops, of several laws: one acts while another is in contact, and the energy balance of all."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BEAM: dict[str, Any] = {**{"kind": "beam", "length": 1.0, "flexural_rigidity": 1
 
 
 def _balance(record_table: dict[str, Any], **tables: Any) -> tuple[Floats, Floats, int]:
-    """Return time, what the energy is off its balance over what has been turned over, and the impacts."""
+    """Return the time, the relative error of the energy balance, and the number of impacts."""
     series = {"rate": 20.0, "variables": [*BALANCED]}
     record = run(**tables, record={**record_table, "time_series": series})
     assert record.samples is not None
@@ -66,7 +66,7 @@ def _uneven_beam() -> Found:
 
 
 def _rest_beside() -> Found:
-    """A pinned beam rests on a dead stop while a Hunt-Crossley stop opposite is pressed, and lets go."""
+    """A pinned beam rests on a dead stop while an opposite Hunt-Crossley stop is pressed in and released."""
     return _balanced(
         5,
         {"recorded_time": 12.0},
@@ -86,7 +86,7 @@ def _rest_beside() -> Found:
 
 
 def _overdamped() -> Found:
-    """An undamped stop under an overdamped mode and an undamped one gives its energy back."""
+    """An undamped stop under an overdamped mode and an undamped mode returns its energy."""
     return _balanced(
         1,
         {"recorded_time": 3.0},
@@ -99,7 +99,7 @@ DEPTHS = np.array([0.01, 0.03, 0.05, 0.07, 0.09])
 
 
 def _behind() -> Found:
-    """A rigid stop behind an undamped spring of 100 N/m: what is left is what energy says, equations.md 6.9."""
+    """A rigid stop behind an undamped spring of 100 N/m: energy gives the speeds, equations.md 6.9."""
     stiffness, r = 100.0, 0.9
     errors = []
     for depth in DEPTHS:
@@ -150,7 +150,7 @@ def _pressed_between() -> Found:
         errors.append(abs(record.final_displacement - 1e-6 - depth) / depth)
     off = np.array(errors)
     return Found(
-        largest(off), Curve(LOADS, off, "load (-)", "relative error of the place at the end (-)", x_log=True)
+        largest(off), Curve(LOADS, off, "load (-)", "relative error of the final position (-)", x_log=True)
     )
 
 
@@ -159,7 +159,7 @@ CASES = (
         "all-laws",
         THEME,
         "a chain with a stop of each law, 20 periods",
-        "energy is balanced",
+        "the energy balance holds",
         "balance",
         "relative error of the balance",
         1.7e-13,
@@ -169,7 +169,7 @@ CASES = (
         "uneven-beam",
         THEME,
         "a beam of 8 modes, undamped to overdamped, four stops of three laws",
-        "energy is balanced",
+        "the energy balance holds",
         "balance",
         "relative error of the balance",
         2.6e-13,
@@ -178,8 +178,8 @@ CASES = (
     HardCase(
         "rest-beside",
         THEME,
-        "a beam that rests on a dead stop while a Hunt-Crossley stop lets go",
-        "comes to an end, energy balanced",
+        "a beam at rest on a dead stop while a Hunt-Crossley stop releases it",
+        "finishes, the energy balance holds",
         "balance",
         "relative error of the balance",
         6e-13,
@@ -189,7 +189,7 @@ CASES = (
         "overdamped",
         THEME,
         "an undamped stop under an overdamped mode",
-        "gives its energy back",
+        "returns its energy",
         "balance",
         "relative error of the balance",
         1.3e-13,
@@ -199,7 +199,7 @@ CASES = (
         "behind",
         THEME,
         "a rigid stop behind a spring",
-        "both are met, and both let go",
+        "the mass meets both, and leaves both",
         "conservation of energy",
         "relative error of the speeds",
         4e-15,
@@ -208,10 +208,10 @@ CASES = (
     HardCase(
         "pressed-between",
         THEME,
-        "a load of 0.1 to 1e3 N on a power law opposite a rigid stop 1e-6 m off",
-        "is pressed in to its static place",
+        "a load of 0.1 to 1e3 N on a power law, opposite a rigid stop at 1e-6 m",
+        "is compressed to its static position",
         "statics",
-        "relative error of the place",
+        "relative error of the position",
         6e-12,
         _pressed_between,
     ),

@@ -1,4 +1,4 @@
-"""The study `hard-cases`: what breaks solvers is run, and each figure is printed beside its bound."""
+"""The study `hard-cases`: runs hard cases, and prints each figure with its bound."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from vibroimpact.orchestrator.hard_cases.measuring import (
 from vibroimpact.orchestrator.operations.hard_cases import HardCases
 
 VERDICTS = ("wrong", "slow")
-"""Of cases beyond their bound: a figure that is an error, and one that is a time."""
+"""Verdicts on cases beyond their bound: the figure is an error, or a time."""
 
 
 def _say_measured(one: Measured) -> None:
-    say(f"  {one.case.name}: {_told(one)}", err=True)
+    say(f"  {one.case.name}: {_figure_text(one)}", err=True)
 
 
 @dataclass(eq=False)
 class MeasuredCases(Study[Measured]):
-    """Hard cases with what is measured of each; a row is a case.
+    """Hard cases with their measurements; a row is a case.
 
     Parameters
     ----------
     names : sequence of str
-        Those to run; none: all.
+        Cases to run; without names all.
     """
 
     name = "hard-cases"
@@ -71,7 +71,7 @@ class MeasuredCases(Study[Measured]):
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """Show the table as it grows on a terminal; elsewhere a line for each case."""
+        """Show the growing table on a terminal; without one, print a line for each case."""
         self._show = _say_measured
         if not sys.stderr.isatty():
             yield
@@ -92,7 +92,7 @@ class MeasuredCases(Study[Measured]):
         self._show(row)
 
     def made(self) -> xr.Dataset:
-        """Return what was measured."""
+        """Return the dataset of the measurements."""
         return dataset_of(self.found)
 
     def print_results(self) -> None:
@@ -101,9 +101,9 @@ class MeasuredCases(Study[Measured]):
         self.interruption = f"Interrupted: {len(self.found)} of {self._many} cases were measured."
 
     def conclude(self, options: HardCases) -> None:
-        """Say how many bounds were met.
+        """Print the number of bounds that were met.
 
-        A wrong figure, where no case was left out, raises typer.Exit.
+        typer.Exit: a figure is wrong, and no case was left out.
         """
         missed: Mapping[str, list[str]] = {word: self._of(word) for word in VERDICTS}
         met = sum(one.is_met for one in self.found)
@@ -116,7 +116,7 @@ class MeasuredCases(Study[Measured]):
         return [one.case.name for one in self.found if one.verdict == verdict]
 
 
-def _told(one: Measured) -> str:
+def _figure_text(one: Measured) -> str:
     if one.failure:
         return f"did not run: {one.failure}"
     return f"{one.found.figure:.1e}" if one.found.figure else "0"
@@ -128,7 +128,7 @@ def _table(measured: Sequence[Measured]) -> Table:
         rows.add_row(
             one.case.name,
             one.case.title,
-            _told(one),
+            _figure_text(one),
             f"{one.case.bound:.2g}",
             one.case.of,
             duration(one.seconds),

@@ -1,4 +1,4 @@
-"""Stops that yield: nearly rigid ones, power laws, preloads, a thousand short touches."""
+"""Yielding stops: nearly rigid ones, power laws, preloads, a thousand short touches."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STIFFNESSES = 10.0 ** np.arange(6.0, 16.0)
 
 
 def _nearly_rigid() -> Found:
-    """A Kelvin-Voigt stop of equal restitution (equations.md 6.9): its motion tends to that of the rigid one."""
+    """A Kelvin-Voigt stop of equal restitution (equations.md 6.9): its motion tends to the rigid stop's."""
     ratio = 0.1
     root = math.sqrt(1.0 - ratio**2)
     r = math.exp(-2.0 * ratio * math.acos(ratio) / root)
@@ -39,8 +39,8 @@ def _nearly_rigid() -> Found:
         yielding = run(**scene, stop=[kelvin_voigt(0.5, float(stiffness), damping)]).final_displacement
         distances.append(abs(yielding - rigid))
     off = np.array(distances)
-    told = off > 1e-9  # below, the order is that of rounding
-    order = float(np.polyfit(np.log(STIFFNESSES[told] ** -0.5), np.log(off[told]), 1)[0])
+    resolved = off > 1e-9  # below, the order is dominated by rounding
+    order = float(np.polyfit(np.log(STIFFNESSES[resolved] ** -0.5), np.log(off[resolved]), 1)[0])
     curve = Curve(
         STIFFNESSES, off, "stiffness (-)", "distance from the rigid stop (-)", x_log=True, is_bounded=False
     )
@@ -51,7 +51,7 @@ PRODUCTS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 
 
 def _hunt_crossley() -> Found:
-    """equations.md 6.10: p (1 + e) = ln((1 + p) / (1 - p e)) with p = damping times speed, whatever the exponent."""
+    """equations.md 6.10: p (1 + e) = ln((1 + p) / (1 - p e)) with p = damping times speed, for any exponent."""
     from scipy.optimize import brentq
 
     errors = []
@@ -86,7 +86,7 @@ def _hunt_crossley() -> Found:
 
 
 def _preloaded() -> Found:
-    """A mass put where a force and the stop's spring balance stays there."""
+    """A mass at the balance of a force and the stop's spring stays there."""
     stiffnesses, ends = 10.0 ** np.arange(0.0, 13.0, 2.0), []
     for stiffness in stiffnesses:
         place = 1.0 / float(stiffness)
@@ -135,7 +135,7 @@ OPEN_STIFFNESSES = 10.0 ** np.arange(2.0, 13.0, 2.0)
 
 
 def _open_contact() -> Found:
-    """A contact that is open when the recording ends: it has its touch-down and speed, and no number of its end."""
+    """A contact that is open at the end of the recording: it has touch-down and speed, but no end."""
     errors = []
     for stiffness in OPEN_STIFFNESSES:
         record = run(
@@ -178,7 +178,7 @@ CASES = (
     HardCase(
         "preloaded",
         THEME,
-        "a mass in its static place on an undamped stop of 1 to 1e12 N/m",
+        "a mass in its static position on an undamped stop of 1 to 1e12 N/m",
         "stays there",
         "statics",
         "relative motion in 100 s",
@@ -189,7 +189,7 @@ CASES = (
         "touches",
         THEME,
         "1000 touches between two undamped springs of 1 to 1e9 N/m",
-        "each found once, each takes its time",
+        "each is found once, with its duration",
         "free flight and half a period of the spring",
         "relative error of times and durations",
         5e-10,
@@ -199,7 +199,7 @@ CASES = (
         "open-contact",
         THEME,
         "a contact that is open when the recording ends, stiffness 1e2 to 1e12",
-        "is an impact of it, whose end is not known",
+        "is an impact of the recording, with unknown end",
         "free motion in closed form",
         "relative error of time and speed",
         9e-16,

@@ -1,4 +1,4 @@
-"""Initialization: connected start values, carried until they no longer change."""
+"""Initialization: start values are carried over the connections until they no longer change."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, equal_values
 
-#: Initialization ends when no connected value changes by more than this, relative.
+#: Largest relative change of a connected value in a pass; below it initialization has converged.
 INITIAL_TOLERANCE = 1e-11
 INITIAL_ITERATIONS = 100
 
 
 def settle_connections(transfers: Sequence[Transfer], loops: LoopSolver, time: float) -> None:
-    """Carry start values over the connections until they no longer change: as many passes as chains are long.
+    """Carry start values over the connections until they no longer change: one pass per link of the longest chain.
 
-    ComponentError: they never do.
+    ComponentError: the values never settle.
     """
     for _ in range(INITIAL_ITERATIONS):
         before = [transfer.write.values.copy() for transfer in transfers]

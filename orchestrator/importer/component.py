@@ -1,4 +1,4 @@
-"""One component of an importer: its instance, its variables, what it can do."""
+"""One component of an importer: its instance, its variables, its capabilities."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Value = float | int | bool | str
 @lru_cache(maxsize=64)
 def description_of(fmu: Path) -> ModelDescription:
     """Return the description of an FMU file, read once for each process."""
-    # what drives our bodies alone needs neither a description nor FMPy
+    # a run of our bodies alone needs neither a description nor FMPy
     from vibroimpact.fmus.packaging.fmpy_door import read_description
 
     return read_description(fmu)
@@ -45,9 +45,9 @@ def kind_of(variable: ModelVariable) -> str:
     return KINDS.get(name, name)
 
 
-#: By the hash of its file, the instance of an FMU of which a process may have one.
+#: Instances of the FMUs that allow one instance per process, by the hash of the file.
 _only_instances: WeakValueDictionary[str, Component] = WeakValueDictionary()
-#: Instants closer than this times (1 + |time|), s, are one.
+#: Instants closer than this times (1 + |time|), s, count as one instant.
 SAME_INSTANT = 1e-13
 
 
@@ -57,27 +57,27 @@ class Component:
     Parameters
     ----------
     spec : ComponentSpec
-        What it is.
+        The FMU, its parameters and its tolerance.
     log : LogTail or None
-        Where its log lines go.
+        Receives the FMU's log lines.
     wrap : callable or None
         Wraps each function of the FMU.
     events : bool
-        Let it handle events in event mode and return early, if it can.
+        Handle events in event mode and return early, if the FMU can.
 
     Attributes
     ----------
     capabilities : Capabilities
-        What its description declares.
+        The capabilities that its description declares.
     has_states : bool
         It can go back to a saved state.
     ticking : frozenset of int or None
-        Value references of its input clocks that tick now, of all of which variables may be read and written; None
-        until its run begins, when all may be.
+        Value references of the input clocks that tick now: their variables may be read and written. None before the
+        run begins, when all variables may be.
     event_mode : bool
         It handles events in event mode and may return early.
     refuses_events : bool
-        It declares an event mode, and made an instance only without.
+        It declares an event mode, but an instance could be made only without it.
     event_times : VariableGroup or None
         FMI 2.0: the variables that report the first event of the last step.
     """
@@ -124,7 +124,7 @@ class Component:
         self.event_times = self._event_time_group() if version == 2 and self.has_states else None
 
     def _refuse_what_it_needs(self) -> None:
-        """Refuse an FMU that needs what no importer here has."""
+        """Raise ComponentFileError where an FMU needs a capability that no importer here has."""
         if self.capabilities.refusals:
             got = " and ".join(self.capabilities.refusals)
             raise ComponentFileError(
@@ -132,7 +132,7 @@ class Component:
             )
 
     def _take_only_instance(self) -> None:
-        """Take the place of the one instance that this process may have of some FMUs."""
+        """Register this component as the only instance of an FMU that allows one per process."""
         if not self.capabilities.only_once:
             return
         other = _only_instances.get(self.sha256)
@@ -147,7 +147,7 @@ class Component:
     def _instance2(
         self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None, reuse: bool
     ) -> Instance2:
-        # an instance that is kept for another one of its name would be a second one beside one of another name
+        # a reused instance of this name would be a second one beside an instance of another name
         reuse = reuse and not self.capabilities.only_once
         try:
             return Instance2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
@@ -155,7 +155,7 @@ class Component:
             raise self._named_tool(refusal) from None
 
     def _named_tool(self, refusal: ComponentError) -> ComponentError:
-        """Return why there is no instance, with the tool that must be there."""
+        """Return the error of a missing instance, with the tool that must be installed."""
         if not self.capabilities.tool or not refusal.function:  # a library that does not load needs no tool
             return refusal
         return type(refusal)(
@@ -175,7 +175,7 @@ class Component:
         )
 
     def _instance3(self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None) -> Instance3:
-        """Make an instance with event mode where that is declared; some FMUs refuse what they declare."""
+        """Make an instance with event mode where that is declared; some FMUs refuse the mode that they declare."""
         make = partial(Instance3, fmu, self.name, log=log, wrap=wrap)
         try:
             return make(event_mode=self.event_mode)
@@ -207,7 +207,7 @@ class Component:
         return frozenset(clock.valueReference for clock in self.variables[name].clocks or ())
 
     def clocked(self, group: VariableGroup, names: Sequence[str]) -> VariableGroup:
-        """Let a group of variables of clocks be moved only while one of these ticks; between, it keeps its values.
+        """Let variables of clocks be moved only while a clock of theirs ticks; between ticks they keep their values.
 
         Variables with different clocks raise ComponentError.
         """
@@ -259,15 +259,15 @@ class Component:
         group.set()
 
     def first_event(self) -> float:
-        """Return the time of the first event of the last step, s, as one of ours in FMI 2.0 reports it; or inf."""
+        """Return the time of the first event that our FMI 2.0 FMU reports in the last step, s, or inf."""
         times = () if self.event_times is None else self.event_times.get()
         return min((float(t) for t in times if not math.isnan(t)), default=math.inf)
 
     def first_event_in(self, time: float, target: float) -> float | None:
-        """Return the first event that was reported of the step just made from `time` to `target`, s.
+        """Return the first event reported in the step just made from `time` to `target`, s.
 
-        It is `target` where it lies at the end, and None where it comes later. Where it lies at the end or the start,
-        the component has not gone further.
+        The result is `target` for an event at the end, and None for a later event. With an event at the end or the
+        start, the component has not gone further.
         """
         first = self.first_event()
         room = SAME_INSTANT * (1.0 + abs(target))
@@ -278,10 +278,10 @@ class Component:
         return target if first >= target - room else first
 
     def watch_inputs(self, names: Iterable[str]) -> None:
-        """Say which inputs are connected; their slopes belong to them."""
-        wanted = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
+        """Name the connected inputs; their slope inputs belong to them."""
+        inputs = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
         by_kind: dict[str, list[str]] = {}
-        for name in wanted:
+        for name in inputs:
             by_kind.setdefault(kind_of(self.variables[name]), []).append(name)
         self._inputs = [self.group(kind, found) for kind, found in by_kind.items()]
 
@@ -298,7 +298,7 @@ class Component:
 
     @contextmanager
     def taken_back(self) -> Iterator[None]:
-        """Leave what is done inside undone: the component may be taken back into the step it has just made."""
+        """Restore the component's state on exit; inside, it may be taken back into the step it has just made."""
         instance = self.instance
         instance.save(self.at_end)
         kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
@@ -312,9 +312,9 @@ class Component:
             instance.is_flagged = any(kept[1:])
 
     def step_from_start(self, time: float, size: float) -> None:
-        """Go back to the start of the step just made, at `time`, and `size` s into it again.
+        """Restore the start of the step just made, at `time`, and make `size` s of it again.
 
-        ComponentError: it ends before, so that what it does depends on more than its state.
+        ComponentError: the step ends early, so that its result depends on more than the saved state.
         """
         self.revisit_start()
         instance = self.instance
@@ -332,7 +332,7 @@ class Component:
             )
 
     def free(self) -> None:
-        """Give back its saved states and its instance."""
+        """Free its saved states and its instance."""
         for slot in (self.at_start, self.at_end):
             if slot and not self.instance.is_fatal:
                 self.instance.free_state(slot)
@@ -342,7 +342,7 @@ class Component:
 
 
 def _loses_memory(description: ModelDescription) -> bool:
-    """Does an FMU lose memory with each instance? The binary of PythonFMU 0.7 does: 18 kB and an entry of sys.path."""
+    """Does each instance leak memory? The binary of PythonFMU 0.7 leaks 18 kB and an entry of sys.path."""
     return str(description.generationTool or "").startswith("PythonFMU")
 
 
@@ -359,10 +359,10 @@ def _item_value(component: str, variable: ModelVariable, name: str) -> int:
 
 
 def _dependencies(description: ModelDescription) -> dict[str, frozenset[str]]:
-    """Inputs that each output is declared to depend on directly; an output that declares nothing has none.
+    """Return the inputs that each output depends on directly, as declared; an output that declares nothing has none.
 
-    An absent list means "perhaps all" in FMI. Importers that iterate on it find no loop that is there; treating it
-    as none is what all known importers do.
+    An absent list means "perhaps all" in FMI. Importers that iterate on it find no real loop; all known importers
+    treat it as none.
     """
     return {
         unknown.variable.name: frozenset(v.name for v in unknown.dependencies or () if v.causality == "input")

@@ -14,7 +14,7 @@ from vibroimpact.analysis.dataset import IMPACT_COLUMNS
 
 
 class Impact(NamedTuple):
-    """One impact: when it began (s), its order among all, and what is known of it (see `RunRecord.impacts`)."""
+    """One impact: its start (s), its order among all, and its known quantities (see `RunRecord.impacts`)."""
 
     time: float
     order: int
@@ -25,7 +25,7 @@ class Impact(NamedTuple):
     force: float = math.nan
 
     def row(self, number: int) -> tuple[float, ...]:
-        """Return its row, of the contact of this number; a scene of components has no phase."""
+        """Return its row for the contact of this number; a scene of components has no phase."""
         known = self.restitution, self.duration, self.force
         return self.time, math.nan, self.closing, self.impulse, float(number), *known
 
@@ -33,18 +33,18 @@ class Impact(NamedTuple):
 class ContactImpacts:
     """The impacts of one contact in a run.
 
-    A contact that yields is one impact, from its touch-down to the end of the step in which its bodies part. Its
-    impulse is exact; its largest force is that of its steps, which are short beside it.
+    A yielding contact is one impact, from its touch-down to the end of the step in which its bodies part. Its impulse
+    is exact. Its largest force is the largest of its steps, which are short.
     """
 
-    #: Which impact began before which, where their times are the same.
+    #: Numbers the impacts of all contacts; the number orders impacts of equal times.
     _orders: Iterator[int] = itertools.count()
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: what has happened so far, a contact that is open included, belongs to no recording."""
+        """Start a new recording: earlier impacts, also an open contact, do not belong to it."""
         self._ended: list[Impact] = []
         self._open: Impact | None = None
         self._impulse = self._largest = 0.0
@@ -59,26 +59,26 @@ class ContactImpacts:
         self._impulse = self._largest = 0.0
 
     def press(self, impulse: float, force: float) -> None:
-        """Note a step in contact: its impulse (N s), and its force (N)."""
+        """Note a step in contact: its impulse (N s) and its force (N)."""
         self._impulse += impulse
         self._largest = max(self._largest, force)
 
     def part(self, time: float, opening: float) -> None:
-        """Note that the bodies have parted at `time`, s, with this speed, m/s."""
-        begun, self._open = self._open, None
-        if begun is not None:
-            restitution = max(opening, 0.0) / begun.closing if begun.closing > 0.0 else math.nan
-            known = self._impulse, restitution, time - begun.time, self._largest
-            self._ended.append(Impact(*begun[:3], *known))
+        """Note the time (s) and the speed (m/s) at which the bodies part."""
+        contact, self._open = self._open, None
+        if contact is not None:
+            restitution = max(opening, 0.0) / contact.closing if contact.closing > 0.0 else math.nan
+            known = self._impulse, restitution, time - contact.time, self._largest
+            self._ended.append(Impact(*contact[:3], *known))
 
     @property
     def all(self) -> list[Impact]:
-        """All of the run; one that has not ended has neither impulse nor duration."""
+        """All impacts of the run; an impact that has not ended has neither impulse nor duration."""
         return self._ended + ([self._open] if self._open is not None else [])
 
 
 def impact_rows(contacts: Iterable[ContactImpacts]) -> NDArray[np.float64]:
-    """Return the impacts of contacts, which are counted from 1, in the order in which they began."""
+    """Return the impacts of contacts, numbered from 1, in the order in which they began."""
     numbered = (
         (impact, number) for number, contact in enumerate(contacts, start=1) for impact in contact.all
     )

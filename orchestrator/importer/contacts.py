@@ -1,5 +1,4 @@
-"""The contacts of an importer with stops that yield: of our bodies' contact ports, and of any other body;
-and its pairs of bodies."""
+"""The contacts of an importer with yielding stops (our contact ports, or any other body), and its pairs of bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInp
 from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
-#: Steps in a contact, where the importer is told nothing else.
+#: Communication steps that a contact is divided into by default.
 CONTACT_STEPS = 30
 
 
@@ -58,19 +57,19 @@ class ContactBonds:
         self._held: list[HeldForceBond] = []
         self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.met_at_start: list[Component] = []
-        """Where the step under way is the first: bodies without event mode whose contacts begin with it."""
+        """Bodies without event mode whose contacts begin with the first step of a run."""
         self.active = False
-        """Any of them is closed in the step under way, or may have to be repeated."""
+        """Some contact is closed in the step under way, or its step may be repeated."""
 
     def _all(self) -> list[ContactBond | HeldForceBond]:
         return [*self.ports, *self.held]
 
     def __bool__(self) -> bool:
-        """Is there any contact?"""
+        """Whether there is any contact."""
         return bool(self.ports or self.held or self.pairs.pairs)
 
     def take_numbers(self, contacts: Sequence[StopContactSpec], pairs: Sequence[PairSpec]) -> None:
-        """Take the masses of `contacts` and the numbers of `pairs`, which are the same otherwise, for the next run."""
+        """Take the masses of `contacts` and the numbers of `pairs` for the next run; the rest of both is unchanged."""
         for pair, spec in zip(self.pairs.specified, pairs, strict=True):
             pair.take(spec)
         for bond, contact in zip(self.held, contacts, strict=True):
@@ -78,7 +77,7 @@ class ContactBonds:
 
     @property
     def have_no_say(self) -> bool:
-        """Does no contact of the run need anything but the values that connections carry?"""
+        """Whether all contacts of the run need only the values that connections carry."""
         return not (self._following or self.held or self.pairs.pairs)
 
     def begin(self, time: float) -> None:
@@ -98,7 +97,7 @@ class ContactBonds:
         return found
 
     def begin_step(self, time: float, target: float) -> float:
-        """Look at all contacts before a step; returns where it should end, s."""
+        """Prepare all contacts for a step; returns where it should end, s."""
         target = self.pairs.pulses.begin_step(time, target)
         if not self.pairs.pulses.under_way:
             for held in self._held:
@@ -111,15 +110,15 @@ class ContactBonds:
         return target
 
     def apply(self) -> None:
-        """Give the bodies their forces, or the slopes that their stops do not."""
+        """Write the forces of the bodies, or the slopes that their stops do not give."""
         for bond in self._following:
             bond.apply()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         open_pairs = [pair for pair in self.pairs.pairs if not pair.closed]
         pressed = [bond for bond in self._following if bond not in open_pairs]
-        # bodies that fly are looked at once all forces agree
+        # free pairs are checked once all forces agree
         for bonds in (pressed, open_pairs):
             found = [e for e in (bond.revised_end(time, end) for bond in bonds) if e is not None]
             if bonds is pressed and not found and (again := self.pairs.rest_end(time, end)) is not None:
@@ -129,12 +128,12 @@ class ContactBonds:
         return None
 
     def agree(self, time: float, end: float) -> None:
-        """Before the bodies without states make their step: it ends at `end`, s."""
+        """Adjust held forces to the end of the step, s, before the bodies without states make theirs."""
         for bond in self._held:
             bond.agree(time, end)
 
     def end_step(self, size: float) -> list[Component]:
-        """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
+        """Accept the step of `size` s; returns the bodies without event mode that have met a stop at its end."""
         for bond in self._following:
             bond.end_step(size)
         self.pairs.pulses.end_step(size)
@@ -147,12 +146,12 @@ class ContactBonds:
         return [bond.impacts for bond in self.held], [pair.impacts for pair in self.pairs.specified]
 
     def remarks(self) -> list[str]:
-        """What a reader of the results must know of held forces, and of bodies at rest on each other."""
-        told = [*(bond.remark() for bond in self.held), *(pair.remark() for pair in self.pairs.pairs)]
-        return [text for text in told if text]
+        """Remarks on the errors of held forces, and on the drift of bodies at rest on each other."""
+        remarks = [*(bond.remark() for bond in self.held), *(pair.remark() for pair in self.pairs.pairs)]
+        return [text for text in remarks if text]
 
     def free(self) -> None:
-        """Give back what they have saved."""
+        """Free their saved states."""
         for bond in self._all():
             bond.free()
         self.pairs.free()
@@ -161,7 +160,7 @@ class ContactBonds:
 
 
 def _is_contact_force(body: Component, variable: str) -> bool:
-    """Is this input the force of a contact port that can follow a stop which yields?"""
+    """Whether this input is the force of a contact port that can follow a yielding stop."""
     port, _, last = variable.rpartition(".")
     needed = (*PORT_OUTPUTS, "law", "side", "position", "mass", STIFFNESS, DAMPING)
     return last == FORCE and all(f"{port}.{name}" in body.variables for name in needed)

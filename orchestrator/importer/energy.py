@@ -1,12 +1,12 @@
 """The energy that the exchange itself adds to coupled components, for each force-displacement connection.
 
-A force that is held over a step is not the force that the other side has: over the step it does the work
-(mean force applied - mean force connected) * displacement of the receiver too much. The sum is the residual of
-that connection, in joule; exact coupling has none.
+A force held over a step differs from the force at the other side of the connection. Over the step its excess work is
+(mean force applied - mean force connected) * displacement of the receiver. The sum over all steps is the residual of
+that connection, in joule; exact coupling has a residual of 0.
 
-At a contact with a stop that yields the body follows a force that is a straight line in penetration and rate; the
-residual is the integral of (that force - the force that the stop's law has on the body's way) * velocity. A body
-that holds its force has it from its bond (`held_force`).
+At a contact with a yielding stop the body follows a force that is linear in penetration and rate. The residual is the
+integral of (that force - the force of the stop's law on the body's path) * velocity. A body that holds its force has
+the residual in its bond (`held_force`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from vibroimpact.orchestrator.importer.stop_contacts.plain_contacts import (
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import POINTS, WEIGHTS
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
-#: Inputs that are forces, by the last part of their name, with the displacement that they do work on.
+#: Names of force inputs (last part), each with the displacement on which it does work.
 CONJUGATE = {"force": "displacement", "applied_force": "displacement"}
 
 
@@ -60,12 +60,12 @@ def force_connections(
     return (*forces, *(contact.name for contact in contacts))
 
 
-#: Where a body separates within a step is found to this fraction of it.
+#: Resolution of the separation of a body within a step, as a fraction of the step.
 SEPARATION = 1e-12
 
 
 class _Connection:
-    """A force that is given once a step, and perhaps its slope over time."""
+    """A force that is given once a step, perhaps with its slope over time."""
 
     def __init__(self, importer: Importer, connection: ConnectionSpec, displacement: str) -> None:
         source = importer.components[connection.source[0]]
@@ -96,9 +96,9 @@ class _Connection:
 
 
 class _Contact:
-    """The force of a stop that yields: what the body felt through a step, against the stop's own law on its way.
+    """The force of a yielding stop: the force felt over a step, against the stop's own law on the body's path.
 
-    The body is taken back into the step to a few points of it, and the stop is asked for its force at each.
+    The body is taken back to a few points of the step, and the stop gives its force at each.
     """
 
     def __init__(self, bond: ContactBond) -> None:
@@ -111,7 +111,7 @@ class _Contact:
 
     @property
     def follows(self) -> bool:
-        """Does the body follow the force of the stop, in this run?"""
+        """Does the body follow the force of the stop in this run?"""
         return self._bond.follows
 
     def begin(self, gain: float) -> None:
@@ -133,7 +133,7 @@ class _Contact:
             self.residual += (finish - begin) * float(np.sum(WEIGHTS * self._power(time, end, way)))
 
     def _kinks(self, time: float, size: float) -> list[float]:
-        """Seconds into the step at which the body lets go of the stop, and at which it is back at its surface."""
+        """Return the times (s) from the start of the step to the separation from the stop and to its surface."""
         bond = self._bond
         kinks = []
         if bond.start.force > 0.0 and not self._felt(time, size)[3] > 0.0:
@@ -148,7 +148,7 @@ class _Contact:
     def _last(
         self, time: float, size: float, holds: Callable[[tuple[float, float, float, float]], bool]
     ) -> float:
-        """The last moment at which something holds that does at the start of the step and not at its end."""
+        """Return the last moment of a condition that is true at the start of the step and false at its end, s."""
         near, far = 0.0, size
         while far - near > SEPARATION * size:
             middle = 0.5 * (near + far)
@@ -165,7 +165,7 @@ class _Contact:
         return size, displacement, velocity, force
 
     def _power(self, time: float, end: float, way: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Power that the body gets too much at the points of a part, W."""
+        """Excess power that the body receives at the points of a part, W."""
         bond = self._bond
         if bond.stop.has_states:
             with bond.stop.taken_back():
@@ -189,14 +189,14 @@ class InterfaceEnergy:
     Attributes
     ----------
     names : tuple of str
-        The connections, `component.output -> component.input`; then the contacts with a held force, likewise.
+        The connections, `component.output -> component.input`; then the contacts with a held force, written alike.
     """
 
     def __init__(self, importer: Importer, connections: Sequence[ConnectionSpec]) -> None:
         bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.ports}
         found: list[tuple[ConnectionSpec, _Connection | _Contact | PlainContact]] = []
         self._plain: list[PlainContact] = []
-        self._begun = [
+        self._starting_forces = [
             ForceThatBegins(importer.components, connection)
             for connection in connections
             if ForceThatBegins.is_one(importer.components, connections, connection)
@@ -221,15 +221,15 @@ class InterfaceEnergy:
         )
         self._connections = [watched for _, watched in found]
         self._specs = [connection for connection, _ in found]
-        if found or self._begun:
+        if found or self._starting_forces:
             importer.watchers.append(StepWatcher(self._before, self._after, self._patience))
 
     def begin(self, connections: Sequence[ConnectionSpec]) -> None:
-        """Start a run; the gains are those of `connections`, which are the same ones otherwise."""
+        """Start a run with the gains of `connections`, which are otherwise unchanged."""
         gains = {connection.target: connection.gain for connection in connections}
         for spec, watched in zip(self._specs, self._connections, strict=True):
             watched.begin(gains[spec.target])
-        for force in self._begun:
+        for force in self._starting_forces:
             force.begin()
 
     def residuals(self) -> NDArray[np.float64]:
@@ -237,19 +237,19 @@ class InterfaceEnergy:
         return np.array([watched.residual for watched in (*self._connections, *self._held)])
 
     def remarks(self) -> list[str]:
-        """What a reader of the results must know of stops whose forces are plain connections."""
-        found = [*(c.remark() for c in self._plain), *(f.remark() for f in self._begun)]
+        """Remarks on stops whose forces are plain connections."""
+        found = [*(c.remark() for c in self._plain), *(f.remark() for f in self._starting_forces)]
         return [text for text in found if text]
 
     def free(self) -> None:
-        """Give back saved states, before the components are freed."""
+        """Free saved states, before the components are freed."""
         for contact in self._plain:
             contact.free()
 
     def _patience(self) -> float:
-        """Nothing is to be seen where there are contacts alone, of which none presses its stop in."""
+        """Return an infinite time where all are contacts that press no stop: then no step needs to be seen."""
         is_idle = all(isinstance(c, _Contact) and not c.follows for c in self._connections)
-        return math.inf if is_idle and not self._begun else 0.0
+        return math.inf if is_idle and not self._starting_forces else 0.0
 
     def _before(self, time: float) -> None:
         for watched in self._connections:
@@ -258,5 +258,5 @@ class InterfaceEnergy:
     def _after(self, time: float, end: float) -> None:
         for watched in self._connections:
             watched.after(time, end)
-        for force in self._begun:
+        for force in self._starting_forces:
             force.look()

@@ -1,4 +1,4 @@
-"""What is seen of a run from outside: its events and its steps; and event mode, which resolves them."""
+"""Events and steps as observers see them, and event mode, which resolves events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall, Transfer
 
-#: Event iterations at one instant before a component is taken to change its outputs for ever.
+#: Event iterations at one instant, above which a component counts as never settling.
 EVENT_ITERATIONS = 100
 
 
@@ -30,13 +30,13 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class StepWatcher:
-    """Looks on at steps: called before a step with (time), after it with (time, end).
+    """Observes steps: called before a step with (time), after it with (time, end).
 
     Attributes
     ----------
     patience : callable or None
-        Returns the seconds of wall time for which steps may pass unseen, the last of which it may see the end of;
-        None: it looks at every step.
+        Returns the wall time, s, for which steps may pass unseen; the observer may see the end of the last of them.
+        None: it observes every step.
     """
 
     before: Callable[[float], None]
@@ -46,30 +46,30 @@ class StepWatcher:
 
 @dataclass(frozen=True, slots=True)
 class LateEvents:
-    """Hears of events that have passed; those beyond its room are told when they happen, by `on_event`.
+    """Receives events after they have passed; events beyond its room are reported at once, by `on_event`.
 
     Attributes
     ----------
     room : callable
-        Returns how many of the next events may pass before it hears of them.
-    tell : callable
-        Called with events that have passed, shape (event, 3): time (s), index among those at the same time, and the
-        place of the component in `Importer.components`.
+        Returns the number of further events that may pass before it is called.
+    report : callable
+        Called with the passed events, shape (event, 3): time (s), index among those at the same time, and place of the
+        component in `Importer.components`.
     """
 
     room: Callable[[], int]
-    tell: Callable[[NDArray[np.float64]], None]
+    report: Callable[[NDArray[np.float64]], None]
 
 
-#: No event may pass: each is told when it happens.
+#: No event may pass: each is reported when it happens.
 NO_EVENTS = LateEvents(lambda: 0, lambda events: None)
 
 
 class EventMode:
-    """Resolves events: carries values, updates discrete states until all are settled, goes back to step mode.
+    """Resolves events: carries values, updates discrete states until all are settled, returns to step mode.
 
-    All components of an importer are given, of which those of FMI 3.0 with event mode take part; `behind` are the
-    transfers that a component's own step has not been preceded by.
+    It is given all components of an importer; FMI 3.0 components with event mode take part. `behind` are the transfers
+    that no component makes just before its own step.
     """
 
     def __init__(
@@ -77,11 +77,11 @@ class EventMode:
     ) -> None:
         with_events = [c.instance for c in components if c.event_mode]
         self.instances = [i for i in with_events if isinstance(i, Instance3)]
-        """Those that take part."""
+        """The instances that take part."""
         enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self.instances]
         update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self.instances]
         leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self.instances]
-        # at its event a component's inputs from those stepped before it are those of that instant already
+        # at an event the inputs from components stepped earlier have the values of that instant already
         first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
         moves = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
         self.begin = CallList([*enter, *first, *update])
@@ -95,7 +95,7 @@ class EventMode:
         """The calls back to step mode."""
 
     def resolve(self, time: float, ticks: Ticks) -> bool:
-        """Resolve the events at `time`, s, and let clocks tick; returns whether a component asks for the end.
+        """Resolve the events at `time`, s, and let clocks tick; returns whether a component requests the run's end.
 
         A component that fails, or never settles, raises ComponentError.
         """
@@ -113,14 +113,14 @@ class EventMode:
         return ends
 
     def _tick(self, time: float, ticks: Ticks) -> None:
-        """Let clocks tick: their variables are given and read while they do, before the event iteration ends it."""
+        """Let clocks tick: their variables are set and read before the event iteration ends the tick."""
         ticks.set(time)
         self._moves()
         ticks.keep_values()
         self._update()
 
     def begin_run(self, time: float, ticks: Ticks) -> bool:
-        """Leave the event mode that initialization ends in, as `resolve` does."""
+        """Leave the event mode after initialization, as `resolve` does."""
         if not self.instances:
             return False
         if ticks.are_due(time):
@@ -174,5 +174,5 @@ def macro_step_error(macro_step: float, room: float, time: float) -> ComponentEr
 
 
 def _takes_events(component: Component) -> bool:
-    """Does an event reach this component's inputs? Others have been given theirs before their step."""
+    """Does an event reach this component's inputs? Other components have received them before their step."""
     return component.event_mode or component.event_times is not None

@@ -1,4 +1,4 @@
-"""The importer: steps components together, ends the step of all at the first event, resolves it, goes on."""
+"""The importer: steps components together, ends the step of all at the first event, resolves it, continues."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
 
-#: Steps without progress before the run is given up.
+#: Steps without progress after which the run ends in an error.
 STANDSTILLS = 100
-#: Repetitions of a step with exchange "iterated", and the relative change at which they end.
+#: Exchange "iterated": most repetitions of a step, and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13
-#: Repetitions of a step until bodies that rest on each other and those that meet meanwhile agree.
+#: Most repetitions of a step until bodies that rest on each other and bodies that meet meanwhile agree.
 PAIR_REPETITIONS = 100
 
 
@@ -57,19 +57,19 @@ class Importer:
     events : sequence of EventSpec
         Watched variables; their components run without event mode and early return.
     contacts : sequence of StopContactSpec
-        Bodies that hold a force over a step, and the stops that they meet.
+        Bodies that hold a force over a step, and their stops.
     pairs : sequence of PairSpec
         Bodies that hit each other.
     exchange : str
-        `jacobi`: all inputs are those of the start of a step. `gauss_seidel`: each component gets the newest
-        outputs of those stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
+        `jacobi`: all inputs have the values of the start of a step. `gauss_seidel`: each component gets the newest
+        outputs of components stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
     macro_step : float
         Longest communication step, s.
     contact_steps : float
-        Communication steps that a contact with a stop that yields is divided into (its law is another FMU's); the
-        macro step may divide it further.
+        Communication steps that a contact with a yielding stop is divided into (its law is another FMU's). The macro
+        step may divide it further.
     log, wrap : callable or None
-        Given a component's name: where its log lines go, and what wraps the functions of its FMU.
+        Given a component's name: the receiver of its log lines, and the wrapper of its FMU's functions.
 
     Attributes
     ----------
@@ -78,17 +78,17 @@ class Importer:
     components : dict of str to Component
         By name.
     contacts : ContactBonds
-        The contacts with stops that yield.
+        The contacts with yielding stops, and the pairs.
     overrun : float
-        Where components were stepped to that could not be taken back when another asked for the end, s; or -inf.
+        Time of components that could not be taken back when another requested the end, s; or -inf.
     steps, repeated_steps : int
-        Communication steps made, and how many of them were repeated.
+        Communication steps made, and the number of steps repeated.
     on_event, on_pause : callable or None
-        Called at each event with it; called when a component ended a step early without an event.
+        Called at each event with it; called when a component ends a step early without an event.
     late_events : LateEvents or None
-        Hears, in place of `on_event`, of events that may pass; None: `on_event` is called at each.
+        Receives events that may pass, in place of `on_event`; None: `on_event` is called at each event.
     steps_in_c : bool
-        Steps that are plain are made in C, to the same bits as here.
+        Plain steps are made in C, with the same bits as here.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Importer:
         self.on_event: Callable[[Event], None] | None = None
         self.late_events: LateEvents | None = None
         self.on_pause: Callable[[], None] | None = None
-        self._begun = False
+        self._has_started = False
 
     @property
     def time(self) -> float:
@@ -165,7 +165,7 @@ class Importer:
 
     @property
     def repeated_steps(self) -> int:
-        """How many of them were repeated."""
+        """Number of steps that were repeated."""
         return int(self._progress.repeated_steps)
 
     def plan_moves(self) -> None:
@@ -190,10 +190,10 @@ class Importer:
         self.wants_to_end = False
         for component in self._order:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
-            component.begin(own, start_time, first=not self._begun)
+            component.begin(own, start_time, first=not self._has_started)
             if not component.capabilities.variable_steps and math.isfinite(self.macro_step):
                 component.instance.only_step = self.macro_step
-        self._begun = True
+        self._has_started = True
         settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
         self.tuning.begin()
         self.ticks.begin(start_time)
@@ -210,7 +210,7 @@ class Importer:
     # ---- advancing ----
 
     def advance(self, end: float) -> None:
-        """Advance to `end`, s, resolving all events on the way; stops early when a component asks for the end.
+        """Advance to `end`, s, resolving all events on the way; stops early when a component requests the end.
 
         Raises
         ------
@@ -235,7 +235,7 @@ class Importer:
     # ---- plain steps ----
 
     def _seconds_for_c(self) -> float:
-        """Return the wall time, s, that plain steps in C may take now; 0 where steps are to be made here."""
+        """Return the wall time, s, that plain steps in C may take now; 0 where this class must make the steps."""
         if self.keeps_start or not (self.steps_in_c and self.contacts.have_no_say):
             return 0.0
         seconds = MOST_SECONDS
@@ -244,7 +244,7 @@ class Importer:
         return seconds
 
     def _make_plain_steps(self, loop: PlainLoop, end: float, seconds: float) -> None:
-        """Make plain steps in C until one is for this class, and finish that one."""
+        """Make plain steps in C up to the first step that needs this class, and finish that step."""
         late = None if self.on_event is None else self.late_events or NO_EVENTS
         hears_pauses = self.on_pause is not None
         came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=hears_pauses)
@@ -284,7 +284,7 @@ class Importer:
         self._finish(time, target, self._step_all(time, target))
 
     def _finish(self, time: float, target: float, overtaken: float | None) -> None:
-        """Finish a step that all have made, or one of them has ended at `overtaken` when others were past it."""
+        """Finish a step that all have made, or that ended at `overtaken` with some components past this time."""
         contacts = self.contacts
         if overtaken is not None or self._plan.iterates:
             self._agree(time, overtaken)
@@ -298,7 +298,7 @@ class Importer:
         self._conclude(time, target)
 
     def _conclude(self, time: float, target: float) -> None:
-        """All are at the end of a step: count it and resolve its events."""
+        """Count the step at whose end all are, and resolve its events."""
         now, end = self._progress, self._reached
         now.standstill = 0 if end > time else now.standstill + 1
         if now.standstill > STANDSTILLS:
@@ -320,7 +320,7 @@ class Importer:
         self._tune(end)
 
     def _prepare(self, time: float) -> None:
-        """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
+        """Prepare a rarer kind of step: solve loops, note inputs, save states."""
         if self.loops.names:
             self._solve_loops(time)
         if self._plan.iterates:
@@ -346,9 +346,9 @@ class Importer:
             component.instance.restore(component.at_start)
 
     def _agree(self, time: float, end: float | None) -> None:
-        """Repeat a step until all components have reached one instant; `end` is where the first event was met."""
+        """Repeat a step until all components have reached one instant; `end` is the time of the first event."""
         while end is not None or (end := self._iterate(time)) is not None:
-            # somebody met an event earlier than the others went: all go back and step to it
+            # a component met an event before the end of the others: all go back and step to it
             self._progress.repeated_steps += 1
             if end <= time:
                 self._stay(time)
@@ -357,7 +357,7 @@ class Importer:
             end = self._step_all(time, end)
 
     def _settle_contacts(self, time: float) -> None:
-        """Repeat a step until the stops that yield agree with what their bodies made of their forces."""
+        """Repeat a step until the yielding stops agree with the motion that their forces cause."""
         for _ in range(PAIR_REPETITIONS if self.contacts.pairs else MOST_REPETITIONS):
             end = self.contacts.revised_end(time, self._reached)
             if end is None or self._reached <= time:
@@ -371,14 +371,14 @@ class Importer:
                 self._agree(time, overtaken)
 
     def _step_all(self, time: float, target: float, made: Made | None = None) -> float | None:
-        """Step each component in its order; returns the time of an event that those before it have passed.
+        """Step each component in order; returns the time of an event that earlier components have passed.
 
-        The first component may return early by itself: those after it follow to its event. Those up to that of `made`
-        have made their steps.
+        The first component may return early by itself: the later components follow to its event. The components up to
+        the place of `made` have made their steps.
         """
         if made is None:
             self._at_event = []
-        self.wants_to_end = False  # what a step that was taken back said does not count
+        self.wants_to_end = False  # requests of a step that was taken back do not count
         place = 0 if made is None else made.place
         first = place == 0
         for component, inputs in self._plan.paths[place:]:
@@ -400,7 +400,7 @@ class Importer:
         return None
 
     def _end_run(self, time: float, reached: float, target: float) -> None:
-        """End the step, and the run, where a component asks for it; the others have gone on."""
+        """End the step and the run at the request of a component; the others have gone on."""
         self._reached = max(time, reached)
         self.overrun = target if len(self._order) > 1 else -math.inf
 
@@ -417,7 +417,7 @@ class Importer:
         self._reached = time
 
     def _step_one(self, component: Component, time: float, target: float, made: Made | None = None) -> float:
-        """Step one component, or take the step that it has made; returns the time of its first event, or `target`."""
+        """Step one component, or take the step it has made; returns the time of its first event, or `target`."""
         instance = component.instance
         status = instance.step(time, target - time) if made is None else instance.take_step(made.status)
         if status == DISCARD:
@@ -431,7 +431,7 @@ class Importer:
         return reached
 
     def _after_step(self, component: Component, target: float) -> float:
-        """Take what a step has said; returns where it has ended."""
+        """Read the flags of a step; returns where the step has ended."""
         instance = component.instance
         if instance.wants_to_end:
             self.wants_to_end = True
@@ -444,11 +444,11 @@ class Importer:
         return instance.time if instance.returned_early else target
 
     def _reported(self, component: Component, time: float, target: float) -> float:
-        """FMI 2.0: the event time that the component reports, when it lies in the step."""
+        """Return the event time that an FMI 2.0 component reports in the step, else `target`."""
         first = component.first_event_in(time, target)
         if first is None:
             return target
-        if first == target or first <= time:  # where it began: the component has stayed there
+        if first == target or first <= time:  # at the start: the component has stayed there
             self._at_event.append(component)
         return first
 
@@ -477,9 +477,9 @@ class Importer:
     # ---- repeated steps ----
 
     def _iterate(self, time: float) -> float | None:
-        """Repeat a step (exchange "iterated") until the inputs over it are those that its end gives.
+        """Repeat a step (exchange "iterated") until its inputs are the ones that the values at its end give.
 
-        Returns the time of an event that these inputs make earlier than its end; None without one.
+        Returns the time of an event that these inputs make earlier than the end; None without one.
         """
         if not self._plan.iterates:
             return None
@@ -505,7 +505,7 @@ class Importer:
         return None
 
     def _step_stateless(self, time: float, end: float) -> None:
-        """Step the components that no step can be repeated with, once the end of the step is agreed."""
+        """Step the components without states, once the end of the step is agreed."""
         for component, inputs in self._plan.stateless_paths:
             if inputs is not None:
                 inputs()

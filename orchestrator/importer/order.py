@@ -12,13 +12,13 @@ from vibroimpact.orchestrator.importer.wiring import Transfer, drawn_inputs
 def stepping_order(
     components: Mapping[str, Component], connections: Sequence[ConnectionSpec]
 ) -> list[Component]:
-    """Components with event mode first, then others with states, those without states last.
+    """Return the components in order: those with event mode first, then others with states, those without states last.
 
-    Of those with states the ones that give an input its slope come last, such as a Replay: value and slope mean the
-    start of a step.
+    Among components with states, one that gives an input its slope comes last, such as a Replay. Value and slope
+    belong to the start of a step.
 
-    Among equals a component comes after those whose outputs its own outputs depend on directly. In a circle only the
-    outputs that are connected count: those that are merely looked at may be late.
+    Among equals a component comes after the components whose outputs its own outputs depend on directly. In a circle
+    only connected outputs count: unconnected outputs may be late.
     """
 
     drawing = _drawing(connections)
@@ -40,7 +40,7 @@ def stepping_order(
             for c in waiting
             if c.name in equals and not (feeding[c.name] - {c.name}) & equals
         )
-        chosen = next(ready, waiting[0])  # in a circle of these too the order of declaration decides
+        chosen = next(ready, waiting[0])  # in a circle of connected outputs the order of declaration decides
         waiting.remove(chosen)
         order.append(chosen)
     return order
@@ -49,10 +49,10 @@ def stepping_order(
 def fresh_inputs(
     order: Sequence[Component], incoming: Mapping[str, Sequence[Transfer]], *, jacobi: bool
 ) -> dict[str, list[Transfer]]:
-    """Return the transfers made just before each component's own step, from those stepped before it.
+    """Return the transfers from components stepped earlier, made just before each component's own step.
 
-    With exchange "jacobi" only a component that answers at once needs them: one without event mode whose outputs
-    all depend on its inputs directly, such as a stop.
+    With exchange "jacobi" only a component that answers at once needs them, such as a stop. It has no event mode, and
+    all its outputs depend on its inputs directly (or it has no states).
     """
     place = {c.name: i for i, c in enumerate(order)}
 
@@ -66,7 +66,7 @@ def fresh_inputs(
 
 
 def _drawing(connections: Sequence[ConnectionSpec]) -> set[str]:
-    """Return the components that give another one an input and its slope."""
+    """Return the components that give another component an input and its slope."""
     pairs: dict[tuple[str, str], list[ConnectionSpec]] = {}
     for connection in connections:
         pairs.setdefault((connection.source[0], connection.target[0]), []).append(connection)
@@ -76,7 +76,7 @@ def _drawing(connections: Sequence[ConnectionSpec]) -> set[str]:
 def _feeding(
     components: Mapping[str, Component], connections: Sequence[ConnectionSpec], *, connected: bool
 ) -> dict[str, set[str]]:
-    """Of each component those that feed an output of it, or a connected one, directly."""
+    """Return the components that feed an output (or a connected output) of each component directly."""
     used = {connection.source for connection in connections}
     feeding: dict[str, set[str]] = {name: set() for name in components}
     for connection in connections:

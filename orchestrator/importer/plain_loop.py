@@ -1,7 +1,7 @@
 """The plain steps of an importer, in C: from event to event by the FMUs' own functions.
 
-A step is plain where nothing but components and connections has a say in it. What it comes to otherwise (a call that
-failed, a component that asks for the end, an event to be heard at once) is left to `master`, which is the reference.
+A step is plain where only components and connections have a part in it. Other outcomes are left to `master`, which is
+the reference: a failed call, a request for the end, an event to be reported at once.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
 from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS, EventMode, LateEvents
 from vibroimpact.orchestrator.importer.wiring import CallList, Scaling, StatusCall
 
-#: Longest wall time of one call, s: signals and deadlines are heard between two.
+#: Longest wall time of one call, s: signals and deadlines are handled between two calls.
 MOST_SECONDS = 0.05
-#: Most events that pass before they are told.
+#: Most events that pass before they are reported.
 MOST_EVENTS = 512
 
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """The step of the component at `place`, and of those before it, is made: what that one returned."""
+    """The steps up to the component at `place` are made; that component returned `status`."""
 
     place: int
     status: int
@@ -59,22 +59,22 @@ class PlainLoop:
     components : sequence of Component
         In the order in which they are stepped.
     numbers : mapping of str to int
-        By component: the number by which its events are told.
+        The number that reports the events of each component, by its name.
     start : CallList or None
-        What is moved before a step.
+        Moves before a step.
     inputs : sequence of CallList or None
-        What is moved before the step of each component.
+        Moves before the step of each component.
     event_mode : EventMode
-        What resolves their events.
+        Resolves the events of the components.
     saves : bool
         A step may have to be repeated: states are saved before it.
     progress : CouplingProgress
-        How far the run is.
+        Time, communication points and counts of the run.
 
     Attributes
     ----------
     run : CouplingRun
-        What the last call has left.
+        The state that the last call has left.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class PlainLoop:
     ) -> None:
         self._components, self._numbers, self._progress = list(components), numbers, progress
         self._known: list[tuple[Instance, str]] = []
-        self._kept: list[object] = []  # what C code has addresses of
+        self._kept: list[object] = []  # memory whose addresses C code holds
         self._events = np.zeros((MOST_EVENTS, 3))
         self._events_address = int(self._events.ctypes.data)
         self._noted, self._noted_time = c_int64(0), c_double(math.nan)
@@ -160,7 +160,7 @@ class PlainLoop:
         return CouplingCalls(array, len(calls))
 
     def _moved(self, call: StatusCall) -> CouplingCall:
-        """Return a call as C code makes it."""
+        """Return a call in the form for C code."""
         instance, moved = call.instance, call.moved
         if isinstance(moved, Scaling):
             self._kept.append(moved)
@@ -205,11 +205,11 @@ class PlainLoop:
     def advance(
         self, end: float, macro_step: float, seconds: float, late: LateEvents | None, *, hears_pauses: bool
     ) -> CouplingEnd:
-        """Make plain steps to the end (s), each at most `macro_step` long, in at most so many seconds of wall time.
+        """Make plain steps to the end (s), each at most `macro_step` long, in at most `seconds` of wall time.
 
-        Events that pass are heard of by `late`, or nobody. With `hears_pauses` a step that ends early without an event
-        is left to the caller. It ends as `done`, `listen`, or with what is left of a step, which `run` has: it is the
-        caller's.
+        `late` receives the events that pass, if it is given. With `hears_pauses` a step that ends early without an
+        event is left to the caller. The result is `done` or `listen`, or the state of an unfinished step: `run` has
+        that step, and the caller finishes it.
         """
         run = self.run
         run.end, run.macro_step, run.hears_pauses = end, macro_step, hears_pauses
@@ -223,11 +223,11 @@ class PlainLoop:
         for instance, step in self._stepped:
             instance.take_time(step.time)
         if late is not None and run.events_used:
-            late.tell(self._events[: run.events_used])
+            late.report(self._events[: run.events_used])
         return came_to
 
     def at_event(self) -> list[Component]:
-        """Return the components at an event at the end of the step that was left."""
+        """Return the components at an event at the end of the unfinished step."""
         return [self._components[i] for i in self._at_event[: self.run.arrived]]
 
     def explain_cut(self) -> None:
@@ -241,7 +241,7 @@ class PlainLoop:
         instance.check(self.run.status, function.replace("FMUstate", "FMUState"))
 
     def call_under_way(self) -> tuple[Instance, str, float] | None:
-        """Return the call that C code is in, as another thread sees it, and its time, s; None: in none yet."""
+        """Return the FMU call that C code is in, as another thread sees it, and its time, s, or None."""
         place = self._noted.value - 1
         if place < 0:
             return None
@@ -252,7 +252,8 @@ class PlainLoop:
 def can_loop(components: Iterable[Component], lists: Iterable[CallList | None]) -> bool:
     """Can the calls of these lists, and the steps of these components, be made in C?
 
-    Not where functions of an FMU are wrapped by more than notes, or where values are converted but real numbers.
+    Not with functions of an FMU that are wrapped by more than notes, nor with converted values other than real
+    numbers.
     """
     wraps = [component.instance.wrap for component in components]
     notes = {w.call_address if isinstance(w, CallNotes) else None for w in wraps}

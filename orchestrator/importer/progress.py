@@ -1,4 +1,4 @@
-"""How far a run of an importer is: its time, its grid of communication points, its events and steps."""
+"""Progress of a run of an importer: its time, its grid of communication points, its events and steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibroimpact.orchestrator.importer.events import macro_step_error
 
 
 class Progress(CouplingProgress):
-    """How far a run is, in memory that C code that makes steps shares."""
+    """Progress of a run, in memory shared with the C code that makes steps."""
 
     def begin(self, start_time: float, macro_step: float) -> None:
         """Start a run at `start_time`, s."""
@@ -19,7 +19,7 @@ class Progress(CouplingProgress):
         self.grid_index = self.event_index = self.standstill = self.steps = self.repeated_steps = 0
 
     def pass_point(self, macro_step: float, room: float) -> None:
-        """Find the next communication point: a multiple of the macro step that lies ahead by more than `room`, s."""
+        """Find the next communication point: a multiple of the macro step ahead by more than `room`, s."""
         if macro_step <= room:
             raise macro_step_error(macro_step, room, self.time)
         while self.next_point - self.time <= room:
@@ -27,12 +27,12 @@ class Progress(CouplingProgress):
             self.next_point = self.grid_start + (self.grid_index + 1) * macro_step
 
     def note_event(self) -> int:
-        """Note an event at this time; returns its index among those at the same time."""
+        """Count an event at the present time; returns its index among events at the same time."""
         self.event_index = self.event_index + 1 if self.time == self.event_time else 0
         self.event_time = self.time
         return int(self.event_index)
 
     def note_step(self, end: float) -> None:
-        """Note a step to `end`, s."""
+        """Count a step to `end`, s."""
         self.time = end
         self.steps += 1

@@ -1,8 +1,8 @@
 """Step revision: the instant at which a watched variable of a black-box FMU crosses its level.
 
-The FMU knows nothing of events. Its step is repeated from a saved state, each time to a better estimate, until the
-crossing lies in an interval of rounding size; the step that is kept ends just past it, so that an FMU that looks at
-its own state at the end of a step sees the event there.
+The FMU knows nothing of events. Its step is repeated from a saved state until the crossing lies in an interval of
+rounding size; each repetition goes to a better estimate. The step that is kept ends just past the crossing. An FMU
+that tests its own state at the end of a step thus sees the event there.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import EventSpec
 
-#: Width of the interval that a crossing is located in, times (1 + |time|), s.
+#: Width of the interval in which a crossing is located, over (1 + |time|), s.
 PRECISION = 2e-13
-#: Events of one watch closer than this times (1 + |time|), s, have accumulated; they are no longer followed.
+#: Spacing of two events of one watch, over (1 + |time|), s, below which events have accumulated and are no longer
+#: located.
 SHORTEST_SPACING = 1e-9
 MOST_EVALUATIONS = 200
-#: A distance below this is on the level: some FMUs put a bounced ball at the smallest number instead of 0.
+#: Distance to the level that counts as 0: some FMUs put a bounced ball at the smallest number instead.
 NEGLIGIBLE = 1e-300
-#: How often a step is halved to find the variable on the near side of its level.
+#: Most halvings of a step in search of a point on the near side of the level.
 MOST_HALVINGS = 30
 
 
@@ -43,8 +44,8 @@ class Bracket:
 class Watch:
     """A watched variable of a component with states.
 
-    `accumulated` events came too close to be told apart and are no longer located; the last located one was at
-    `last_time`, s.
+    `accumulated`: events came too close together and are no longer located. The last located event was at `last_time`,
+    s.
     """
 
     def __init__(self, component: Component, event: EventSpec) -> None:
@@ -60,7 +61,7 @@ class Watch:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the run before."""
+        """Forget the previous run."""
         self.accumulated = False
         self.last_time = -math.inf
         self._agreed = -math.inf
@@ -68,7 +69,7 @@ class Watch:
         self._landed: float | None = None
 
     def distance(self) -> float:
-        """Signed distance to the level now, positive on the side from which a crossing is an event."""
+        """Return the signed distance to the level now, positive on the side from which a crossing is an event."""
         value = float(self._group.get()[0]) - self.event.level
         return -value if self.event.direction == "rising" else value
 
@@ -77,9 +78,9 @@ class Watch:
         self._start = self.distance()
 
     def find(self, time: float, size: float) -> float | None:
-        """Return the seconds into the step just made at which the first crossing seen lies; None without one.
+        """Return the seconds into the step just made at which the first crossing lies; None without a crossing.
 
-        The component is left somewhere in the step, and the caller repeats it to the crossing. Of that repeated step
+        The component is left somewhere in the step, and the caller repeats it to the crossing. In that repeated step
         the crossing is the end; the component is then left there.
         """
         self._landed = None
@@ -98,7 +99,7 @@ class Watch:
             return None
         bracket = Bracket(near[0], near[1], size)
         precision = PRECISION * (1.0 + abs(time))
-        # a little further, so that the FMU's own test sees the crossing too, whatever it does with an exact zero
+        # a little further, so that the FMU's own test sees the crossing too, however it treats an exact zero
         located = precision + refine(bracket, lambda u: sign * self._value_at(time, u), precision)
         if located >= size:
             self._value_at(time, size)
@@ -108,18 +109,18 @@ class Watch:
         return located
 
     def forget(self) -> None:
-        """The step just made was taken back."""
+        """Forget a step that was taken back."""
         self._landed = None
 
     def confirm(self) -> None:
-        """The step just made counts: the crossing at its end, if there is one, is an event."""
+        """Accept the step just made: a crossing at its end is an event."""
         if self._landed is not None:
             self.accumulated = self._landed - self.last_time < SHORTEST_SPACING * (1.0 + abs(self._landed))
             self.last_time = self._landed
             self._landed = None
 
     def _near_side(self, time: float, size: float, sign: float) -> tuple[float, float] | None:
-        """A point of the step on the near side: its start, or (after an event) a moment later."""
+        """Return a point of the step on the near side: its start, or (after an event) a moment later."""
         if sign * self._start > NEGLIGIBLE:
             return 0.0, sign * self._start
         u = size
@@ -139,9 +140,9 @@ class Watch:
 def refine(bracket: Bracket, value: Callable[[float], float], precision: float) -> float:
     """Narrow a bracket to `precision` and return its far end.
 
-    Guesses come from a parabola through the last near points, as values on the far side may be anything: the FMU may
-    have reset its state there. A guess that does not pay is followed by a bisection. The bracket has near side > 0 >=
-    far side; the value is the signed distance at a number of seconds.
+    Guesses come from a parabola through the last near points. Values on the far side may be meaningless, as the FMU
+    may have reset its state there. A bisection follows a poor guess. The bracket has near side > 0 >= far side. The
+    value is the signed distance at a number of seconds.
 
     >>> round(refine(Bracket(0.0, 1.0, 2.0), lambda u: 1.0 - u * u, 1e-13), 12)
     1.0
@@ -181,7 +182,7 @@ def _probe(
 
 
 def _extrapolated(points: list[tuple[float, float]]) -> float | None:
-    """Next root of the parabola (or line) through the last near points; None when it has none ahead."""
+    """Return the next root of the parabola (or line) through the last near points; None without a root ahead."""
     if len(points) < 2:
         return None
     (a, fa), (b, fb) = points[-2:]

@@ -1,8 +1,8 @@
 """Sampling recorded variables on a time grid without disturbing the steps.
 
-A component with states is taken back to the start of the step, stepped to each sample, read, and put back where it
-was: the run is the same, bit for bit, whether it is sampled or not. A component without states is read at the
-communication points, with straight lines between them.
+A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
+The run is the same, bit for bit, with and without sampling. A component without states is read at the communication
+points, with straight lines between them.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class Sampler:
     Parameters
     ----------
     importer : Importer
-        Its steps are watched from now on.
+        Its steps are observed from now on.
     variables : sequence of (component, variable)
-        What is recorded.
+        The recorded variables.
     rate : float
         Samples per second.
 
@@ -80,7 +80,7 @@ class Sampler:
         return np.array(self._values).reshape(-1, self._width)
 
     def begin(self, first: float, end: float) -> None:
-        """Sample from `first` to `end`, s; the first sample is taken when the run gets there."""
+        """Sample from `first` to `end`, s; the first sample is taken when the run reaches `first`."""
         self._values = array("d")
         self._first, self._index, self._end = first, 0, end
         if self._importer.time >= first - self._room(first):
@@ -96,7 +96,7 @@ class Sampler:
         return time if time <= self._end + self._room(self._end) else np.inf
 
     def _patience(self) -> float:
-        """Before it begins, and once all samples are taken, nothing is to be seen."""
+        """Return an infinite time before sampling begins and after the last sample, else 0."""
         return np.inf if self._next() == np.inf else 0.0
 
     def _take_now(self, time: float) -> None:
@@ -140,8 +140,8 @@ class Sampler:
     ) -> None:
         """Read a component inside the step just made, and put it back at the step's end.
 
-        Each sample is reached from the start of the step: what an input means there (a slope from the start, the
-        force of a stop that yields) it does not mean later in the step.
+        Each sample is reached from the start of the step. Some inputs (a slope from the start, the force of a yielding
+        stop) have their meaning only from that start.
         """
         component = probe.component
         with component.taken_back():

@@ -1,4 +1,4 @@
-"""What an importer is made of: components, connections, watched events. Scenes expand to these."""
+"""The parts of an importer: components, connections, watched events. Scenes expand to these."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
 PairLaw = Literal["restitution", "kelvin_voigt", "hertz", "hunt_crossley"]
-#: What each law of a pair takes, beside the clearance.
+#: Numbers of each law of a pair, besides the clearance.
 PAIR_NUMBERS: Mapping[PairLaw, tuple[str, ...]] = {
     "restitution": ("restitution",),
     "kelvin_voigt": ("stiffness", "damping"),
@@ -87,7 +87,7 @@ class EventSpec:
 
 @dataclass(frozen=True, slots=True)
 class StopContactSpec:
-    """A body of any tool that meets a stop: one that yields, or an ImpactStop with restitution.
+    """A body of any tool that meets a stop: a yielding stop, or an ImpactStop with restitution.
 
     Attributes
     ----------
@@ -98,12 +98,12 @@ class StopContactSpec:
     mass : float or None
         Effective mass of the contact point, kg; None: a trial step finds it.
     stop_displacement, stop_force : str
-        Variables of the stop: the input that it is given the motion by, and the force that it answers, which presses
-        the body away and is >= 0.
+        Variables of the stop: the input of the displacement, and the output of its force, which presses the body away
+        and is >= 0.
     stop_velocity : str or None
-        Likewise; None: it takes no velocity.
+        The input of the velocity; None: the stop takes no velocity.
     side : {"upper", "lower"} or None
-        On which side of the motion the stop is; None: its parameter `side` says it.
+        The side of the motion on which the stop is; None: its parameter `side` gives it.
     """
 
     body: str
@@ -119,7 +119,7 @@ class StopContactSpec:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The numbers that it is given, by name."""
+        """The given numbers, by name."""
         return {} if self.mass is None else {"mass": self.mass}
 
     @property
@@ -129,7 +129,7 @@ class StopContactSpec:
 
     @property
     def connections(self) -> tuple[ConnectionSpec, ...]:
-        """The connections by which the stop is given the motion of the body."""
+        """The connections that carry the motion of the body to the stop."""
         inputs = {self.displacement: self.stop_displacement, self.velocity: self.stop_velocity}
         return tuple(
             ConnectionSpec((self.body, output), (self.stop, name)) for output, name in inputs.items() if name
@@ -147,7 +147,7 @@ class BodyPoint:
     displacement, velocity, force : str
         Its variables: the motion of the point, and the input of the force on it.
     mass : float
-        Effective mass of the point, kg: the change of its momentum over that of its velocity.
+        Effective mass of the point, kg: change of momentum over change of velocity.
     """
 
     component: str
@@ -169,16 +169,16 @@ class PairSpec:
     Attributes
     ----------
     lower, upper : tuple of str, or BodyPoint
-        Component and contact port (`contact[k]`, of the law `pair`) of each of our bodies, or a point of one of any
-        tool: their gap is `clearance + displacement of upper - displacement of lower`.
+        Each body of ours by component and contact port (`contact[k]`, of the law `pair`), or a point of a body of any
+        tool. Their gap is `clearance + displacement of upper - displacement of lower`.
     clearance : float
         Gap where both displacements are 0, m.
     law : str
-        `restitution`, or one that yields: `kelvin_voigt`, `hertz`, `hunt_crossley`.
+        `restitution`, or a yielding law: `kelvin_voigt`, `hertz`, `hunt_crossley`.
     restitution : float
         Coefficient of restitution, 0 to 1.
     stiffness, damping, exponent : float
-        Of a law that yields, as of a contact port.
+        Numbers of a yielding law, as of a contact port.
     """
 
     lower: tuple[str, str] | BodyPoint
@@ -192,11 +192,11 @@ class PairSpec:
 
     @property
     def name(self) -> str:
-        """Both points, the lower one first."""
+        """Names of both points, the lower point first."""
         lower, upper = (p.name if isinstance(p, BodyPoint) else ".".join(p) for p in (self.lower, self.upper))
         return f"{lower} - {upper}"
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The numbers that its law has, by name."""
+        """The numbers of its law, by name."""
         return {name: getattr(self, name) for name in (*PAIR_NUMBERS[self.law], "clearance")}

@@ -1,4 +1,4 @@
-"""What each step of an importer must do: decided once, from its components and connections."""
+"""The work of each step of an importer: decided once, from its components and connections."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, moves
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What an importer is made of."""
+    """The parts of an importer."""
 
     components: Sequence[Component]
-    """In the order in which they are stepped."""
+    """The components, in the order in which they are stepped."""
     numbers: Mapping[str, int]
-    """Their places in the order in which they are told of."""
+    """Place of each component in the order of event reports."""
     transfers: Sequence[Transfer]
     looping: Sequence[Transfer]
     """The transfers that belong to algebraic loops."""
@@ -37,16 +37,16 @@ class Parts:
 
 
 class StepPlan:
-    """What a step must do.
+    """The work of a step.
 
     Parameters
     ----------
     parts : Parts
-        What the importer is made of.
+        The parts of the importer.
     exchange : str
-        How values are exchanged.
+        The exchange of values: `jacobi`, `gauss_seidel` or `iterated`.
     progress : Progress
-        How far the run of the importer is.
+        Time, communication points and counts of the run.
 
     Attributes
     ----------
@@ -57,15 +57,15 @@ class StepPlan:
     prepares : bool
         A step needs more than moves before it.
     saved : list of Component
-        Those with states.
+        The components with states.
     start_moves, moves_after_loops : CallList or None, CallList
-        What is moved before a step, and after its loops are solved.
+        Moves before a step, and after its loops are solved.
     paths : list of (Component, CallList or None)
-        Those that make a step together, each with what is moved before.
+        The components that step together, each with the moves before its step.
     stateless_paths : list of (Component, CallList or None)
-        Those that cannot go back, and wait until the end of the step is agreed.
+        The components that cannot go back, and wait until the end of the step is agreed.
     event_mode : EventMode
-        What resolves events.
+        Resolves events.
     """
 
     def __init__(self, parts: Parts, exchange: Exchange, progress: Progress) -> None:
@@ -82,7 +82,7 @@ class StepPlan:
         self.plan_moves()
 
     def _is_looked_at(self, component: Component) -> bool:
-        """Are its events found from its outputs?"""
+        """Are the component's events found from its outputs?"""
         watches = self._parts.watches
         return component.event_times is not None or any(w.component is component for w in watches)
 
@@ -94,7 +94,7 @@ class StepPlan:
         self.start_moves = moves_of(behind) or None
         self.moves_after_loops = moves_of(t for t in behind if t not in parts.looping)
         paths = [(c, moves_of(fresh[c.name]) or None) for c in parts.components]
-        # those that cannot go back wait for the last repetition
+        # components that cannot go back wait for the last repetition
         repeats = self.iterates or bool(parts.contacts)
         self.paths = [path for path in paths if path[0].has_states or not repeats]
         self.stateless_paths = [path for path in paths if not path[0].has_states and repeats]
@@ -104,7 +104,7 @@ class StepPlan:
 
     @property
     def plain_loop(self) -> PlainLoop | None:
-        """What makes these steps in C; None where more than components and connections has a say in them."""
+        """The loop that makes these steps in C; None where more than components and connections takes part in them."""
         if self._is_plain is None:
             self._loop = self._made_loop()
             self._is_plain = self._loop is not None

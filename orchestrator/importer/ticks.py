@@ -1,7 +1,8 @@
-"""The input clocks of an importer's components: time events that it brings about itself.
+"""The input clocks of an importer's components: time events that the importer raises itself.
 
-A clock of a constant or fixed interval ticks at `start + shift + k interval`. The step of all ends there, and the clock
-is set in event mode. Variables of a clock are read and written while it ticks, and keep their values between.
+A clock of a constant or fixed interval ticks at `start + shift + k interval`. The step of all components ends there,
+and the clock is set in event mode. A clock's variables are read and written while it ticks, and keep their values
+between ticks.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
 
 @dataclass(slots=True)
 class _Clock:
-    """One clock in a run: its interval and shift, and where it ticks next, s."""
+    """One clock in a run: its interval, its first tick and its next tick, s."""
 
     component: Component
     declared: InputClock
@@ -29,7 +30,7 @@ class _Clock:
     next: float = math.inf
 
     def begin(self, start: float) -> None:
-        """Start a run: in initialization mode an FMU says what its description leaves open."""
+        """Start a run: in initialization mode an FMU gives the interval and shift that its description leaves open."""
         interval, shift = self.declared.interval, self.declared.shift
         if interval is None:
             instance = self.component.instance
@@ -58,7 +59,7 @@ class _Clock:
 
 
 class Ticks:
-    """The clocks of all components of an importer; `next` is where a clock ticks next, s, infinite without clocks."""
+    """The clocks of all components of an importer; `next` is the time of the next tick, s, infinite without clocks."""
 
     def __init__(self, components: Iterable[Component]) -> None:
         self._clocks = [_Clock(c, clock) for c in components for clock in c.capabilities.clocks]
@@ -66,7 +67,7 @@ class Ticks:
         self.next = math.inf
 
     def __bool__(self) -> bool:
-        """Is there any?"""
+        """Whether there is any clock."""
         return bool(self._clocks)
 
     def begin(self, start: float) -> None:
@@ -83,7 +84,7 @@ class Ticks:
         return self.next <= time + _room(time)
 
     def set(self, time: float) -> None:
-        """Let the clocks that are due tick; their components are in event mode.
+        """Let the due clocks tick; their components are in event mode.
 
         ComponentError: a component refuses, or an interval is lost in the rounding of the time.
         """

@@ -1,4 +1,4 @@
-"""Tunable parameters that are connected: set at the end of a step, in event mode, where what feeds them has changed."""
+"""Connected tunable parameters: set at the end of a step, in event mode, when their source values have changed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.importer.wiring import Transfer, order_of, transfe
 
 
 def is_tunable(connection: ConnectionSpec, components: Mapping[str, Component]) -> bool:
-    """Does it feed a parameter?"""
+    """Does the connection feed a parameter?"""
     name, variable = connection.target
     return bool(components[name].variables[variable].causality == "parameter")
 
@@ -23,9 +23,9 @@ def is_tunable(connection: ConnectionSpec, components: Mapping[str, Component]) 
 class Tuning:
     """The connections to tunable parameters.
 
-    Inputs may change at any time, parameters at events only: so those are moved once a step is agreed and its events
-    are resolved, and never in a step that may be taken back. What feeds them is given its own inputs before, by all
-    other transfers, in their order.
+    Inputs may change at any time, parameters at events only. Parameters are therefore written once a step is agreed
+    and its events are resolved, and never in a step that may be taken back. Before that, all other transfers, in their
+    order, write the inputs of the components that feed them.
     """
 
     def __init__(
@@ -40,17 +40,17 @@ class Tuning:
         self._given = [transfer.write.values.copy() for transfer in self.transfers]
 
     def __bool__(self) -> bool:
-        """Are there any?"""
+        """Whether there are any such connections."""
         return bool(self.transfers)
 
     def begin(self) -> None:
-        """Initialization has given the parameters their first values."""
+        """Note the first values of the parameters, which initialization has set."""
         self._given = [transfer.write.values.copy() for transfer in self.transfers]
 
     def resolve(self, time: float) -> bool:
-        """Give the parameters that have changed their values at `time`, s; returns whether one asks for the end.
+        """Write the changed parameters at `time`, s; returns whether a component requests the end of the run.
 
-        A component that fails, or never settles, raises ComponentError.
+        ComponentError: a component fails, or never settles.
         """
         for transfer in self._feeding:
             transfer.move()

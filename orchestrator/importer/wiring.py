@@ -60,7 +60,7 @@ def order_of(connections: Connections, components: dict[str, Component]) -> Tran
 
 
 def _feeding(connections: Connections, components: dict[str, Component], c: ConnectionSpec) -> set[int]:
-    """Connections into inputs that the output of `c` depends on directly."""
+    """Return the connections into inputs that the output of `c` depends on directly."""
     component, variable = c.source
     needed = components[component].depends.get(variable, frozenset())
     return {
@@ -69,7 +69,7 @@ def _feeding(connections: Connections, components: dict[str, Component], c: Conn
 
 
 def _merged(cycles: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Cycles that share a connection are one loop."""
+    """Merge cycles that share a connection into one loop."""
     loops: list[set[int]] = []
     for cycle in cycles:
         touching = [loop for loop in loops if loop & set(cycle)]
@@ -79,20 +79,20 @@ def _merged(cycles: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
 
 
 def drawn_inputs(connections: Connections) -> set[str]:
-    """Return the inputs, among connections from one component to another, that a value and its slope are given for."""
+    """Return the inputs, among connections from one component to another, that get a value and its slope."""
     named = {c.target[1] for c in connections}
     return {name for x in named if f"{x}_rate" in named for name in (x, f"{x}_rate")}
 
 
 @dataclass(frozen=True, slots=True)
 class StatusCall:
-    """A bare call that returns FMI's status, with what an error message needs."""
+    """A bare call that returns FMI's status, with the data for an error message."""
 
     call: Callable[[], int]
     instance: Instance
     function: str
     moved: VariableGroup | Scaling | None = None
-    """What it reads or writes, or converts."""
+    """The variables that the call reads or writes, or the scaling that it makes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Scaling:
     write: NDArray[np.float64]
 
     def __call__(self) -> int:
-        """Convert."""
+        """Write the scaled values; returns status 0."""
         np.multiply(self.read, self.gains, out=self.write)
         return 0
 
@@ -128,7 +128,7 @@ class Transfer:
         written = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
         self.write = target.clocked(written, [c.target[1] for c in connections])
         self.convert: Callable[[], int] | None = None if shared else self._converter()
-        """Carries the values read to those written, returns status 0; None when they share one buffer."""
+        """Carries the values read to the values written, returns status 0; None when both share one buffer."""
         self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
@@ -147,9 +147,9 @@ class Transfer:
         return copy if bool(np.all(gains == 1.0)) else convert
 
     def _bind_rates(self) -> None:
-        """Inputs that come with an input for their slope (`force`, `force_rate`) can follow a straight line.
+        """Find the inputs that follow a straight line: those with an input for their slope (`force`, `force_rate`).
 
-        Where the source gives the slope too, both say what comes from the start of a step on.
+        If the source gives the slope too, value and slope belong to the start of a step.
         """
         variables = self.target.variables
         slopes = [f"{c.target[1]}_rate" for c in self.connections]
@@ -165,7 +165,7 @@ class Transfer:
         self._begin_values = self.write.values.copy()
 
     def keep_at_start(self, inputs: Container[str], *, kept: bool) -> None:
-        """Say whether these inputs mean the start of a step, also in one repeated with the values at its end."""
+        """Fix these inputs to their values at the start of a step, also in a repeated step, or release them."""
         named = {i for i, c in enumerate(self.connections) if c.target[1] in inputs}
         self._kept = sorted({*self._kept, *named} if kept else {*self._kept} - named)
 
@@ -177,8 +177,8 @@ class Transfer:
     def write_over_step(self, size: float) -> None:
         """Write inputs for a repeated step of `size` s from the outputs at its end, which `take` has read.
 
-        An input with a slope follows the straight line from the start of the step; any other is held at its end,
-        but those that mean the start.
+        An input with a slope follows the straight line from the start of the step. An input fixed to the start keeps
+        its value. Any other input is held at its value at the end.
         """
         values, begin = self.write.values, self._begin_values
         if self._rates is not None:
@@ -206,7 +206,7 @@ class Transfer:
         return float(self._gains[[c.target for c in self.connections].index(connection.target)])
 
     def set_gain(self, connection: ConnectionSpec, gain: float) -> None:
-        """Change the gain of one connection; the calls of `calls` must be bound again."""
+        """Change the gain of one connection; the calls from `calls` must be bound again."""
         if self.convert is None:
             kind = kind_of(self.target.variables[connection.target[1]])
             self.write = self.target.group(kind, [c.target[1] for c in self.connections])
@@ -221,7 +221,7 @@ class Transfer:
         self.write.set()
 
     def calls(self) -> list[StatusCall]:
-        """Return the bare calls of a move, for a path that checks their status itself."""
+        """Return the bare calls of a move, for code that checks their status itself."""
         source, target = self.source.instance, self.target.instance
         scaling = self.convert if isinstance(self.convert, Scaling) else None
         middle = [] if self.convert is None else [StatusCall(self.convert, target, "convert", scaling)]
@@ -232,14 +232,14 @@ class Transfer:
         ]
 
 
-#: Numbers smaller than this are 0 where values are compared.
+#: Scale of values below which they compare as 0.
 SMALLEST = 1e-300
 
 
 class SettlingInputs:
-    """Inputs of a step, given by transfers, that is repeated until those of its end are the same as before.
+    """Inputs of a step, given by transfers; the step is repeated until the inputs at its end stay the same.
 
-    The tolerance is the relative difference of values that are the same.
+    The tolerance is the relative difference below which values are equal.
     """
 
     def __init__(self, transfers: Sequence[Transfer], tolerance: float) -> None:
@@ -247,7 +247,7 @@ class SettlingInputs:
         self._before: list[NDArray[Any]] | None = None
 
     def have_settled(self) -> bool:
-        """Take the inputs; are they those taken before?"""
+        """Take the inputs; returns whether they equal the inputs taken before."""
         before, self._before = self._before, [transfer.take() for transfer in self._transfers]
         return before is not None and all(
             equal_values(a, b, self._tolerance) for a, b in zip(self._before, before, strict=True)
@@ -257,7 +257,7 @@ class SettlingInputs:
 def equal_values(a: NDArray[Any], b: NDArray[Any], tolerance: float) -> bool:
     """Are values equal, relative to the largest? Booleans and integers count as numbers; NaN equals NaN."""
     wide_a, wide_b = a.astype(np.float64), b.astype(np.float64)
-    # fmax: a value that is none does not hide how large the others are
+    # fmax: a NaN does not hide the size of the others
     largest = np.fmax.reduce(np.abs(wide_a), initial=0.0)
     close = np.abs(wide_a - wide_b) <= tolerance * (SMALLEST + largest)
     return bool(np.all(close | (np.isnan(wide_a) & np.isnan(wide_b))))
@@ -290,7 +290,7 @@ class CallList:
         return len(self._bare)
 
     def find(self, call: object) -> StatusCall | None:
-        """Return what is known of one of the calls; None when it is not among them."""
+        """Return the instance and function of a call; None if it is not in the list."""
         return next((c for c in self.calls if c.call is call), None)
 
     def _explain(self, call: Callable[[], int], status: int) -> None:
@@ -334,7 +334,7 @@ def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[
 def _group_for(
     connection: ConnectionSpec, groups: list[list[ConnectionSpec]], components: dict[str, Component]
 ) -> list[ConnectionSpec] | None:
-    """The last group with the same ends, if nothing moved since then feeds this connection's output."""
+    """Return the last group with the same ends, if no transfer since then feeds this connection's output."""
     key = _key(connection, components)
     needed = components[connection.source[0]].depends.get(connection.source[1], frozenset())
     for group in reversed(groups):
@@ -348,14 +348,14 @@ def _group_for(
 #: Iteration of algebraic loops: relative change at which it ends, and most iterations.
 LOOP_TOLERANCE = 1e-12
 LOOP_ITERATIONS = 100
-#: A combination of inputs to which a loop responds by less than this, relative, is taken to have no solution.
+#: Relative response of a loop to a combination of inputs, below which the combination counts as having no solution.
 SMALLEST_RESPONSE = 1e-10
 
 
 def _next_step(
     guesses: Sequence[NDArray[np.float64]], changes: Sequence[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Anderson's step from the last guess: the straight line through the last guesses to where nothing changes."""
+    """Return Anderson's step from the last guess: along the straight line through the last guesses to zero change."""
     newest = changes[-1]
     memory = min(len(changes) - 1, len(newest))
     if memory == 0:
@@ -374,7 +374,7 @@ def _next_step(
 class LoopSolver:
     """Solves the algebraic loops of an exchange by fixed-point iteration with Anderson's acceleration.
 
-    A linear loop of n connections settles after n + 1 iterations, whatever its gain (but 1).
+    A linear loop of n connections settles after n + 1 iterations, for any gain but 1.
     """
 
     def __init__(

@@ -1,1 +1,1 @@
-"""Operations of this package: one declaration a file, see `vibroimpact.fmus.operations`."""
+"""Operations of this package, one declaration a file: see `vibroimpact.fmus.operations`."""

@@ -1,4 +1,4 @@
-"""Arguments that operations on scenes share, worded once."""
+"""Arguments shared by operations on scenes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Changes = Annotated[
     Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Change a key of the scene before it is checked, the key as messages write it; may be repeated.",
+        help="Change a key of the scene before its check, written as in messages; may be repeated.",
         python="",
     ),
 ]
@@ -31,7 +31,7 @@ Seed = Annotated[
     str | None,
     Option(
         metavar="PHASE:STOP,...",
-        help="Forcing phases (rad) of impacts near to those of an orbit, and their stops (1).",
+        help="Forcing phases (rad) close to those of an orbit's impacts, and their stops (1).",
         python="seed: Sequence[tuple[float, int]] | None = None",
     ),
 ]
@@ -39,8 +39,8 @@ FromDataset = Annotated[
     Path | None,
     Option(
         metavar="FILE",
-        help="Dataset (.nc, or the folder of a campaign) on the orbit of whose run it begins.",
+        help="Dataset (.nc, or the folder of a campaign) whose run gives the first orbit.",
         python="",
     ),
 ]
-Run = Annotated[int | None, Option(help="run_index of that run, where there are several.", min=0, python="")]
+Run = Annotated[int | None, Option(help="run_index of that run, if there are several.", min=0, python="")]

@@ -10,10 +10,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.orbits.basins:BasinsOfScene", Door("basins", without=("output",)))
 class Basins(Operation):
-    """Find which attractor each start of a plane of displacements and velocities ends on, and the share of each.
+    """Find the attractor of each start in a plane of displacements and velocities, and the share of each attractor.
 
-    Attractors are found by long runs, named as classify names runs, and a start counts as soon as it is so near to one
-    that all starts tried at that distance came back.
+    Long runs find the attractors, and classes of runs name them. A start counts as soon as it is close to an
+    attractor: within a distance from which all test starts came back.
 
     Example: vibroimpact basins examples/basins.toml --points 500 -o basins.nc --figure basins.png
     """
@@ -24,7 +24,7 @@ class Basins(Operation):
         Option(
             metavar="LOW:HIGH",
             python="x: Span | None = None",
-            help="Displacements at the start (m); twice the scene's own.",
+            help="Displacements at the start (m); by default up to twice the size of the scene's motion.",
         ),
     ] = None
     y: Annotated[
@@ -32,7 +32,7 @@ class Basins(Operation):
         Option(
             metavar="LOW:HIGH",
             python="y: Span | None = None",
-            help="Velocities at the start (m/s); twice the scene's own.",
+            help="Velocities at the start (m/s); by default up to twice the size of the scene's motion.",
         ),
     ] = None
     points: Annotated[
@@ -43,7 +43,7 @@ class Basins(Operation):
     ] = "200"
     number: Annotated[
         int | None,
-        Option(help="Mass of a chain (the one that is hit first) or mode of a beam (1) that starts so."),
+        Option(help="Mass of a chain (first impacting one) or mode of a beam (1) with these starts."),
     ] = None
     output: DatasetFile = None
     figure: FigureFile = None

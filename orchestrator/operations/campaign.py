@@ -18,9 +18,7 @@ class Campaign(Operation):
 
     scene: Annotated[
         Path,
-        Positional(
-            python="scene: SceneLike", help="Scene file (TOML), or a system (SSP), that sweeps something."
-        ),
+        Positional(python="scene: SceneLike", help="Scene file (TOML), or a system (SSP), with a sweep."),
     ]
     output: Annotated[
         Path, Option("--output", "-o", python="folder: PathLike", help="Folder of the campaign.")
@@ -29,7 +27,8 @@ class Campaign(Operation):
     workers: Annotated[
         int | None,
         Option(
-            help="Worker processes; by default one for each processor, where more than 2 s are left.", min=1
+            help="Worker processes; by default one for each processor, if more than 2 s of work remain.",
+            min=1,
         ),
     ] = None
     scheduler: Annotated[

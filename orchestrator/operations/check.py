@@ -8,10 +8,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile, St
 
 @operation("orchestrator.commands.check:check_scene", Door("cost_of"))
 class Check(Operation):
-    """Say what is wrong with a scene or, where nothing is, what would run and what it would cost.
+    """Print the problems of a scene or, without any, its engine, its effects and its cost.
 
-    One point of the scene is computed, the middle one of its sweep, for 20 s at most; times, memory and sizes are
-    those of this point, for all points. Nothing is written. Exit code 2: the scene has problems; 1: the point failed.
+    One point of the scene is computed, the middle one of its sweep, for 20 s at most. Times, memory and sizes assume
+    that all points are like it. No file is written. Exit code 2: the scene has problems; 1: the point failed.
 
     Example: vibroimpact check examples/bifurcation.toml
     """

@@ -10,7 +10,7 @@ from vibroimpact.fmus.operations import Operation, Option, operation
 
 @operation("orchestrator.commands.demo:run_demo")
 class Demo(Operation):
-    """Run the bifurcation of the impact oscillator: campaign, dataset, figure, and what is read off it.
+    """Run the bifurcation of the impact oscillator: campaign, dataset, figure, and readings with their exact values.
 
     Example: vibroimpact demo -o demo
     """

@@ -8,10 +8,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.study.cost_of_effects:CostOfEffects", Door("effects"))
 class Effects(Operation):
-    """Say what a scene asks for, what each of it costs and changes, and what is not simulated.
+    """List the effects of a scene, the cost and influence of each, and the effects that are not simulated.
 
-    The scene is run with and without each effect (forcing, damping, stops, modes, what is recorded, how it runs), in
-    five pairs in turn. A sweep is left out. Exit code 2: the scene has problems.
+    The scene runs with and without each effect (forcing, damping, stops, modes, recording, execution), in five pairs
+    in turn. A sweep is ignored. Exit code 2: the scene has problems.
 
     Example: vibroimpact effects examples/thesis/figure_7_11.toml --figure effects.png
     """

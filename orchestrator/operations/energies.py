@@ -13,10 +13,11 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDatase
     Door("energies", also=("progress: Progress | None = None",), without=("output",)),
 )
 class Energies(Operation):
-    """Say how energy goes between the modes of an impacting body: what force, damping and impacts give and take.
+    """Show the energy flow between the modes of an impacting body: by force, damping and impacts.
 
-    Of an oscillator, a chain or a beam on restitution stops, over the periodic orbit of each run, by exact integrals. A
-    scene is run first. A run without a periodic orbit (chaos, sticking, no impacts) is told with its reason.
+    Exact integrals cover the periodic orbit of each run. The body is an oscillator, a chain or a beam on restitution
+    stops. A scene is run first. A run without a periodic orbit (chaos, sticking, no impacts) is listed with the
+    reason.
 
     Example: vibroimpact energies examples/thesis/figure_6_15.toml --figure energies.png
     """
@@ -24,8 +25,8 @@ class Energies(Operation):
     file: SceneOrDataset
     output: DatasetFile = None
     figure: FigureFile = None
-    run: Annotated[int | None, Option(help="run_index of one run, of which each impact is told.", min=0)] = (
-        None
-    )
+    run: Annotated[
+        int | None, Option(help="run_index of a run whose impacts are listed one by one.", min=0)
+    ] = None
     changes: Changes = None
     force: Force = False

@@ -15,12 +15,12 @@ from vibroimpact.fmus.operations import Door, Operation, Option, Positional, ope
 class ExportFmu(Operation):
     """Write an FMU for another tool: a component, or the body of a scene with its stops. Needs no compiler.
 
-    A component that is given no forcing, contact or start of motion starts displaced, so that a run of it shows motion.
-    A scene's numbers are the start values; what it sweeps has the value that it has in its own table.
+    A component without forcing, contact or initial motion starts displaced, so that its run shows motion. A scene's
+    numbers are the start values; a swept key has the value in its own table.
 
     Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
 
-    A rig, ready: vibroimpact fmu export examples/single_run.toml -o rig.fmu
+    A whole rig: vibroimpact fmu export examples/single_run.toml -o rig.fmu
 
     A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
     """
@@ -44,10 +44,10 @@ class ExportFmu(Operation):
             "may be repeated.",
         ),
     ] = None
-    contacts: Annotated[int | None, Option(help="Contacts in its description.")] = None
-    modes: Annotated[int | None, Option(help="Beam: modes in its description.")] = None
-    masses: Annotated[int | None, Option(help="Chain: masses, likewise.")] = None
-    sensors: Annotated[int | None, Option(help="Beam: sensors, likewise.")] = None
+    contacts: Annotated[int | None, Option(help="Number of contacts in its description.")] = None
+    modes: Annotated[int | None, Option(help="Beam: number of modes in its description.")] = None
+    masses: Annotated[int | None, Option(help="Chain: number of masses in its description.")] = None
+    sensors: Annotated[int | None, Option(help="Beam: number of sensors in its description.")] = None
     fmi: Annotated[str, Option(help="FMI version, 3.0 or 2.0.")] = "3.0"
     full: Annotated[
         bool,
@@ -57,17 +57,17 @@ class ExportFmu(Operation):
         Literal["external"] | None,
         Option(
             python="external: bool = False",
-            help="external: describe what a tool needs that answers contacts itself.",
+            help="external: describe the variables for a tool with contact laws of its own.",
         ),
     ] = None
-    enumerations: Annotated[
-        bool, Option("--enumerations", help="Keep enumerations; else they are integers.")
-    ] = False
+    enumerations: Annotated[bool, Option("--enumerations", help="Keep enumerations instead of integers.")] = (
+        False
+    )
     platform: Annotated[
         str | None,
         Option(
-            help="Machines it is for: all, or names such as x86_64-windows,x86_64-linux. Needs the extra cross where "
+            help="Target machines: all, or names such as x86_64-windows,x86_64-linux. Needs the extra cross where "
             "this release has no libraries for them."
         ),
     ] = None
-    law: Annotated[Path | None, Option(help="user-contact-law: the Python file of your law.")] = None
+    law: Annotated[Path | None, Option(help="user-contact-law: the Python file of the law.")] = None

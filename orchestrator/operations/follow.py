@@ -12,41 +12,43 @@ from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, 
 class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
-    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
-    and the force harmonic. Orbits to begin with are looked for along the range; --seed is one of the scene as it is,
-    --from-dataset one at the values of its run. With --second folds, period doublings and grazes are curves over both
-    numbers, and these are what is written and drawn; the branches are printed.
+    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid, the
+    force harmonic. First orbits are searched along the range. --seed gives one for the scene as it is, --from-dataset
+    one at the values of its run. With --second, folds, period doublings and grazes are curves over both numbers. The
+    curves are then written and drawn, and the branches are printed.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
 
     scene: SceneFile
-    parameter: Annotated[str, Option(metavar="KEY", help="Number of the scene that is varied.")]
-    start: Annotated[float, Option("--from", help="One end of its range.")]
-    stop: Annotated[float, Option("--to", help="The other end.")]
+    parameter: Annotated[str, Option(metavar="KEY", help="Varied number of the scene.")]
+    start: Annotated[float, Option("--from", help="First end of its range.")]
+    stop: Annotated[float, Option("--to", help="Second end of its range.")]
     output: DatasetFile = None
     figure: FigureFile = None
-    impacts: Annotated[int | None, Option(help="Impacts of the orbits to begin with (1).")] = None
+    impacts: Annotated[int | None, Option(help="Impacts of the first orbits (1).")] = None
     periods: Annotated[
-        int | None, Option(python="periods: int = 1", help="Forcing periods of the orbits to begin with (1).")
+        int | None, Option(python="periods: int = 1", help="Forcing periods of the first orbits (1).")
     ] = None
     seed: Seed = None
     from_dataset: FromDataset = None
     run: Run = None
-    doublings: Annotated[int, Option(help="How often branches of twice the period are followed on.")] = 1
-    step: Annotated[float, Option(help="Largest step along a branch, over its range.")] = 0.01
+    doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
+    step: Annotated[float, Option(help="Largest step along a branch, relative to the range.")] = 0.01
     second: Annotated[
         str | None,
-        Option(metavar="KEY", help="Another number, over which the bifurcations are followed as well."),
+        Option(metavar="KEY", help="Second number, over which the bifurcations are followed."),
     ] = None
     second_start: Annotated[
         float | None,
         Option(
             "--second-from",
             python="second_range: tuple[float, float] | None = None",
-            help="One end of its range.",
+            help="First end of its range.",
         ),
     ] = None
-    second_stop: Annotated[float | None, Option("--second-to", python="", help="The other end.")] = None
+    second_stop: Annotated[
+        float | None, Option("--second-to", python="", help="Second end of its range.")
+    ] = None
     changes: Changes = None
     force: Force = False

@@ -9,10 +9,10 @@ from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Op
 
 @study("orchestrator.hard_cases.study:MeasuredCases", Door("hard_cases", without=("names",)))
 class HardCases(Operation):
-    """Run what breaks solvers of impacts, and print each figure beside its bound.
+    """Run cases that are hard for solvers of impacts, and print each figure with its bound.
 
-    Grazes, resonance, chatter into rest, stops that are next to rigid, units from nano to giga: each against a closed
-    form or a law of conservation. Exit code 1: a figure is wrong on this machine; what is slow alone is told.
+    Grazes, resonance, chatter into rest, nearly rigid stops, units from nano to giga: each against a closed form or a
+    conservation law. Exit code 1: a figure is wrong on this machine. A slow case is only reported.
 
     Example: vibroimpact hard-cases --only grazing-from-above --only chatter --figure hard_cases.png
     """
@@ -22,7 +22,7 @@ class HardCases(Operation):
         Option(
             metavar="NAME",
             python="only: str | Sequence[str] = ()",
-            help="A case to run; may be repeated. All without it.",
+            help="Case to run, by default all; may be repeated.",
         ),
     ] = None
     output: DatasetFile = None

@@ -21,8 +21,8 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 class Maps(Operation):
     """Draw a map of a scene: impacts or states at phase 0 with its orbits, sets of grazing impacts, normal forms.
 
-    S are the impacts whose next one is a graze, W those that a graze leads to. Nordmark's map is that of the forcing
-    amplitude at its first graze.
+    The set S has the impacts whose next impact is a graze, the set W the impacts after a graze. Nordmark's map varies
+    the forcing amplitude around its first graze.
 
     Example: vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity --figure sets.png
     """
@@ -34,12 +34,16 @@ class Maps(Operation):
     kind: Annotated[
         str, Option(help="impact, strobe, discontinuity (sets S and W), nordmark, square-root.")
     ] = "impact"
-    start: Annotated[float | None, Option("--from", help="Of rho or d: one end of its range.")] = None
-    stop: Annotated[float | None, Option("--to", help="The other end.")] = None
-    points: Annotated[int, Option(help="Values in that range; phases of the grazes of S and W.")] = 1500
-    alpha: Annotated[float | None, Option(help="Of the Nordmark map, instead of the scene's.")] = None
-    gamma: Annotated[float | None, Option(help="Likewise.")] = None
-    restitution: Annotated[float | None, Option(help="Likewise (1).")] = None
+    start: Annotated[float | None, Option("--from", help="First end of the range of rho or d.")] = None
+    stop: Annotated[float | None, Option("--to", help="Second end of the range.")] = None
+    points: Annotated[
+        int, Option(help="Number of values in that range, or of grazing phases of S and W.")
+    ] = 1500
+    alpha: Annotated[float | None, Option(help="alpha of the Nordmark map, instead of the scene's.")] = None
+    gamma: Annotated[float | None, Option(help="gamma of the Nordmark map, instead of the scene's.")] = None
+    restitution: Annotated[
+        float | None, Option(help="Restitution of the Nordmark map, instead of the scene's (1).")
+    ] = None
     slope: Annotated[float | None, Option(help="lambda of the square-root map (0.5).")] = None
     output: DatasetFile = None
     figure: FigureFile = None

@@ -10,11 +10,11 @@ from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, 
 
 @study("orchestrator.orbits.find:OrbitsOfScene", Door("find_orbits", without=("output",)))
 class FindOrbits(Operation):
-    """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
+    """Find periodic orbits of a scene, stable and unstable ones, and their multipliers.
 
-    Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on; with
-    --seed or --from-dataset the orbit near to it. Each is nowhere beyond a stop: all maxima between its impacts are
-    found, the nearest to a stop is told.
+    Without --impacts and --periods the result is all orbits of one impact a period, and the orbit on which a long run
+    ends. With --seed or --from-dataset it is the orbit near the seed. No orbit passes a stop: all maxima between its
+    impacts are found, and the nearest to a stop is printed.
 
     Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
     """
@@ -26,7 +26,7 @@ class FindOrbits(Operation):
     from_dataset: FromDataset = None
     run: Run = None
     penetrating: Annotated[
-        bool, Option("--penetrating", help="Tell orbits that pass through a stop as well.")
+        bool, Option("--penetrating", help="Also report orbits that pass through a stop.")
     ] = False
     output: DatasetFile = None
     figure: FigureFile = None

@@ -13,10 +13,10 @@ from vibroimpact.fmus.operations import Door, FigureFile, Force, Operation, Opti
     Door("replay", without=("save_scene", "workers", "scheduler")),
 )
 class Replay(Operation):
-    """Drive a scene by recorded channels and compare its motion with what was measured.
+    """Drive a scene by recorded channels and compare its motion with measured channels.
 
     One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
-    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
+    recordings and the scene's sweep, on many workers; the same command resumes it.
 
     Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
     """
@@ -28,7 +28,7 @@ class Replay(Operation):
         list[Path] | None,
         Positional(
             python="recordings: PathLike | Sequence[PathLike] = ()",
-            help="Recordings to replay, and to fit to; left out, those that the scene names.",
+            help="Recordings to replay and to fit to; by default those that the scene names.",
         ),
     ] = None
     output: Annotated[
@@ -37,7 +37,7 @@ class Replay(Operation):
             "--output",
             "-o",
             python="path: PathLike | None = None",
-            help="Dataset to write (.nc); of a campaign its folder.",
+            help="Dataset to write (.nc), or the folder of a campaign.",
         ),
     ] = None
     fit: Annotated[
@@ -51,17 +51,17 @@ class Replay(Operation):
         list[Path] | None,
         Option(
             python="score: PathLike | Sequence[PathLike] = ()",
-            help="Recording to score that was not fitted on; may be repeated.",
+            help="Recording that is compared but not used in the fit; may be repeated.",
         ),
     ] = None
     save_scene: Annotated[
         Path | None,
-        Option(help="Scene to write with the numbers found (.toml); one that is there only with --force."),
+        Option(help="Scene to write with the fitted numbers (.toml); an existing one only with --force."),
     ] = None
     figure: FigureFile = None
     execution: Annotated[
         str | None,
-        Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
+        Option(help="auto, fused, or coupled (driven by a Replay FMU); by default as the scene says."),
     ] = None
     workers: Annotated[int | None, Option(help="Worker processes of a campaign.", min=1)] = None
     scheduler: Annotated[str | None, Option(help="Dask scheduler of a campaign.")] = None

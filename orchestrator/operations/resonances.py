@@ -8,10 +8,11 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDatase
 
 @study("orchestrator.orbits.resonances:PeaksOfSweep", Door("resonances", without=("output",)))
 class Resonances(Operation):
-    """Find the peaks of a sweep of the forcing frequency, of the whole body and of each mode, beside what shifts them.
+    """Find the peaks of a frequency sweep, for the whole body and each mode, with the shifted natural frequencies.
 
-    A stop shifts natural frequencies: by pi / arccos(-a / x), a its position, x the deepest excursion on the other
-    side. That is right for one elastic, undamped, unforced mode, and else a guess. A scene is run first.
+    A stop shifts natural frequencies by the factor pi / arccos(-a / x): a is its position, x the deepest excursion on
+    the other side. The factor is right for one elastic, undamped, unforced mode, else it is a guess. A scene is run
+    first.
 
     Example: vibroimpact resonances examples/thesis/figure_6_4.toml --figure resonances.png
     """

@@ -11,9 +11,9 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 
 @operation("orchestrator.commands.ssp:export_to_archive", Door("export_ssp"))
 class ExportSsp(Operation):
-    """Write a scene of components as a system that other tools run: FMUs, start values, connections.
+    """Write a scene of components as a system for other tools: FMUs, start values, connections.
 
-    What SSP has no words for (events, record, sweep, execution) travels in an annotation, and comes back with it.
+    Parts without a form in SSP (events, record, sweep, execution) go into an annotation, which an import reads back.
 
     Example: vibroimpact ssp export examples/two_oscillators.toml -o two.ssp
     """
@@ -34,10 +34,8 @@ class ExportSsp(Operation):
     gains: Annotated[
         str,
         Option(
-            help="A gain is a component with units of its own, or a transformation of its connection: without delay "
+            help="A gain is a component with its own units, or a transformation of its connection: without delay "
             "where values are exchanged once a step, but OMSimulator leaves it out."
         ),
     ] = "component"
-    platform: Annotated[
-        str | None, Option(help="Machines it is for, as `vibroimpact fmu export` has them.")
-    ] = None
+    platform: Annotated[str | None, Option(help="Target machines, as in `vibroimpact fmu export`.")] = None

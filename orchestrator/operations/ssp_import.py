@@ -33,7 +33,7 @@ class ImportSsp(Operation):
         list[Path] | None,
         Option(
             python="parameters: PathLike | Sequence[PathLike] = ()",
-            help="Parameter set (.ssv), a file or one in the archive; repeated, they are made a sweep.",
+            help="Parameter set (.ssv), a file or one in the archive; several make a sweep.",
         ),
     ] = None
     force: Force = False

@@ -10,10 +10,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
 
 @study("orchestrator.orbits.transients:Transients", Door("transients"))
 class TransientsOf(Operation):
-    """Find how many periods a scene needs to forget its start: other starts come near to its own motion, or do not.
+    """Find the number of periods in which a scene forgets its start, by motions from other starts.
 
     Motions from the scene's start and from others are compared at each forcing phase 0. Their distance falls by a
-    constant factor a period, which is printed beside that of the body without impacts. Starts that end on another
+    constant factor a period, which is printed with the factor of the body without impacts. Starts that end on another
     attractor are named; a chaotic motion forgets nothing. Without a force the period is that of the first mode.
 
     Example: vibroimpact transients examples/basins.toml --tolerance 1e-6 -o transients.nc --figure transients.png
@@ -22,13 +22,13 @@ class TransientsOf(Operation):
     scene: SceneFile
     output: DatasetFile = None
     figure: FigureFile = None
-    starts: Annotated[int, Option(help="Starts beside that of the scene.")] = 8
+    starts: Annotated[int, Option(help="Number of starts besides that of the scene.")] = 8
     spread: Annotated[
-        float, Option(help="Largest distance of these starts, over the size of the scene's motion.")
+        float, Option(help="Largest distance of these starts, relative to the size of the scene's motion.")
     ] = 1.0
-    tolerance: Annotated[float, Option(help="Distance over that size below which a start is forgotten.")] = (
-        1e-6
-    )
-    periods: Annotated[int, Option(help="Most periods that are followed.")] = 3000
+    tolerance: Annotated[
+        float, Option(help="Distance, relative to that size, below which a start is forgotten.")
+    ] = 1e-6
+    periods: Annotated[int, Option(help="Maximum number of periods.")] = 3000
     changes: Changes = None
     force: Force = False

@@ -1,4 +1,4 @@
-"""Orbits of scenes: found, and followed over a parameter."""
+"""Studies of a scene's orbits: search, continuation over a parameter, and related analyses."""
 
 from __future__ import annotations
 

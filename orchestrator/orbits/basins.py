@@ -61,29 +61,29 @@ TABLE = ResultTable(
     ("border_dimension_error", "", "1", "standard error of it"),
 )
 POINTS = 200
-"""Starts along each axis, unless it is said."""
+"""Default number of starts along each axis."""
 MOST_STARTS = 16_000_000
 BLOCK = 16_384
-"""Starts that are followed by one call: Ctrl-C is heard in between."""
+"""Starts followed in one call; Ctrl-C takes effect between calls."""
 REACH = 2.0
-"""Half the width of the plane over the size of the scene's own motion, unless it is said."""
+"""Default half width of the plane, over the size of the scene's own motion."""
 
 Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """The start states of which ends are found.
+    """The plane of start states.
 
     Attributes
     ----------
     x, y : tuple of float, or None
-        Ends of displacement (m) and velocity (m/s); None: from the scene's own motion.
+        Ends of the axes of displacement (m) and velocity (m/s); None: from the scene's own motion.
     points : tuple of int
-        Along both.
+        Starts along both axes.
     number : int or None
-        Which mass of a chain, or mode of a beam, starts so; the others as the scene says. None: the mass that the first
-        stop hits, mode 1.
+        Mass of a chain, or mode of a beam, whose start is varied; the others start as in the scene. None: the mass
+        that the first stop hits, or mode 1.
     """
 
     x: Span | None = None
@@ -92,7 +92,7 @@ class Plane:
     number: int | None = None
 
     def refuse(self) -> None:
-        """Raise UsageError if the plane is none."""
+        """Raise UsageError unless the plane has finite spans in order and 2 to MOST_STARTS starts."""
         for name, span in (("x", self.x), ("y", self.y)):
             if span is not None and not (
                 math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]
@@ -109,7 +109,7 @@ class Plane:
 
 
 def _axes(scene: Scene, number: int | None) -> tuple[int, int]:
-    """Return the places of displacement and velocity of the plane among the start values."""
+    """Return the indices of the plane's displacement and velocity among the start values."""
     if not scene.body.IS_STRUCTURE:
         if number not in (None, 1):
             raise UsageError(f"basins: number: expected 1, an oscillator's only mass, got {number}.")
@@ -122,7 +122,7 @@ def _axes(scene: Scene, number: int | None) -> tuple[int, int]:
 
 
 def _first_hit(scene: Scene) -> int:
-    """Return the mass that a chain's first stop hits; 1 of a beam, its first mode."""
+    """Return the mass that a chain's first stop hits; for a beam 1, its first mode."""
     return integer_parameters(scene).get("contact[1].mass_number", 1)
 
 
@@ -138,7 +138,7 @@ def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[
 
 
 def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which start states are beyond a stop."""
+    """Return a mask of the start states beyond a stop, shape (state,)."""
     modal = modal_displacements(scene, states[:, : states.shape[1] // 2])
     beyond = np.zeros(len(states), np.bool_)
     for contact in body.contacts:
@@ -176,7 +176,7 @@ def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span,
 
 
 def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:
-    """Return what is known of a plane."""
+    """Return the dataset of a plane: ends of the starts, attractors, borders."""
     labels = found.labels.reshape(y.size, x.size)
     across, along = _axes(scene, plane.number)
     most = max([len(each.states) for each in found.attractors], default=0)
@@ -246,7 +246,7 @@ def points_of(text: str) -> tuple[int, int]:
 
 @dataclass(eq=False)
 class BasinsOfScene(Study[Basins]):
-    """Where the starts of a plane end: see `vibroimpact.basins`. A row is what is known after a block of starts."""
+    """The ends of the starts of a plane: see `vibroimpact.basins`. A row is the search after a block of starts."""
 
     name = "basins"
     nothing = "an attractor"
@@ -294,11 +294,11 @@ class BasinsOfScene(Study[Basins]):
             flow.close()
 
     def made(self) -> xr.Dataset:
-        """Return what is known of the plane."""
+        """Return the dataset of the plane as far as it is known."""
         return basins_dataset(self.scene, self.plane, self.x, self.y, self.known)
 
     def print_results(self) -> None:
-        """Print each attractor with its share, and what is not known."""
+        """Print each attractor with its share, and the undecided starts."""
         found, data = self.known, self.dataset
         rows = table(
             f"Basins of attraction: {self.scene.title or self.scene.source}",
@@ -338,7 +338,7 @@ def _say_rest(found: Basins, data: xr.Dataset) -> None:
 
 
 def _say_chaotic(found: Basins) -> None:
-    """Print what tells chaotic attractors apart, or that they are not told apart."""
+    """Print the impact rates that distinguish chaotic attractors, or that there may be several."""
     chaotic = [
         (name, each) for name, each in zip(found.names, found.attractors, strict=True) if each.is_chaotic
     ]

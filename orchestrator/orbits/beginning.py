@@ -1,4 +1,4 @@
-"""Which orbit an operation begins with."""
+"""The orbit that an operation begins with."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from vibroimpact.orchestrator.orbits.seeds import Seed, seed_of_run
 from vibroimpact.orchestrator.scene import Scene
 
 
-class Begun(NamedTuple):
-    """Scene and orbit to begin with; numbers that were not given are None."""
+class OrbitStart(NamedTuple):
+    """Scene and orbit to begin with; None for numbers that were not given."""
 
     scene: Scene
     impacts: int | None
@@ -22,23 +22,23 @@ class Begun(NamedTuple):
 
 
 class Beginning(Protocol):
-    """Arguments that say which orbit is meant."""
+    """Arguments that define the first orbit."""
 
     @property
     def impacts(self) -> int | None:
-        """Impacts of it."""
+        """Number of impacts of the orbit."""
 
     @property
     def periods(self) -> int | None:
-        """Forcing periods of it."""
+        """Number of its forcing periods."""
 
     @property
     def seed(self) -> str | None:
-        """Phases and stops of impacts near to those of one orbit."""
+        """Phases and stops of impacts near the impacts of one orbit."""
 
     @property
     def from_dataset(self) -> Path | None:
-        """Dataset of a run that is on it."""
+        """Dataset with a run on the orbit."""
 
     @property
     def run(self) -> int | None:
@@ -46,12 +46,12 @@ class Beginning(Protocol):
 
 
 def files_of(options: Beginning) -> list[Path]:
-    """Return the files that are read for it."""
+    """Return the files that define the orbit."""
     return [] if options.from_dataset is None else [options.from_dataset]
 
 
 def refuse_contradictions(options: Beginning) -> None:
-    """Raise UsageError if options say two things, or half of one."""
+    """Raise UsageError for options that contradict each other or are incomplete."""
     if options.from_dataset is None:
         if options.run is not None:
             raise UsageError("--run: expected --from-dataset as well, got --run alone.")
@@ -62,15 +62,17 @@ def refuse_contradictions(options: Beginning) -> None:
         raise UsageError(f"--from-dataset: expected it without {', '.join(given)}, which the run says.")
 
 
-def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()) -> Begun:
-    """Return the scene, without its sweep, at the values of the run of the dataset, if there is one, and the seed.
+def orbit_start(
+    options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequence[str] = ()
+) -> OrbitStart:
+    """Return the scene without its sweep, at the values of the dataset's run if one is given, and the seed.
 
-    The scene was given the changes, each KEY=VALUE. The command varies the keys in `varied`: values that the scene
-    leaves to its sweep are not needed. UsageError: the seed is none, or a change is another than the run has.
-    DatasetError: the run has no orbit.
+    The scene has the changes already, each KEY=VALUE. The command varies the keys in `varied`, so values that the
+    scene leaves to its sweep are not needed for them. UsageError: the seed is malformed, or a change contradicts the
+    run. DatasetError: the run has no orbit.
     """
     if options.from_dataset is None:
-        return Begun(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))
+        return OrbitStart(scene.unswept(varied), options.impacts, options.periods, _impacts_of(options.seed))
     with open_dataset(options.from_dataset) as runs:
         try:
             found = seed_of_run(runs, options.run)
@@ -79,7 +81,7 @@ def begun(options: Beginning, scene: Scene, changes: Sequence[str], varied: Sequ
     if twice := sorted(found.values.keys() & {each.partition("=")[0].strip() for each in changes}):
         raise UsageError(f"--set {twice[0]}: expected another key than those the dataset sweeps, got one.")
     alone = scene.unswept([*varied, *found.values])
-    return Begun(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
+    return OrbitStart(alone.with_values(found.values), len(found.impacts), found.periods, found.impacts)
 
 
 def _impacts_of(seed: str | None) -> Seed | None:

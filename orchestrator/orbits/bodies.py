@@ -1,4 +1,4 @@
-"""From a scene to the modes and contacts that its orbits follow from: the numbers that its FMU gets."""
+"""The modes and contacts of a scene, which define its orbits, with the numbers that its FMU gets."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ Floats = NDArray[np.float64]
 
 
 def impacting_body(scene: Scene) -> ImpactingBody:
-    """Return the modes, the force and the contacts of a scene: of an Oscillator, a Chain or a Beam on rigid stops.
+    """Return the modes, the force and the contacts of a scene: an Oscillator, a Chain or a Beam on rigid stops.
 
     Parameters
     ----------
     scene : Scene
-        Of the short form; its sweep is not looked at.
+        In the short form; its sweep is ignored.
 
     Raises
     ------
     UsageError
-        Its orbits are not those of modes that fly between restitution stops under one harmonic force.
+        The scene is not a body of modes between restitution stops under one harmonic force.
     """
     refuse_orbits(scene, seen(scene))
     body = body_points(scene)
@@ -40,7 +40,7 @@ def impacting_body(scene: Scene) -> ImpactingBody:
 def modal_displacements(scene: Scene, displacements: Floats) -> Floats:
     """Return displacements of the masses of a chain, or of the modes of a beam, in mass-normalised modes.
 
-    Displacements have shape (state, mass or mode), m; of an oscillator that of its mass. Those returned have shape
+    The given displacements have shape (state, mass or mode), m; an oscillator has one mass. The result has shape
     (state, mode), kg^(1/2) m.
     """
     return body_points(scene).normalised(displacements)

@@ -1,4 +1,4 @@
-"""Many states of a scene's body, followed from one phase 0 of the force to another by the loop in C."""
+"""The flow of many states of a scene's body from one phase 0 of the force to another, by the loop in C."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
 RECORDED = 64
-"""Forcing periods of which the class of a run is told."""
+"""Forcing periods that define the class of a run."""
 SLICE = 0.25
-"""Time after which a thread looks whether it is still wanted, s: Ctrl-C waits no longer than that and one run."""
+"""Interval at which a thread checks whether it should stop, s. Ctrl-C takes at most this time and one run."""
 DEADLINE = 20.0
-"""Longest time of one run, s: one that takes longer counts as one whose end is not known."""
+"""Longest time of one run, s; a longer run counts as one with an unknown end."""
 _PHASE, _VELOCITY, _CONTACT = (
     IMPACT_COLUMNS.index(f"impact_{name}") for name in ("phase", "velocity", "contact")
 )
@@ -38,22 +38,22 @@ _RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
 
 
 class _Closing(Exception):
-    """Ends a thread whose work is no longer wanted."""
+    """Ends a thread whose work is no longer needed."""
 
 
 class BodyFlow:
-    """Follows many states of a scene's body in lanes, or by the loop in C, on two threads and more."""
+    """Follows many states of a scene's body in lanes, or by the loop in C, on one thread per processor."""
 
     def __init__(self, scene: Scene, workers: int | None = None) -> None:
         self.scene = scene
         bare = {**_RECORD, "extrema": False, "strobe": False}
-        told = {**_RECORD, "extrema": True, "strobe": True}
+        record = {**_RECORD, "extrema": True, "strobe": True}
         self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
         count = self._pool._max_workers
         self._closing = False
         self._runners: list[PointRunner] = []
         self._bare = [self._loop(bare) for _ in range(count)]
-        self._telling = [self._loop(told) for _ in range(count)]
+        self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = scene.body.start_names
 
@@ -70,14 +70,14 @@ class BodyFlow:
         return loop
 
     def close(self) -> None:
-        """Give back what was opened."""
+        """Stop the threads and close the runners."""
         self._closing = True
         self._pool.shutdown(cancel_futures=True)
         for runner in self._runners:
             runner.close()
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
-        """Return where states are after some forcing periods: see `analysis.orbits.basins.Flow`."""
+        """Return the states after some forcing periods: see `analysis.orbits.basins.Flow`."""
         columns = self._run(self._bare, states, (0, periods), first=first)
         return Ends(
             np.concatenate([_final(each) for each in columns]),
@@ -87,15 +87,15 @@ class BodyFlow:
     def classes(
         self, states: Floats, transient: int, *, first: bool = False
     ) -> tuple[list[RunClass], Floats]:
-        """Return what a run from each state is after so many forcing periods, and its last states."""
-        columns = self._run(self._telling, states, (transient, RECORDED), first=first)
+        """Return the class of a run from each state after a transient (forcing periods), and its last states."""
+        columns = self._run(self._recording, states, (transient, RECORDED), first=first)
         found = [kind for each in columns for kind in _classes(each)]
         return found, np.concatenate([_final(each) for each in columns])
 
     def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
         """Return features of impacts in consecutive blocks: see `analysis.orbits.basins.Flow`."""
         features, well = [], np.ones(len(states), np.bool_)
-        for _ in range(blocks):  # one after the other, so that few impacts are in memory
+        for _ in range(blocks):  # one block after the other keeps few impacts in memory
             columns = self._run(self._measuring, states, (0, periods), first=False)
             features.append(np.concatenate([self._features(each, periods) for each in columns]))
             states = np.concatenate([_final(each) for each in columns])

@@ -36,25 +36,25 @@ from vibroimpact.orchestrator.scene.keys import coordinate_name
 
 HISTORY = "periodic orbits followed by vibroimpact"
 SAME_ORBIT = 0.02
-"""Distance, over the range of the parameter and a radian, at which an orbit is on a branch that is known."""
+"""Distance, in ranges of the parameter and radians, below which an orbit lies on a known branch."""
 
 Followings = Iterator[tuple[Branch, BranchOrbit]]
-"""Each orbit that is followed, and the branch whose last it is."""
+"""Each new orbit, and the branch that it extends."""
 
 
 @dataclass(slots=True)
 class Followed:
-    """What was followed."""
+    """Branches of orbits over one parameter."""
 
     scene: Scene
     parameter: str
-    """Key of the scene."""
+    """Key of the scene that is varied."""
     branches: list[Branch] = field(default_factory=list)
-    """Grows while they are followed."""
+    """The branches so far."""
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Of the file of its orbits."""
+        """Attributes of the file of its orbits."""
         return scene_attributes(self.scene, HISTORY) | {"parameter": self.parameter}
 
     @property
@@ -74,11 +74,11 @@ class FollowedLoci:
     """Bifurcations that were followed over two parameters."""
 
     followed: Followed
-    """The branches on which they were found."""
+    """The branches with the bifurcations."""
     second: str
     """Key of the second parameter."""
     loci: list[Locus] = field(default_factory=list)
-    """Grows while they are followed."""
+    """The curves so far."""
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -100,7 +100,7 @@ class FollowedLoci:
 
     @property
     def names(self) -> list[str]:
-        """What each curve is, and the branch on which it was found."""
+        """Kind and orbit of each curve, and the branch on which it was found."""
         return [
             f"{number}  {locus.kind} of {locus.points[0].orbit.full_name}; begun from {locus.origin}"
             for number, locus in enumerate(self.loci, start=1)
@@ -108,12 +108,12 @@ class FollowedLoci:
 
     @property
     def left_out(self) -> str:
-        """What was not looked for, as a sentence."""
+        """A sentence on the bifurcations that were not searched."""
         scene, points = (
             self.followed.scene,
             [point for each in self.followed.branches for point in each.points],
         )
-        said = (
+        text = (
             f"Curves were begun only where a branch has a {', '.join(FOLLOWED_KINDS[:-1])} or {FOLLOWED_KINDS[-1]} at "
             f"{self.second} = {scene.value(self.second):g}: others, and those that leave points of codimension 2, were "
             f"not looked for. Begin at other values of {self.second} to find more."
@@ -121,15 +121,15 @@ class FollowedLoci:
         others = [point for point in points if point.kind not in FOLLOWED_KINDS]
         if others:
             where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
-            said += f" Not followed: {where}."
-        return said
+            text += f" Not followed: {where}."
+        return text
 
 
 def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSettings) -> Iterator[Locus]:
-    """Follow folds, period doublings and grazes of the branches over a second parameter; yield a locus as it grows.
+    """Follow folds, period doublings and grazes of the branches over a second parameter; yield each locus as it grows.
 
-    The settings have the ranges of both parameters. The loci are put into `result`. UsageError: the second parameter is
-    no number of the scene.
+    The settings have the ranges of both parameters. The loci go into `result`. UsageError: the second parameter is no
+    number of the scene.
     """
     scene, keys = result.followed.scene, (result.followed.parameter, result.second)
     value = float(scene.value(result.second))
@@ -152,7 +152,7 @@ def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSetti
 
 
 def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
-    """Raise UsageError if nothing can be followed over a second parameter."""
+    """Raise UsageError unless the second parameter differs from the first, and its range holds the scene's value."""
     if result.followed.parameter == result.second:
         raise UsageError(
             f"--second: expected another number of the scene than {result.second}, got the same."
@@ -168,7 +168,7 @@ def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
 def _is_on(
     loci: list[Locus], point: SpecialPoint, value: float, first: FollowSettings, second: FollowSettings
 ) -> bool:
-    """Say whether a locus that is known goes through a point."""
+    """Return whether a known locus goes through a point."""
     for locus in loci:
         if locus.kind == point.kind and locus.points[0].orbit.name == point.at.orbit.name:
             rows = np.array([each.values for each in locus.points])
@@ -190,11 +190,11 @@ def follow_branches(
     longest: float = 0.01,
     looking: Callable[[float], None] = lambda value: None,
 ) -> Followings:
-    """Follow orbits P(p,q), and those that leave them at period doublings; yield each orbit with its branch.
+    """Follow orbits P(p,q), and branches that leave them at period doublings; yield each orbit with its branch.
 
-    Branches are put into `followed`, also those that are not followed to their end. `longest` is the largest step, the
-    range of the parameter counted 1, a radian of all phases 1; for the others see `vibroimpact.follow`. `looking` hears
-    of each value at which orbits of several impacts are looked for.
+    Branches go into `followed`, also unfinished branches. `longest` is the largest step: the range of the parameter
+    counts as 1, a radian of all phases as 1. For the other arguments see `vibroimpact.follow`. `looking` is called
+    with each value at which orbits of several impacts are searched.
 
     UsageError: the scene has no such orbits, or the parameter is no number of it. OrbitError: there is no orbit to
     begin with.
@@ -204,8 +204,8 @@ def follow_branches(
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
-    begun = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
-    for value, orbit in begun:
+    starts = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
+    for value, orbit in starts:
         if not _is_known(followed.branches, orbit, value, settings):
             yield from _both_ways(follower, orbit, value, followed)
     if not followed.branches:
@@ -220,7 +220,7 @@ def follow_branches(
 
 
 def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
-    """Return what to do where there is no orbit of some impacts and periods: what runs in the range end on says it."""
+    """Return advice for a range without orbits of some impacts and periods: the orbits on which runs end there."""
     ends = _counted(orbit for _, orbit in _ends_of_runs(scene, parameter, settings))
     ends.pop(sought, None)
     if not ends:
@@ -231,9 +231,9 @@ def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought
 
 
 def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
-    """Return a line for each kind of orbit that runs in a range end on and no branch holds, the commonest first.
+    """Return a line for each kind of orbit on which runs end and that no branch holds, the commonest first.
 
-    The range is that of the parameter; the branches begin at orbits of one impact.
+    `start` and `stop` are the range of the parameter; branches begin at orbits of one impact.
     """
     settings = FollowSettings(min(start, stop), max(start, stop))
     ends = _ends_of_runs(followed.scene, followed.parameter, settings)
@@ -253,7 +253,7 @@ def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[s
 def _ends_of_runs(
     scene: Scene, parameter: str, settings: FollowSettings
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
-    """Yield the orbits that runs end on, with their values of the parameter."""
+    """Yield the orbits on which runs end, with their values of the parameter."""
     with long_runs(scene) as impacts_at:
         for value in seed_values(settings):
             try:
@@ -266,17 +266,17 @@ def _ends_of_runs(
 
 
 def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
-    """Return how many orbits of each number of impacts and periods there are."""
+    """Return the number of orbits for each pair of impacts and periods."""
     return Counter((orbit.phases.size, orbit.periods) for orbit in orbits)
 
 
 def _asking(impacts: int, periods: int) -> Message:
-    """Return what asks for orbits of some impacts and periods."""
+    """Return the options that select orbits of some impacts and periods."""
     return message(Argument("impacts", impacts), Either(", ", " "), Argument("periods", periods))
 
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:
-    """Follow an orbit both ways; what is there when it is interrupted is kept."""
+    """Follow an orbit both ways; an interruption keeps the orbits so far."""
     origin = f"{orbit.full_name} at {value:g}"
     ways = Branch(origin), Branch(origin)
     try:
@@ -308,7 +308,7 @@ def _doubled(follower: Follower, result: Followed, doublings: int) -> Followings
 
 
 def _leads_back(branches: list[Branch], doubling: BranchOrbit, settings: FollowSettings) -> bool:
-    """Say whether a branch of twice the period has been followed to this doubling, from its other end."""
+    """Return whether a branch of twice the period has reached this doubling from its other end."""
     twice = 2 * doubling.orbit.periods
     near = SAME_ORBIT * settings.span
     return any(
@@ -330,12 +330,12 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
             kept[value] = impacting_body(scene.at({parameter: value}))
         return kept[value]
 
-    body_at(value)  # a key that is none is refused before anything is followed
+    body_at(value)  # a wrong key is refused before any orbit is followed
     return body_at
 
 
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:
-    """Say whether an orbit is on a branch, counted from any of its impacts and periods."""
+    """Return whether an orbit is on a branch, counted from any of its impacts and periods."""
     whole = 2.0 * np.pi * orbit.periods
     for branch in branches:
         alike = branch.orbits[0].orbit
@@ -355,10 +355,10 @@ def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settin
 
 
 def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
-    """Return how far something is off a path.
+    """Return the distance of a point from a path.
 
-    `apart`, shape (n, d), parts it from the points of the path; `steps`, shape (n - 1, d), lead from each point to the
-    next.
+    `apart`, shape (n, d), is the point's offset from each point of the path. `steps`, shape (n - 1, d), lead from each
+    point to the next.
     """
     squares = np.maximum((steps**2).sum(axis=1), np.finfo(np.float64).tiny)
     shares = np.clip(-(apart[:-1] * steps).sum(axis=1) / squares, 0.0, 1.0)

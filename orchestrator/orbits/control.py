@@ -1,7 +1,7 @@
-"""The study `control`: an unstable orbit that is kept by its forcing amplitude over angular frequencies.
+"""The study `control`: an unstable orbit, kept by its forcing amplitude over angular frequencies.
 
-Thesis 3.5.2. The components are coupled as any others: body and stop, which answers its impacts, and a controller,
-which answers each impact by the force of the next flight. Nothing here iterates a map.
+Thesis 3.5.2. The components are coupled as in any scene: the body, the stop that answers its impacts, and a
+controller. The controller answers each impact with the force of the next flight. No map is iterated here.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ TABLE = ResultTable(
 AT_THE_END = 20
 """Impacts at the last angular frequency of a plan."""
 CHUNK = 16
-"""Forcing periods between two looks at the controller."""
+"""Forcing periods between two checks of the controller."""
 _SHOWN = 8
-"""Orbits that are printed."""
+"""Orbits in the printed table."""
 
 
 @dataclass(eq=False)
 class Controlled(Study[int]):
-    """An orbit that is kept from one angular frequency to another; a row is the number of impacts so far.
+    """An orbit kept from one angular frequency to another; a row is the number of impacts so far.
 
     Parameters
     ----------
@@ -73,10 +73,10 @@ class Controlled(Study[int]):
     Attributes
     ----------
     impacts : list of tuple
-        Of each: time (s), phase (rad), speed (m/s), and of the flight that led to it forcing amplitude (N), angular
-        frequency (rad/s) and row of the plan.
+        Time (s), phase (rad) and speed (m/s) of each impact. Then forcing amplitude (N), angular frequency (rad/s) and
+        row of the plan for the flight that led to it.
     end : str
-        Why it ended.
+        Reason for the end.
     """
 
     name = "control"
@@ -91,7 +91,7 @@ class Controlled(Study[int]):
 
     @classmethod
     def prepare(cls, options: Control, stack: ExitStack) -> Self:
-        """Open the scene, find the orbits, and leave the controller where that is asked for."""
+        """Open the scene, find the orbits, and write the controller to the folder `keep` if it is given."""
         settings, keep = _settings(options), options.keep
         require_pythonfmu()
         if keep is not None:
@@ -106,7 +106,7 @@ class Controlled(Study[int]):
         return study
 
     def rows(self) -> Generator[int, None, None]:
-        """Couple body, stop and controller, and let them go through the plan.
+        """Couple body, stop and controller, and run them through the plan.
 
         ComponentError: pythonfmu is not installed, or a component fails.
         """
@@ -134,7 +134,7 @@ class Controlled(Study[int]):
 
     @property
     def kept_to(self) -> float | None:
-        """Angular frequency of the last orbit that was kept over two impacts and more, rad/s; None of none."""
+        """Angular frequency of the last orbit that was kept over two impacts or more, rad/s; None if there is none."""
         rows = [int(impact[5]) for impact in self.impacts]
         visits = Counter(rows)
         lost = self.end.startswith("lost")
@@ -142,7 +142,7 @@ class Controlled(Study[int]):
         return self.plan.orbits[kept[-1]].body.angular_frequency if kept else None
 
     def print_results(self) -> None:
-        """Print some of the orbits, and how far they were kept."""
+        """Print some of the orbits, and the range over which they were kept."""
         _print(self)
 
 
@@ -158,7 +158,7 @@ def _run(importer: Importer, found: Controlled) -> Iterator[int]:
     stay = [0, -1]  # impacts at this row
 
     def note(_: object) -> None:
-        # the controller has not seen this impact yet: force and row are those of the flight that led here
+        # the controller has not seen this impact yet: force and row belong to the flight that led here
         if int(count.get()[0]) == len(found.impacts):
             return  # initialization ends in event mode, too
         seen.get()

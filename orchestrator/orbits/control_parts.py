@@ -1,4 +1,4 @@
-"""The components that keep an orbit, and how they are coupled: body, stop, controller."""
+"""The coupled components of orbit control: body, stop, controller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.orbits.control_plan import ControlPlan
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 
 SEEN = ("count", "last_time", "last_phase", "last_velocity")
-"""Outputs of the contact that the controller is told."""
+"""Outputs of the contact that feed the controller."""
 
 
 def coupled(plan: ControlPlan, controller: Path) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
@@ -50,7 +50,7 @@ def coupled(plan: ControlPlan, controller: Path) -> tuple[list[ComponentSpec], l
 
 
 def coupled_scene(plan: ControlPlan, controller: str) -> str:
-    """Return a scene of the coupled components, whose controller is the FMU of this name beside it."""
+    """Return a scene of the coupled components; `controller` is the name of its FMU beside the scene."""
     components, connections = coupled(plan, Path(controller))
     title = f"{plan.scene.title or Path(plan.scene.source).stem}: an orbit that is kept"
     lines = ["[scene]", f"title = {json.dumps(title)}", f'units = "{plan.scene.units}"', ""]

@@ -20,32 +20,32 @@ from vibroimpact.orchestrator.scene import Scene
 
 MOST_ROWS = 100_000
 LONGEST_STAY = 500
-"""Impacts at one angular frequency after which the orbit is taken not to settle."""
+"""Impacts at one angular frequency, above which the orbit counts as not settling."""
 NEAREST = 1e-10
-"""Distance, rad/s, to which the end of a branch is narrowed down, relative."""
+"""Relative width, in angular frequency, to which the end of a branch is located."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControlSettings:
-    """How an orbit is kept.
+    """Settings of orbit control.
 
     Attributes
     ----------
     law : {"ogy", "deadbeat", "newton"}
     step : float
-        Of the angular frequency, rad/s.
+        Step of the angular frequency, rad/s.
     tolerance : float
-        Difference of two speeds in a row, over that of the orbit, at which the frequency goes on.
+        Difference of two consecutive speeds, over the orbit's speed, below which the frequency moves on.
     limit : float
-        Largest correction over the forcing amplitude; 0: nothing is corrected.
+        Largest correction over the forcing amplitude; 0: no correction.
     noise : float
         Standard deviation of the error of measured speeds, relative.
     seed : int
-        Of the noise.
+        Seed of the noise.
     periods : int
         q of the orbit P(1,q).
     stay : int
-        Flights at each angular frequency at least.
+        Least number of flights at each angular frequency.
     """
 
     law: Law = "ogy"
@@ -58,7 +58,7 @@ class ControlSettings:
     stay: int = 1
 
     def refuse(self) -> None:
-        """Raise UsageError if no control has these numbers."""
+        """Raise UsageError unless all numbers are in their ranges."""
         if self.law not in LAWS:
             raise UsageError(f"control: law: expected one of {', '.join(LAWS)}, got {self.law!r}.")
         for name in ("step", "tolerance"):
@@ -80,7 +80,7 @@ class ControlSettings:
 
 
 def settings_of(law: str = "ogy", **numbers: Any) -> ControlSettings:
-    """Return settings whose law comes from outside; those that no control has raise UsageError."""
+    """Return checked settings for a law given as text; UsageError if they are out of range."""
     settings = ControlSettings(cast("Law", law), **numbers)
     settings.refuse()
     return settings
@@ -88,20 +88,20 @@ def settings_of(law: str = "ogy", **numbers: Any) -> ControlSettings:
 
 @dataclass(frozen=True, eq=False)
 class ControlPlan:
-    """The orbits that are kept, one after the other, and the gains about each."""
+    """The orbits to keep, one after the other, and the gains about each."""
 
     scene: Scene
     settings: ControlSettings
     amplitude: float
     """Forcing amplitude, N."""
     orbits: list[PeriodicOrbit]
-    """One at each angular frequency."""
+    """One orbit at each angular frequency."""
     ends_at: float | None
-    """Angular frequency at which the branch ends, rad/s; None where it goes on beyond the plan."""
+    """Angular frequency at which the branch ends, rad/s; None if it continues beyond the plan."""
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """What the controller is given of each orbit."""
+        """The controller's data of each orbit."""
         return [_row(orbit, self.amplitude, self.settings.law) for orbit in self.orbits]
 
     def controller(self, output: Path) -> Path:
@@ -142,17 +142,17 @@ def control_plan(scene: Scene, start: float, stop: float, settings: ControlSetti
     Parameters
     ----------
     scene : Scene
-        An oscillator on restitution stops under a harmonic force; its sweep is left out.
+        An oscillator on restitution stops under a harmonic force; its sweep is ignored.
     start, stop : float
-        rad/s.
+        First and last angular frequency, rad/s.
     settings : ControlSettings
 
     Raises
     ------
     UsageError
-        The scene has no orbits that this keeps.
+        The scene has no orbits that this control keeps.
     OrbitError
-        There is none at the start.
+        There is no such orbit at the start.
     """
     settings.refuse()
     alone = scene.unswept(varied=["forcing.angular_frequency"])
@@ -197,12 +197,12 @@ def _first(body: ImpactingBody, periods: int) -> PeriodicOrbit:
             f"control: expected an orbit P(1,{periods}) to keep at {body.angular_frequency:g}, got none there. "
             "Ask follow where there are some."
         )
-    # of several the one that is least unstable
+    # of several orbits, the least unstable
     return min(found, key=lambda orbit: float(np.abs(orbit.multipliers[0])))
 
 
 def _next(orbit: PeriodicOrbit, angular_frequency: float) -> PeriodicOrbit | None:
-    """Return the orbit of the same branch at another angular frequency; None where there is none."""
+    """Return the orbit of the same branch at another angular frequency; None if it does not exist."""
     try:
         found = find_orbit(
             _at(orbit.body, angular_frequency), orbit.phases, orbit.contacts.tolist(), orbit.periods
@@ -213,7 +213,7 @@ def _next(orbit: PeriodicOrbit, angular_frequency: float) -> PeriodicOrbit | Non
 
 
 def _end_of_branch(orbit: PeriodicOrbit, beyond: float) -> float:
-    """Return where a branch ends between an orbit and an angular frequency without one."""
+    """Return the end of a branch between an orbit and an angular frequency without one, rad/s."""
     while abs(beyond - orbit.body.angular_frequency) > NEAREST * orbit.body.angular_frequency:
         middle = 0.5 * (beyond + orbit.body.angular_frequency)
         found = _next(orbit, middle)

@@ -1,4 +1,4 @@
-"""The study `energies`: energies of the modes over the orbit next to the impacts of each run of a dataset."""
+"""The study `energies`: energies of the modes over the periodic orbit of each run of a dataset."""
 
 from __future__ import annotations
 
@@ -109,14 +109,14 @@ _OF_RUNS: Mapping[str, Callable[[OrbitEnergies], float]] = {
 }
 Found = OrbitEnergies | str
 _MANY = 5000
-"""Runs from which on it takes seconds."""
+"""Number of runs from which a progress bar is shown: they take seconds."""
 _MOST_SHOWN = 4
-"""Modes up to which the matrices of an impact are printed."""
+"""Most modes for which the matrices of an impact are printed."""
 
 
 @dataclass(eq=False)
 class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
-    """Energies of the modes: see `energies`. A row is those of a run, and how far it is from its orbit."""
+    """Energies of the modes: see `energies`. A row has the energies of a run, and its distance from its orbit."""
 
     name = "energies"
     nothing = "a run with energies"
@@ -143,9 +143,9 @@ class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
             seen.advance(1)
 
     def made(self) -> xr.Dataset:
-        """Return the energies of one run, or those of all on the dimensions of the sweep.
+        """Return the energies of one run, or of all runs on the dimensions of the sweep.
 
-        An only run without an orbit raises DatasetError.
+        DatasetError: a single run has no orbit.
         """
         attrs, units = runs_attributes(self.runs.attrs), units_of(self.runs)
         if self._many > 1:
@@ -157,7 +157,7 @@ class EnergiesOfRuns(RunsStudy[tuple[Found, float]]):
         return _of_one(only, distance, attrs, units)
 
     def print_results(self) -> None:
-        """Print the energies of the only orbit, or of all as a whole."""
+        """Print the energies of a single orbit, or a summary of all."""
         (_print_one if "orbit" in self.dataset.attrs else _print_all)(self.dataset)
 
 
@@ -169,28 +169,28 @@ def energies(
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        As `open_dataset` or `run` gives it, or its file or folder: of an oscillator, a chain or a beam on restitution
-        stops, with impacts.
+        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain or a beam on
+        restitution stops, and impacts are recorded.
     run : int, optional
-        `run_index` of one run alone, of which each impact is told too.
+        `run_index` of a single run; its result also has each impact.
     progress : Progress, optional
-        Told how far it is, where there are many runs.
+        Shows the progress over many runs.
 
     Returns
     -------
     xarray.Dataset
         `residual_energy`, `forcing_work`, `damping_loss`, `impact_change`, `mean_kinetic_energy` (J) of each `mode`,
-        on the dimensions of the sweep; `contact_energy`, `contact_loss`, `residual_restitution`, `impacts`, `periods`,
-        `identity_error`, `transient`; `reason`: why a run has none, else empty. Of one run also `energy_before`,
-        `energy_after`, `energy_change` at each impact, and the matrices `velocity_transfer`, `energy_transfer` of
-        each `contact`.
+        on the dimensions of the sweep. Also `contact_energy`, `contact_loss`, `residual_restitution`, `impacts`,
+        `periods`, `identity_error`, `transient`, and `reason`: why a run has no energies, else empty. A single run
+        also has `energy_before`, `energy_after`, `energy_change` at each impact, and the matrices `velocity_transfer`,
+        `energy_transfer` of each `contact`.
 
     Raises
     ------
     DatasetError
-        It has no impacts or no scene, no such run, or its only run has no orbit.
+        The dataset has no impacts or no scene, no such run, or its only run has no orbit.
     UsageError
-        The scene is none whose orbits are followed.
+        The scene's orbits cannot be followed.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def energies(
 
 
 def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
-    """Return the energies of a run, or why it has none, and how far its impacts are from its orbit."""
+    """Return the energies of a run, or why it has no energies, and the distance of its impacts from its orbit."""
     body = bodies[place]
     if reason := why_without_orbit(runs, place):
         return reason, np.nan
@@ -230,8 +230,8 @@ def _of_one(found: OrbitEnergies, distance: float, attrs: Mapping[str, Any], uni
         "impact_contact": orbit.contacts + 1,
         "transient": distance,
     }
-    said = {"orbit": orbit.name, "is_stable": int(orbit.is_stable)}
-    return TABLE.dataset(values, said | dict(attrs), units=units)
+    attributes = {"orbit": orbit.name, "is_stable": int(orbit.is_stable)}
+    return TABLE.dataset(values, attributes | dict(attrs), units=units)
 
 
 def _on_sweep(
@@ -285,9 +285,9 @@ def _print_one(found: xr.Dataset) -> None:
     )
     masses = ", ".join(f"{each:.6g}" for each in found["contact_mass"].values)
     say(f"Mass that an impact meets{', kg' if unit else ''}: {masses}.")
-    said = residual_restitution(float(found.residual_energy.sum()), met)
-    slope = f", {said.slope:.4g} per unit of residual energy" if np.isfinite(said.slope) else ""
-    say(f"Restitution from the residual energy: {said.problem or f'{said.value:.9g}{slope}'}.")
+    restitution = residual_restitution(float(found.residual_energy.sum()), met)
+    slope = f", {restitution.slope:.4g} per unit of residual energy" if np.isfinite(restitution.slope) else ""
+    say(f"Restitution from the residual energy: {restitution.problem or f'{restitution.value:.9g}{slope}'}.")
     if float(found.transient) > 1e-9:
         say(f"Recorded impacts are {float(found.transient):.1e} from the orbit: a transient is not over.")
     if found.sizes["mode"] <= _MOST_SHOWN:

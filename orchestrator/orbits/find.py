@@ -1,4 +1,4 @@
-"""The study `orbit`: periodic orbits of a scene: those of given p and q, and the one that a long run ends on."""
+"""The study `orbit`: periodic orbits of a scene with given p and q, and the orbit on which a long run ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
-from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
+from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.provenance import scene_attributes
@@ -33,13 +33,13 @@ from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "periodic orbits found by vibroimpact"
 LONGEST = 16
-"""Forcing periods of an orbit that a run is taken to end on."""
+"""Most forcing periods of an orbit on which a run may end."""
 TRANSIENT = 2000
-"""Forcing periods that a run is given to come to its orbit."""
+"""Forcing periods of a run before its orbit is read."""
 LARGEST_PHASE = 1e6
-"""Of a seed, rad: a larger one has lost digits of the turn that it is in."""
+"""Largest phase of a seed, rad; a larger phase has lost digits within its turn."""
 REPEATS = 1e-4
-"""Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
+"""Difference of phases, rad, below which a run is near an orbit; Newton's method converges from there."""
 
 
 @dataclass(eq=False)
@@ -67,14 +67,14 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     @classmethod
     def prepare(cls, options: FindOrbits, stack: ExitStack) -> Self:
-        """Open the scene, at the values of the run that the orbit is one of."""
+        """Open the scene, at the values of the run that is on the orbit."""
         refuse_contradictions(options)
         changes = options.changes or ()
-        first = begun(options, opened_scene(options.scene, changes, for_orbits=True), changes)
+        first = orbit_start(options, opened_scene(options.scene, changes, for_orbits=True), changes)
         return cls(first.scene, first.impacts, first.periods, first.seed, options.penetrating)
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
-        """Look for the orbit near to the seed, for those that are counted, or for those of one impact and of a run."""
+        """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
         body, counts = impacting_body(self.scene), (self.impacts, self.periods)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
@@ -88,7 +88,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     @property
     def orbits(self) -> FoundOrbits:
-        """What was found, as a list that has a dataset."""
+        """All found orbits, as a list with a dataset."""
         return FoundOrbits(self.found, self.scene.units, self._attributes)
 
     def _attributes(self) -> dict[str, Any]:
@@ -104,12 +104,12 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     @property
     def written(self) -> xr.Dataset | None:
-        """The physical orbits; None where there is none."""
+        """The physical orbits; None without any."""
         return self.dataset if self._physical else None
 
     @property
     def drawn(self) -> FoundOrbits | None:
-        """All orbits; None where there is none."""
+        """All orbits; None without any."""
         return self.orbits if self.found else None
 
     def print_results(self) -> None:
@@ -118,7 +118,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             f"Periodic orbits: {self.scene.title or self.scene.source}",
             *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
             *("<largest multipliers", ">determinant, off by", ">nearest maximum"),
-            rows=map(_told, self.found),
+            rows=map(_row, self.found),
         )
         if self.found:
             wide_terminal().print(rows)
@@ -127,7 +127,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     @property
     def _called(self) -> str:
-        """What the orbits that are looked for are called."""
+        """Description of the orbits in search."""
         if self.seed is not None:
             return "near to the seed"
         if self.impacts is None and self.periods is None:
@@ -135,7 +135,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
         return f"P({self.impacts or 1},{self.periods or 1})"
 
     def conclude(self, options: FindOrbits) -> None:
-        """Say where no dataset was written."""
+        """Say that no dataset was written."""
         if options.output is not None and not self._physical:
             say(f"{options.output} is not written: it would hold no orbit.")
 
@@ -174,7 +174,7 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
 
 @contextmanager
 def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats | None]]:
-    """Yield what runs a scene long at some values of its keys, and returns its last impacts as `RunRecord` has them."""
+    """Yield a function that runs a scene long at values of its keys, and returns its last impacts (`RunRecord`)."""
     long = scene.with_values(
         {
             "record.transient_periods": TRANSIENT,
@@ -187,13 +187,13 @@ def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats |
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
-    """Return the orbit that a long run of a scene ends on; None where it ends on none of few periods."""
+    """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as impacts_at:
         return orbit_of_impacts(impacting_body(scene), impacts_at({}))
 
 
 def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit | None:
-    """Return the orbit that the last impacts of a run are on; None where they are on none of few periods."""
+    """Return the orbit of the last impacts of a run; None unless it has few periods."""
     if rows is None or not len(rows):
         return None
     turns = np.floor(
@@ -209,13 +209,13 @@ def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit 
             continue
         try:
             orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods)
-        except (OrbitError, UsageError):  # impacts closer than phases can tell: chatter
+        except (OrbitError, UsageError):  # chatter: impacts closer than phases can resolve
             return None
         return orbit if orbit.is_physical else None
     return None
 
 
-def _told(orbit: PeriodicOrbit) -> tuple[str, ...]:
+def _row(orbit: PeriodicOrbit) -> tuple[str, ...]:
     off = orbit.determinant / orbit.exact_determinant - 1.0 if orbit.exact_determinant > 0.0 else np.nan
     return (
         orbit.name,

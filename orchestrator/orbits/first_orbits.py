@@ -1,4 +1,4 @@
-"""The orbits of a scene that branches begin at."""
+"""The first orbits of a scene's branches."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.scene import Scene
 
 SEEDS = 25
-"""Values of the parameter at which orbits are looked for to begin with."""
+"""Values of the parameter at which first orbits are searched."""
 
 
 def first_orbits(
@@ -28,14 +28,14 @@ def first_orbits(
     seed: Seed | None,
     looking: Callable[[float], None] = lambda value: None,
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
-    """Return values of the parameter and a physical orbit at each; several may lie on one branch.
+    """Yield values of the parameter and a physical orbit at each; several may lie on one branch.
 
-    The parameter is a key of the scene, whose own value a seed belongs to; the settings have its range. p and q are
-    `impacts` and `periods`: one impact, or as many as the seed has. The impacts of a seed, each a phase and a stop, are
-    near to those of the only orbit. `looking` hears of each value at which many starts are tried.
+    The parameter is a key of the scene. A seed belongs to the scene's own value of it. The settings have its range. p
+    and q are `impacts` and `periods`: one impact by default, or as many as the seed has. The impacts of a seed, each a
+    phase and a stop, are near those of the only orbit. `looking` is called with each value at which many starts are
+    tried.
 
-    UsageError: there is no such seed in the scene or in the range. OrbitError: there is no physical orbit near to the
-    seed.
+    UsageError: the seed does not fit the scene or the range. OrbitError: there is no physical orbit near the seed.
     """
     if seed is not None:
         yield _of_seed(scene, parameter, settings, seed, impacts, periods)
@@ -46,7 +46,7 @@ def first_orbits(
 
 
 def seed_values(settings: FollowSettings) -> list[float]:
-    """Return values of the parameter at which orbits are looked for."""
+    """Return the values of the parameter at which orbits are searched."""
     return [float(each) for each in np.linspace(settings.lowest, settings.highest, SEEDS + 2)[1:-1]]
 
 
@@ -72,7 +72,7 @@ def _of_many_impacts(
     periods: int,
     looking: Callable[[float], None],
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
-    """Return orbits at values of the range, first at the scene's own: a branch may lie between the others."""
+    """Yield orbits at values of the range, first at the scene's own: a branch may lie between the others."""
     own = float(scene.value(parameter))
     inside = [own] if settings.lowest <= own <= settings.highest else []
     for value in [*inside, *seed_values(settings)]:

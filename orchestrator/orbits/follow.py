@@ -1,4 +1,4 @@
-"""The study `follow`: orbits over one number of a scene, their bifurcations over two, and where they change."""
+"""The study `follow`: orbits over one number of a scene, and their bifurcations over two numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.follow import Follow
-from vibroimpact.orchestrator.orbits.beginning import begun, files_of, refuse_contradictions
+from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
 from vibroimpact.orchestrator.orbits.branches import (
     HISTORY,
     Followed,
@@ -34,12 +34,12 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
 
 EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
-"""Digits of the value of a special point: of one that is a zero of a test, and of one that only a bracket holds."""
+"""Digits of a special point's value: for a zero of a test function, and for a bracket without a test function."""
 
 
 @dataclass(eq=False)
 class Following(Study[str]):
-    """Orbits of a scene over one of its numbers: see `vibroimpact.follow`. A row names what grew."""
+    """Orbits of a scene over one of its numbers: see `vibroimpact.follow`. A row names the branch or locus at work."""
 
     name = "follow"
     nothing = "an orbit"
@@ -71,11 +71,11 @@ class Following(Study[str]):
 
     @classmethod
     def prepare(cls, options: Follow, stack: ExitStack) -> Self:
-        """Open the scene, at the values of the run that the orbit is one of."""
+        """Open the scene, at the values of the run that is on the orbit."""
         refuse_contradictions(options)
         changes, second_range = options.changes or (), _second_range(options)
         opened = opened_scene(options.scene, changes, for_orbits=True)
-        first = begun(options, opened, changes, [options.parameter])
+        first = orbit_start(options, opened, changes, [options.parameter])
         return cls(
             *(first.scene, options.parameter, options.start, options.stop),
             impacts=first.impacts,
@@ -88,7 +88,7 @@ class Following(Study[str]):
         )
 
     def rows(self) -> Generator[str, None, None]:
-        """Follow branches, then the bifurcations on them."""
+        """Follow branches, then their bifurcations."""
         first, *others = self._settings()
         for each in others:
             refuse_second(self.loci, each)
@@ -121,11 +121,11 @@ class Following(Study[str]):
         return not self.followed.branches
 
     def made(self) -> xr.Dataset:
-        """Return the curves over two numbers where there are some, else the branches."""
+        """Return the curves over two numbers if there are any, else the branches."""
         return self.loci.dataset if self.loci.loci else self.followed.dataset
 
     def print_results(self) -> None:
-        """Print what happens on each branch, and each curve."""
+        """Print the special points of each branch, and each curve."""
         self._print_points()
         self._print_branches()
         self._print_unexplained()
@@ -137,7 +137,7 @@ class Following(Study[str]):
             say(self.loci.left_out)
 
     def conclude(self, options: Follow) -> None:
-        """Say what the dataset holds where two numbers were varied."""
+        """Say whether the dataset holds curves or branches after a study over two numbers."""
         output = options.output
         if output is not None and self.loci.loci:
             say(f"{output} has the curves over both numbers; branches are written without --second.")
@@ -195,7 +195,7 @@ class Following(Study[str]):
 
 
 def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:
-    """Return what happens at a special point, its value, and velocities and multipliers of its orbit."""
+    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts."""
     orbit = point.at.orbit
     largest = (
         "" if point.kind == "graze" else ", ".join(multiplier_text(each) for each in orbit.multipliers[:2])
@@ -206,7 +206,7 @@ def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:
 
 
 def _second_range(options: Follow) -> tuple[float, float] | None:
-    """Return the range of the second number; UsageError if it is half given, or empty."""
+    """Return the range of the second number; UsageError if it is incomplete or empty."""
     low, high = options.second_start, options.second_stop
     given = (options.second is not None, low is not None, high is not None)
     if any(given) and not all(given):

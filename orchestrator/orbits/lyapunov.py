@@ -41,12 +41,12 @@ TABLE = ResultTable(
 
 _NUMBER = re.compile(r"\d+")
 _MOST_SHOWN = 30
-"""Runs that are told one by one."""
+"""Most runs in the printed table."""
 
 
 @dataclass(eq=False)
 class ExponentsOfRuns(RunsStudy[Exponents | str]):
-    """Lyapunov exponents of the runs of a dataset; a row is those of a run, or why it has none."""
+    """Lyapunov exponents of the runs of a dataset; a row has the exponents of a run, or the reason for none."""
 
     name = "lyapunov"
     nothing = "a run with exponents"
@@ -65,12 +65,12 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         return _on_sweep(self.runs, [*self.found, *[self.left_out] * many], 2 * self._bodies.most_modes)
 
     def print_results(self) -> None:
-        """Print the exponents of runs, and how many have none; DatasetError where no run has exponents."""
+        """Print the exponents of runs, and the number of runs without; DatasetError if no run has exponents."""
         reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
         counts = _counted([text for text in reasons if text])
         if all(reasons):
-            told = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
-            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {told}")
+            summary = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
+            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {summary}")
         _print(self.dataset)
         for words, count in counts:
             say(f"{count} without: {words}")
@@ -82,22 +82,23 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        As `open_dataset` or `run` gives it, or its file or folder: of an oscillator, a chain or a beam on restitution
-        stops, with impacts: 200 that count, or two rounds of a periodic orbit.
+        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain or a beam on
+        restitution stops. 200 impacts must count, or two rounds of a periodic orbit.
 
     Returns
     -------
     xarray.Dataset
-        `lyapunov_exponent` per impact and `standard_error` along `exponent`, the largest first, on the dimensions of
-        the sweep; `impact_interval` (s): exponents over it are those per second; `dimension` (Kaplan-Yorke),
-        `impacts` that counted, `sum_error`; `reason`: why a run has none, else empty.
+        On the dimensions of the sweep: `lyapunov_exponent` per impact and `standard_error` along `exponent`, the
+        largest first. `impact_interval` (s) is the mean time between impacts; the exponent over it is the exponent per
+        second. Also `dimension` (Kaplan-Yorke), `impacts` that counted, `sum_error`, and `reason`: why a run has no
+        exponents, else empty.
 
     Raises
     ------
     DatasetError
-        It has no impacts, or no scene.
+        The dataset has no impacts, or no scene.
     UsageError
-        The scene is none whose orbits are followed.
+        The scene's orbits cannot be followed.
 
     Examples
     --------
@@ -146,7 +147,7 @@ def _on_sweep(dataset: xr.Dataset, found: list[Exponents | str], most: int) -> x
 
 
 def _counted(reasons: Sequence[str]) -> list[tuple[str, int]]:
-    """Return reasons with how many runs have them, the commonest first; of those that differ by numbers, the first."""
+    """Return reasons with their numbers of runs, the commonest first; reasons that differ by numbers share a line."""
     kinds: dict[str, list[str]] = {}
     for text in reasons:
         kinds.setdefault(_NUMBER.sub("#", text), []).append(text)
@@ -181,8 +182,8 @@ def _print(found: xr.Dataset) -> None:
 
 
 def _where(one: xr.Dataset, found: xr.Dataset) -> str:
-    told = []
+    texts = []
     for name in (str(dim) for dim in found.reason.dims if str(dim) in one.coords):
         value = one[name].item()
-        told.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
-    return ", ".join(told)
+        texts.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
+    return ", ".join(texts)

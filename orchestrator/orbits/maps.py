@@ -1,4 +1,4 @@
-"""The study `maps`: where impacts and periods of a scene lead to, sets of grazing impacts, and what a graze is like."""
+"""The study `maps`: points of impact and stroboscopic maps, grazing sets, and normal forms of a graze."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ HISTORY = "maps of vibroimpact"
 MapKind = Literal["impact", "strobe", "discontinuity", "nordmark", "square-root"]
 MAP_KINDS: tuple[MapKind, ...] = ("impact", "strobe", "discontinuity", "nordmark", "square-root")
 POINTS = 1500
-"""Values of a diagram's parameter, phases of a set, unless it is said."""
+"""Default number of a diagram's parameter values, or of a set's phases."""
 MOST_POINTS = 100_000
 PART = 500
-"""Values of a diagram that are iterated together: Ctrl-C is heard in between."""
+"""Values of a diagram iterated together; Ctrl-C takes effect between two parts."""
 RHO, OFFSET = (-0.02, 0.1), (-0.01, 0.12)
-"""Ranges of the diagrams, unless they are said."""
+"""Default ranges of the diagrams."""
 CLASSES = {True: "stable", False: "unstable"}
 STATES = ResultTable(
     "maps",
@@ -73,19 +73,19 @@ IMPACTS = ResultTable(
     ("after_phase", "graze", "rad", "W: forcing phase of the impact after the graze"),
     ("after_velocity", "graze", "m s-1", "W: velocity of the impact after the graze"),
 )
-"""Variables of an impact map; those of grazes are there with the kind `discontinuity`."""
+"""Variables of an impact map; the variables of grazes exist with the kind `discontinuity`."""
 _SETS = {
     "grazes": "graze_phase",
     **{name: name for name in ("before_phase", "before_velocity", "after_phase", "after_velocity")},
 }
-"""Variables of the sets of grazing impacts, by their names in what is found of them."""
+"""Variables of the sets of grazing impacts, with the names of their attributes."""
 NORDMARK = ResultTable(
     "maps",
     ("rho", "rho", "1", "distance from the graze in Nordmark's map"),
     ("x", "rho step", "1", "virtual penetration in Nordmark's map"),
     ("forcing_amplitude", "rho", "N", "forcing amplitude"),
 )
-"""Variables of the diagram of Nordmark's map; the last is there with a scene."""
+"""Variables of the diagram of Nordmark's map; `forcing_amplitude` exists with a scene."""
 SQUARE_ROOT = ResultTable(
     "maps",
     ("d", "d", "1", "offset of the square-root map"),
@@ -96,7 +96,7 @@ SQUARE_ROOT = ResultTable(
 
 @dataclass(frozen=True, slots=True)
 class MapSettings:
-    """Which map, and of what.
+    """Kind of a map, and its numbers.
 
     Attributes
     ----------
@@ -104,9 +104,9 @@ class MapSettings:
     span : tuple of float, or None
         Range of rho (nordmark) or d (square-root).
     points : int
-        Values in it; phases of the sets of discontinuity.
+        Number of values in the range, or of phases in the sets of `discontinuity`.
     alpha, gamma, restitution : float or None
-        Of the Nordmark map; None: those of the scene.
+        Numbers of the Nordmark map; None: from the scene.
     slope : float
         lambda of the square-root map.
     """
@@ -120,7 +120,7 @@ class MapSettings:
     slope: float | None = None
 
     def refuse(self) -> None:
-        """Raise UsageError if these are settings of no map."""
+        """Raise UsageError unless the settings fit the kind of map."""
         if self.kind not in MAP_KINDS:
             raise UsageError(f"maps: kind: expected one of {', '.join(MAP_KINDS)}, got {self.kind!r}.")
         if not 10 <= self.points <= MOST_POINTS:
@@ -156,12 +156,12 @@ class MapSettings:
 
 
 def settings_of(kind: str, **options: Any) -> MapSettings:
-    """Return settings whose kind comes from outside.
+    """Return checked settings for a kind given as text.
 
     Raises
     ------
     UsageError
-        They are none of a map.
+        The settings fit no map.
     """
     settings = MapSettings(cast("MapKind", kind), **options)
     settings.refuse()
@@ -170,7 +170,7 @@ def settings_of(kind: str, **options: Any) -> MapSettings:
 
 @dataclass(eq=False)
 class MapOfScene(Study[str]):
-    """A map as points to be drawn: see `vibroimpact.maps`. A row is the name of a part of it that is found."""
+    """The points of a map, to be drawn: see `vibroimpact.maps`. A row is the name of a finished part."""
 
     name = "maps"
     nothing = "a map"
@@ -204,9 +204,9 @@ class MapOfScene(Study[str]):
         return cls(None, settings)
 
     def rows(self) -> Generator[str, None, None]:
-        """Find part after part.
+        """Find the parts of the map, one after the other.
 
-        UsageError: the scene has no such map. OrbitError: the body has several modes, where the map is one of one mode.
+        UsageError: the scene has no such map. OrbitError: the map needs one mode, and the body has several.
         """
         kind = self.settings.kind
         if kind == "square-root":
@@ -228,21 +228,21 @@ class MapOfScene(Study[str]):
         return found.assign_attrs(attributes | {"map": kind, "history": HISTORY})
 
     def print_results(self) -> None:
-        """Print what the map has."""
-        _tell(self.dataset)
+        """Print a summary of the map."""
+        _print_map(self.dataset)
 
     def _of_impacts(self, scene: Scene) -> Generator[str, None, None]:
         body = impacting_body(scene)
         is_strobe, has_sets = self.settings.kind == "strobe", self.settings.kind == "discontinuity"
         if has_sets:
-            one_mode(body)  # refused before anything is found
+            one_mode(body)  # refused before any computation
             self.values |= dict.fromkeys(_SETS.values(), np.empty(0))
         across = "displacement" if is_strobe else "phase"
         states = _run(scene, strobe=is_strobe)
         self._mark([], across)
         self.values |= {across: states[:, 0], "velocity": states[:, 1]}
         yield "states"
-        with suppress(OrbitError):  # a body without losses has families of them, of which none is marked
+        with suppress(OrbitError):  # a body without losses has families of orbits: no single orbit to mark
             self._mark(find_orbits(scene, 1, 1), across)
         yield "orbits"
         if has_sets:
@@ -282,7 +282,7 @@ class MapOfScene(Study[str]):
     def _diagram(
         self, name: str, span: tuple[float, float], states_at: Callable[[Floats], Floats]
     ) -> Iterator[Floats]:
-        """Yield the values of a diagram whose states are known, part after part."""
+        """Yield the diagram's values, part after part, each time its states are known."""
         values = np.linspace(*(self.settings.span or span), self.settings.points)
         parts: list[Floats] = []
         for begin in range(0, values.size, PART):
@@ -318,7 +318,7 @@ def _strobed(orbit: PeriodicOrbit) -> tuple[float, float]:
 
 
 def _named(orbit: PeriodicOrbit) -> str:
-    """Return what an orbit is: of one mode by its two multipliers, else whether it is stable."""
+    """Return the class and name of an orbit: by its two multipliers for one mode, else by its stability."""
     multipliers = orbit.multipliers
     if multipliers.size != 2 or not np.isfinite(multipliers).all():
         return f"{CLASSES[orbit.is_stable]} {orbit.name}"
@@ -334,7 +334,7 @@ def _impact(orbit: PeriodicOrbit) -> tuple[float, float]:
 
 
 def _nordmark(scene: Scene | None, settings: MapSettings) -> tuple[Nordmark, GrazingFamily | None]:
-    """Return Nordmark's map, and how the scene comes to its graze where the map is that of a scene."""
+    """Return Nordmark's map, and for a map from a scene its path to the graze."""
     if settings.alpha is not None and settings.gamma is not None:
         restitution = 1.0 if settings.restitution is None else settings.restitution
         return Nordmark(settings.alpha, settings.gamma, restitution), None
@@ -367,10 +367,10 @@ def _settings(options: Maps) -> MapSettings:
     )
 
 
-def _tell(found: xr.Dataset) -> None:
+def _print_map(found: xr.Dataset) -> None:
     kind = found.attrs["map"]
     if kind in ("nordmark", "square-root"):
-        _tell_diagram(found, "rho" if kind == "nordmark" else "d")
+        _print_diagram(found, "rho" if kind == "nordmark" else "d")
         return
     say(f"{counted(found.sizes['state'], 'state' if kind == 'strobe' else 'impact')} of a run.")
     for name in found["orbit_name"].values:
@@ -382,7 +382,7 @@ def _tell(found: xr.Dataset) -> None:
         )
 
 
-def _tell_diagram(found: xr.Dataset, name: str) -> None:
+def _print_diagram(found: xr.Dataset, name: str) -> None:
     if name == "rho":
         numbers = {key: float(found.attrs[key]) for key in ("alpha", "gamma", "restitution")}
         say(", ".join(f"{key} {value:.8g}" for key, value in numbers.items()) + ".")

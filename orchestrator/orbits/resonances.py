@@ -1,4 +1,4 @@
-"""The study `resonances`: peaks of a response over the forcing frequency, beside the shifted natural frequencies."""
+"""The study `resonances`: peaks of a response over the forcing frequency, and the shifted natural frequencies."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ TABLE = ResultTable(
     ("mode", "mode", "1", "number of the mode, the slowest first"),
 )
 _KEYS = {"forcing.angular_frequency": 1.0, "forcing.frequency": 2.0 * np.pi}
-_SAME = 1e-9
+_AGREEMENT = 1e-9
 
 
 class _Found(NamedTuple):
-    """A peak: of which quantity, on which branch."""
+    """A peak with its quantity and branch."""
 
     quantity: str
     branch: int
@@ -72,7 +72,7 @@ class PeaksOfSweep(RunsStudy[tuple[OrbitEnergies | str, float]]):
             yield row
 
     def made(self) -> xr.Dataset:
-        """Return the peaks; DatasetError where there is none."""
+        """Return the peaks; DatasetError without any."""
         self._energies.incomplete = self.incomplete
         exchanged, body, name = self._energies.dataset, impacting_body(self._scene), self._name
         order = [name] if "direction" not in self.runs["outcome"].dims else ["direction", name]
@@ -118,29 +118,30 @@ class PeaksOfSweep(RunsStudy[tuple[OrbitEnergies | str, float]]):
 
 
 def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
-    """Return the peaks of the response of a body over the forcing frequency, of the whole body and of each mode.
+    """Return the peaks of the response of a body over the forcing frequency, for the whole body and each mode.
 
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        As `open_dataset` or `run` gives it, or its file or folder: a sweep of `forcing.angular_frequency` or
-        `forcing.frequency` alone, of an oscillator, a chain or a beam on restitution stops, with impacts and extrema.
+        As `open_dataset` or `run` gives it, or its file or folder. Only `forcing.angular_frequency` or
+        `forcing.frequency` is swept. The body is an oscillator, a chain or a beam on restitution stops, and impacts
+        and extrema are recorded.
 
     Returns
     -------
     xarray.Dataset
         Along `peak`: `quantity` (displacement_range, impact_velocity, mean_kinetic_energy of a mode), `branch`,
-        `peak_frequency`, `peak_height`, `grid_step`, `motion` (P(p,q), or why it has no period); `stop_ratio` of
-        the first stop over the deepest excursion on the other side; `shifted_frequency` of each `mode` at that ratio,
-        thesis (2.35): right for one mode, elastic, undamped and unforced, else a guess. And what peaks are of, along
-        `branch` and the frequency. Frequencies are angular ones, rad/s.
+        `peak_frequency`, `peak_height`, `grid_step`, `motion` (P(p,q), or why it has no period). Also `stop_ratio`:
+        position of the first stop over the deepest excursion on the other side. `shifted_frequency` of each `mode` at
+        that ratio is thesis (2.35): right for one mode, elastic, undamped and unforced, else a guess. The curves with
+        the peaks are given along `branch` and the frequency. Frequencies are angular ones, rad/s.
 
     Raises
     ------
     DatasetError
-        It is another sweep, or nothing was recorded that has peaks.
+        The sweep is another one, or no quantity with peaks was recorded.
     UsageError
-        The scene is none whose orbits are followed.
+        The scene's orbits cannot be followed.
 
     Examples
     --------
@@ -150,7 +151,7 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
 
 
 def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:
-    """Return the peaks of curves, each of shape (branch, frequency); DatasetError where there is none."""
+    """Return the peaks of curves, each of shape (branch, frequency); DatasetError without any."""
     found = [
         _Found(quantity, branch, peak)
         for quantity, branches in curves.items()
@@ -163,15 +164,15 @@ def _peaks(curves: Mapping[str, Floats], frequency: Floats) -> list[_Found]:
 
 
 def _shifted(ratio: Floats, body: ImpactingBody) -> Floats:
-    """Return the natural frequencies that a stop shifts, shape (peak, mode)."""
+    """Return the natural frequencies shifted by a stop, shape (peak, mode)."""
     shifted = np.full((ratio.size, body.frequencies.size), np.nan)
-    known = (ratio > -1.0) & (ratio <= 1.0 + _SAME)
+    known = (ratio > -1.0) & (ratio <= 1.0 + _AGREEMENT)
     shifted[known] = frequency_shift(ratio[known])[:, None] * body.frequencies
     return shifted
 
 
 def _swept(dataset: xr.Dataset, scene: Scene) -> tuple[str, float]:
-    """Return the dimension of the frequency, and what makes it an angular one."""
+    """Return the dimension of the frequency, and the factor to an angular frequency."""
     keys = [axis.key for axis in scene.sweep]
     dims = [str(dim) for dim in dataset["outcome"].dims if dim != "direction"]
     if len(keys) != 1 or keys[0] not in _KEYS or len(dims) != 1 or dims[0] == "run":
@@ -197,7 +198,7 @@ def _curves(
     is_free = (exchanged["reason"].transpose(*order).values == NO_IMPACTS).reshape(-1, count)
     for mode, values in enumerate(kinetic):
         w, z = body.frequencies[mode], body.damping_ratios[mode]
-        # the steady response, equations.md 1.3; without bound where an undamped mode resonates
+        # the steady response, equations.md 1.3; NaN where an undamped mode resonates
         stiffness = np.abs(w**2 - frequency**2 + 2j * z * w * frequency)
         speed = np.divide(
             frequency * body.force[mode], stiffness, out=np.full(count, np.nan), where=stiffness > 0.0
@@ -206,12 +207,12 @@ def _curves(
 
 
 def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: int) -> Floats:
-    """Return position of the first stop over the deepest excursion on the other side; NaN where it is not recorded."""
+    """Return position of the first stop over the deepest excursion on the other side; NaN if extrema are missing."""
     contact = body.contacts[0]
     side = "displacement_min" if contact.direction > 0.0 else "displacement_max"
     nothing = np.full((dataset["outcome"].size // count, count), np.nan)
     size = float(np.abs(contact.shape).max())
-    if side not in dataset or np.abs(contact.shape - body.observed).max() > _SAME * size:
+    if side not in dataset or np.abs(contact.shape - body.observed).max() > _AGREEMENT * size:
         return nothing
     rest = contact.direction * float(contact.shape @ (body.held / body.frequencies**2))
     extreme = dataset[side] if "period" not in dataset[side].dims else dataset[side].min("period")
@@ -225,11 +226,11 @@ def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: 
 def _motions(exchanged: xr.Dataset, order: list[str]) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
     impacts, periods = (exchanged[name].transpose(*order).values for name in ("impacts", "periods"))
     reasons = exchanged["reason"].transpose(*order).values
-    told = [
+    texts = [
         f"P({p:.0f},{q:.0f})" if np.isfinite(p) else str(reason).split(":")[0]
         for p, q, reason in zip(impacts.ravel(), periods.ravel(), reasons.ravel(), strict=True)
     ]
-    return np.array(told, dtype=object)
+    return np.array(texts, dtype=object)
 
 
 def _cells(found: xr.Dataset) -> Iterator[tuple[str, ...]]:
@@ -245,7 +246,7 @@ def _cells(found: xr.Dataset) -> Iterator[tuple[str, ...]]:
 
 
 def _nearest(at: float, frequencies: Floats) -> str:
-    """Return the mode whose frequency is nearest to a peak, and how far off the peak is."""
+    """Return the mode whose frequency is nearest to a peak, and the relative distance of the peak."""
     if not np.isfinite(frequencies).all():
         return "-"
     mode = int(np.argmin(np.abs(np.log(frequencies / at))))

@@ -1,4 +1,4 @@
-"""The runs of a dataset of impacting bodies: the scene, the body and the impacts of each."""
+"""The runs of a dataset of impacting bodies: the scene, and the body and impacts of each run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Row = TypeVar("Row")
 
 
 class OfRuns(Protocol):
-    """Arguments that say which runs are meant."""
+    """Arguments that select runs."""
 
     @property
     def file(self) -> Path:
@@ -45,7 +45,7 @@ class OfRuns(Protocol):
 
 @dataclass(eq=False)
 class RunsStudy(Study[Row]):
-    """A study of the runs of a dataset, or of those of a scene, which are run first."""
+    """A study of the runs of a dataset, or of a scene, which runs first."""
 
     runs: xr.Dataset
     """As `open_dataset` or `run` gives it."""
@@ -62,15 +62,15 @@ class RunsStudy(Study[Row]):
 
     @property
     def left_out(self) -> str:
-        """Why runs that were not looked at have no result."""
+        """Reason for runs without a result because of an early end."""
         return f"not looked at: {self.incomplete}"
 
 
 @contextmanager
 def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
-    """Open the runs of a dataset; those of a scene are run first.
+    """Open the runs of a dataset, or run a scene and open its runs.
 
-    UsageError: the scene is none whose orbits are followed, or a dataset is to be changed.
+    UsageError: the scene's orbits cannot be followed, or changes are given for a dataset.
     """
     if path.is_dir() or path.suffix.lower() == DATASET_ENDING:
         if changes:
@@ -112,7 +112,7 @@ def scene_of(dataset: xr.Dataset, who: str) -> Scene:
 
 
 def place_of(runs: xr.Dataset, run: int, who: str) -> int:
-    """Return where in a table of runs a run_index is."""
+    """Return the row of a run_index in a table of runs."""
     there = np.flatnonzero(runs["run_index"].values == run)
     if not there.size:
         known = runs["run_index"].values
@@ -123,7 +123,7 @@ def place_of(runs: xr.Dataset, run: int, who: str) -> int:
 
 
 def why_without_orbit(runs: xr.Dataset, place: int) -> str:
-    """Return why a run cannot have an orbit of finitely many impacts; empty where it may."""
+    """Return the reason that a run has no orbit of finitely many impacts; empty if it may have one."""
     outcome = Outcome(int(runs["outcome"].values[place]))
     if outcome is not Outcome.ok:
         return f"outcome {outcome.name}"
@@ -140,7 +140,7 @@ def units_of(dataset: xr.Dataset) -> UnitSystem:
 
 
 class OnSweep:
-    """Places what belongs to runs on the dimensions of their dataset.
+    """Places values of runs on the dimensions of their dataset.
 
     `dims` are dimensions of the runs, `coords` their coordinates, each with a unit and a name in words.
     """
@@ -168,7 +168,7 @@ class OnSweep:
         return np.asarray(np.concatenate([values, nothing])[self._index])
 
     def texts(self, values: Sequence[str]) -> Any:
-        """Return texts of runs on the dimensions, a single one as it is; `no run` where there is none."""
+        """Return texts of runs on the dimensions, a single text as it is; `no run` without a run."""
         return np.array([*values, "no run"], dtype=object)[self._index]
 
 

@@ -1,4 +1,4 @@
-"""Seeds of orbits: impacts near to those of an orbit, given by hand or recorded by a run."""
+"""Seeds of orbits: impacts near those of an orbit, given by hand or recorded in a run."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, place_of, sc
 from vibroimpact.orchestrator.run.dataset import coordinate_names
 
 Seed = Sequence[tuple[float, int]]
-"""Forcing phase, rad, and stop, from 1, of each impact of a train to begin with."""
+"""Forcing phase, rad, and stop, from 1, of each impact of a first guess."""
 
 
 class RunSeed(NamedTuple):
-    """Seed that the last round of a run's impacts gives.
+    """The seed from the last round of a run's impacts.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class RunSeed(NamedTuple):
     periods : int
         q of P(p,q).
     values : dict of str to float
-        What the run has of each key that its scene sweeps.
+        The run's value of each key that its scene sweeps.
     """
 
     impacts: list[tuple[float, int]]
@@ -38,21 +38,21 @@ class RunSeed(NamedTuple):
 
 
 def seed_of_run(dataset: xr.Dataset | str | PathLike[str], run: int | None = None) -> RunSeed:
-    """Return the seed of the orbit that a run of a dataset ends on.
+    """Return the seed of the orbit on which a run of a dataset ends.
 
     Parameters
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder; with impacts.
     run : int, optional
-        `run_index`; not needed of an only run.
+        `run_index`; optional for a single run.
 
     Raises
     ------
     DatasetError
-        It has no impacts or no scene, no such run, or the run has no periodic orbit.
+        The dataset has no impacts or no scene, no such run, or the run has no periodic orbit.
     UsageError
-        The scene is none whose orbits are followed.
+        The scene's orbits cannot be followed.
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""The study `transients`: how many periods a scene needs to forget its start.
+"""The study `transients`: the number of periods in which a scene forgets its start.
 
-Motions from other starts are followed beside the scene's own, and compared at each forcing phase 0. Near to a periodic
-motion their distance falls by a constant factor a period: the largest Floquet multiplier of the orbit (of the body
-without impacts: exp(-zeta omega T) of its slowest mode). Further away anything may happen, which is why starts at the
-size of the motion are followed as well as near ones.
+Motions from other starts are followed next to the scene's own, and compared at each forcing phase 0. Near a periodic
+motion their distance falls by a constant factor a period. This factor is the largest Floquet multiplier of the orbit;
+for the body without impacts it is exp(-zeta omega T) of its slowest mode. Further away the distance may do anything.
+Starts at the size of the motion are therefore followed as well as near ones.
 """
 
 from __future__ import annotations
@@ -48,27 +48,27 @@ TABLE = ResultTable(
 )
 MOST_STARTS, MOST_PERIODS = 1000, 1_000_000
 SMALL, ROUNDING = 1e-2, 1e-13
-"""Distances between which the contraction is measured: above the motion is not linear, below it is rounding."""
+"""Range of distances for the contraction: above SMALL the motion is not linear, below ROUNDING is rounding."""
 FURTHER = 1e-2
-"""Part of the tolerance down to which starts are followed, so that the contraction is seen."""
+"""Part of the tolerance down to which starts are followed, so that their contraction is measured."""
 FEWEST = 3
-"""Periods from which the contraction is told."""
+"""Fewest periods for a measured contraction."""
 SAME = 1e-4
-"""Distance over the size of the motion at which two states are on one orbit."""
+"""Distance over the size of the motion, below which two states are on one orbit."""
 LOOKS = (100, 200, 400, 800, 1600)
-"""Periods after which it is looked whether all starts have come to where they stay."""
+"""Periods after which the study checks whether all starts have reached their final motion."""
 SURVEY = 50
-"""Periods of the scene's own motion that its size is taken from."""
+"""Periods of the scene's own motion that define its size."""
 DRAWS = 100
-"""Draws of a start, of which one has to be on the free side of the stops."""
+"""Draws of a start, of which at least one must be on the free side of the stops."""
 FORGOTTEN, ELSEWHERE, SHIFTED, CHAOTIC, SLOW, LOST = (
     *("forgotten", "another attractor", "the same orbit, whole periods apart"),
     *("chaotic: nothing is forgotten", "not forgotten yet", "the run failed"),
 )
 
 
-class Told(NamedTuple):
-    """Classes of all motions, the scene's own first, and what became of each start."""
+class Verdicts(NamedTuple):
+    """Classes of all motions, the scene's own first, and the end of each start."""
 
     motions: list[str]
     ends: list[str]
@@ -76,7 +76,7 @@ class Told(NamedTuple):
 
 @dataclass(eq=False)
 class Transients(Study[Floats]):
-    """Distances of starts from a scene's own motion: see `vibroimpact.transients`. A row is those of one period."""
+    """Distances of starts from a scene's own motion: see `vibroimpact.transients`. A row has those of one period."""
 
     name = "transients"
     nothing = "a period"
@@ -104,7 +104,7 @@ class Transients(Study[Floats]):
         return cls(opened, options.starts, options.spread, options.tolerance, options.periods)
 
     def rows(self) -> Generator[Floats, None, None]:
-        """Follow all starts from one phase 0 to the next, until they are near, or there are no more periods."""
+        """Follow all starts from one phase 0 to the next, until all are near or the periods are over."""
         flow = BodyFlow(self.scene, workers=1)
         try:
             self._scale = _size(flow, self.body)
@@ -119,10 +119,10 @@ class Transients(Study[Floats]):
                 if not (distances > FURTHER * self.tolerance).any():
                     break
                 if period + 1 in LOOKS:
-                    self._told = self._what_became(flow, states)
-                    if SLOW not in self._told.ends and CHAOTIC not in self._told.ends:
+                    self._verdicts = self._what_became(flow, states)
+                    if SLOW not in self._verdicts.ends and CHAOTIC not in self._verdicts.ends:
                         return
-            self._told = self._what_became(flow, states)
+            self._verdicts = self._what_became(flow, states)
         finally:
             flow.close()
 
@@ -148,37 +148,37 @@ class Transients(Study[Floats]):
 
     @property
     def linear_contraction(self) -> float:
-        """Factor a period of the body without impacts: that of its slowest mode."""
+        """Factor per period of the body without impacts, in its slowest mode."""
         decay = float((self.body.damping_ratios * self.body.frequencies).min())
         return math.exp(-decay * self.body.period)
 
     def made(self) -> xr.Dataset:
-        """Return the distances, and what became of each start."""
+        """Return the distances, and the end of each start."""
         distances = np.array(self.found).T
         after = [_after(row, self.tolerance) for row in distances]
         ends = [FORGOTTEN if math.isfinite(each) else SLOW for each in after]
-        told = Told(["unknown"] * (self.starts + 1), ends) if self.incomplete else self._told
+        verdicts = Verdicts(["unknown"] * (self.starts + 1), ends) if self.incomplete else self._verdicts
         values = {
             "period": np.arange(distances.shape[1]),
             "distance": distances,
             "first_distance": self._first,
             "forgotten_after": after,
             "contraction": [_contraction(row) for row in distances],
-            "motion": told.motions[1:],
-            "end": told.ends,
+            "motion": verdicts.motions[1:],
+            "end": verdicts.ends,
         }
         attributes = scene_attributes(self.scene, HISTORY) | {
             "units_system": self.scene.units,
             "tolerance": self.tolerance,
             "linear_contraction": self.linear_contraction,
-            "motion": told.motions[0],
+            "motion": verdicts.motions[0],
             "period_length": self.body.period,
             "period_of": "the force" if self.is_forced else "the first mode",
         }
         return TABLE.dataset(values, attributes, units=self.scene.units)
 
-    def _what_became(self, flow: BodyFlow, states: Floats) -> Told:
-        """Return the class of each motion, and what became of each start, by runs from the states now."""
+    def _what_became(self, flow: BodyFlow, states: Floats) -> Verdicts:
+        """Return the class of each motion, and the end of each start, by runs from the present states."""
         (own, *others), last = flow.classes(states, 0)
         orbit = [last[0]]
         for _ in range(1, own.periods):
@@ -188,13 +188,13 @@ class Transients(Study[Floats]):
             self._end(distances[:, place], own, kind, (last[place + 1] - np.array(orbit)) / self._scale)
             for place, kind in enumerate(others)
         ]
-        return Told([kind.name for kind in (own, *others)], ends)
+        return Verdicts([kind.name for kind in (own, *others)], ends)
 
     def _end(self, distances: Floats, own: RunClass, kind: RunClass, apart: Floats) -> str:
-        """Return what became of a start.
+        """Return the end of a start.
 
-        Distances are those from the scene's own motion, period by period; `apart`, shape (period, variable), is from
-        each state of the scene's orbit. `own` and `kind` are the classes of the scene's own motion and of the start.
+        `distances` are from the scene's own motion, period by period; `apart`, shape (period, variable), is from each
+        state of the scene's orbit. `own` and `kind` are the classes of the scene's own motion and of the start.
         """
         if np.isnan(distances[-1]):
             return LOST
@@ -211,7 +211,7 @@ class Transients(Study[Floats]):
         return ELSEWHERE if _stays(distances, max(own.periods, 1)) else SLOW
 
     def print_results(self) -> None:
-        """Print a row for each start, and what they say together."""
+        """Print a row for each start, and their joint result."""
         data = self.dataset
         rows = table(
             f"Transients: {self.scene.title or self.scene.source}",
@@ -233,7 +233,7 @@ class Transients(Study[Floats]):
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """Return what a dataset of transients says, a sentence a line."""
+    """Return the result of a dataset of transients as sentences."""
     ends, after = data["end"].values.tolist(), data["forgotten_after"].values
     many, tolerance = len(ends), float(data.attrs["tolerance"])
     what = "" if data.attrs["period_of"] == "the force" else " of the first mode"
@@ -268,7 +268,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 
 def _refuse(study: Transients) -> None:
-    """Raise UsageError if numbers make no study."""
+    """Raise UsageError unless the numbers are in their ranges."""
     if not 1 <= study.starts <= MOST_STARTS:
         raise UsageError(f"transients: starts: expected 1 to {MOST_STARTS}, got {study.starts}.")
     if not 1 <= study.periods <= MOST_PERIODS:
@@ -280,7 +280,7 @@ def _refuse(study: Transients) -> None:
 
 
 def _with_the_first_mode(scene: Scene) -> Scene:
-    """Return a scene without a force as one whose force is zero, with the period of its first mode."""
+    """Return a scene without a force as a scene with zero force, with the period of its first mode."""
 
     def forced(frequency: float) -> Scene:
         record = {"transient_periods": 0, "recorded_periods": 1}
@@ -292,7 +292,7 @@ def _with_the_first_mode(scene: Scene) -> Scene:
 
 
 def _size(flow: BodyFlow, body: ImpactingBody) -> Floats:
-    """Return the size of the scene's own motion for each displacement and velocity, from where it is in time."""
+    """Return the size of the scene's own motion in time, for each displacement and velocity."""
     numbers = float_parameters(flow.scene, None)
     state = np.array([[numbers.get(name, 0.0) for name in flow.names]])
     seen = [state[0]]
@@ -307,7 +307,7 @@ def _size(flow: BodyFlow, body: ImpactingBody) -> Floats:
 
 
 def _after(distances: Floats, tolerance: float) -> float:
-    """Return the period from which on all distances are below a tolerance; infinite where the last one is not."""
+    """Return the period from which all distances are below a tolerance; infinite if the last is not."""
     above = np.flatnonzero(~(distances <= tolerance))
     if not above.size:
         return 0.0
@@ -315,13 +315,13 @@ def _after(distances: Floats, tolerance: float) -> float:
 
 
 def _stays(distances: Floats, periods: int) -> bool:
-    """Say whether a distance is the same in the last round of some periods as in the one before."""
+    """Return whether a distance is equal in the last two rounds of some periods."""
     before, last = distances[-2 * periods : -periods], distances[-periods:]
     return before.size == periods and bool((np.abs(last - before) <= SAME * before).all())
 
 
 def _contraction(distances: Floats) -> float:
-    """Return the factor a period of a distance in the end, while it is small; NaN where that is not seen.
+    """Return the factor per period of a small distance in the end; NaN if it is not seen.
 
     >>> round(_contraction(0.5 ** np.arange(40.0)), 12)
     0.5

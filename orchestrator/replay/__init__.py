@@ -1,4 +1,4 @@
-"""Recorded channels drive a scene; its motion is compared with what was measured, and fitted to it."""
+"""Recorded channels drive a scene; its motion is compared with measured channels, and fitted to them."""
 
 from __future__ import annotations
 

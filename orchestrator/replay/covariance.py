@@ -1,8 +1,8 @@
-"""Errors of numbers that were fitted to replays: what noise of all channels, and the lags found beside, leave open.
+"""Errors of numbers fitted to replays: from the noise of all channels, and from the lags fitted with them.
 
-Numbers solve sum S e = 0 (e: residual, S: its slope by each number, over all samples), and each lag that was found
-from the start of an event solves sum w e = 0 there (w: slope by the lag, less what a gain or an offset does). Both
-are linearised together, so that the errors of the lags are in those of the numbers.
+Numbers solve sum S e = 0 (e: residual, S: its slope by each number, over all samples). A lag that was found from the
+start of an event solves sum w e = 0 there. Its weight w is the slope by the lag, less the effect of a gain or an
+offset. Both equations are linearised together, so that the errors of the numbers include the errors of the lags.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
 
-#: Samples from which noise is learned.
+#: Fewest quiet samples from which the noise of a channel is estimated.
 FEWEST_QUIET = 100
 
 
 @dataclass(frozen=True, slots=True)
 class LagSlopes:
-    """What a lag does to the residual of its channel."""
+    """The effect of a lag on the residual of its channel."""
 
     slope: Floats
     """Derivative of the residual by the lag, 1/s, shape (sample,)."""
     weight: Floats
-    """w of the equation that the lag solves, shape (sample,); 0 outside the start of the event."""
+    """Weight w of the lag's equation, shape (sample,); 0 outside the start of the event."""
 
 
 def lag_slopes(comparison: Comparison, model: Interpolated, size: float) -> LagSlopes | None:
-    """Return what the lag of a comparison does to its residual over `size`; None for a lag that was given."""
+    """Return the effect of a comparison's lag on its residual over `size`; None for a given lag."""
     alignment = comparison.alignment
     if not 0.0 < alignment.lag_error < np.inf:
         return None
@@ -61,8 +61,8 @@ def covariance_of(
     """Return the covariance of the numbers, shape (key, key).
 
     Slopes of the residual of each channel have shape (sample, key); residuals are correlated in time. Disturbances are
-    draws of what noise of the drives does to the residuals of all channels: its response rings for longer than any
-    estimate from one record's residual can see.
+    draws of the effect of drive noise on the residuals of all channels. The response to this noise rings longer than
+    an estimate from one record's residual can cover.
     """
     keys, found = slopes[0].shape[1], [place for place, lag in enumerate(lags) if lag is not None]
     derivatives, weights = [], []
@@ -88,11 +88,11 @@ def covariance_of(
 
 
 def _meats(weight: Floats, residual: Floats) -> tuple[Floats, Floats]:
-    """Return the covariance of sum weight * residual twice, correlations fading out over n^(1/2) samples.
+    """Return two covariances of sum weight * residual; correlations fade out over n^(1/2) samples.
 
-    First with a residual that may change (Newey and West): it sees a model that is wrong during the event. It is too
-    small where few samples have all the weight, for there their sum is 0 by the fit itself. So also with a residual of
-    one autocovariance all over the record.
+    The first allows a residual that changes in time (Newey and West): it covers a wrong model during the event. It is
+    too small if few samples have all the weight, as the fit itself makes their sum 0. The second assumes one
+    autocovariance over the whole record.
     """
     scores = weight * residual[:, None]
     count = len(scores)
@@ -109,9 +109,9 @@ def _meats(weight: Floats, residual: Floats) -> tuple[Floats, Floats]:
 
 
 def quiet_noise(channel: Channel) -> Floats | None:
-    """Return what a channel shows before its event, in its SI unit, without drift.
+    """Return the values of a channel before its event, in its SI unit, without drift.
 
-    None where it does not rest for `FEWEST_QUIET` samples: a record may begin with the foot of its pulse.
+    None unless it rests for `FEWEST_QUIET` samples: a record may begin with the foot of its pulse.
     """
     if channel.attrs.get("role") == "simulated":
         return None
@@ -125,16 +125,16 @@ def quiet_noise(channel: Channel) -> Floats | None:
     values = channel.si()[rows]
     if len(values) < FEWEST_QUIET:
         return None
-    # a drift is none of the noise
+    # drift is not noise
     place = np.linspace(-1.0, 1.0, len(values))
     noise: Floats = values - np.polyval(np.polyfit(place, values, 1), place)
     return noise if np.any(noise) else None
 
 
 def drawn_noise(sample: Floats, count: int, random: np.random.Generator) -> Floats:
-    """Return `count` values of noise with the spectrum of a sample of it.
+    """Return `count` values of noise with the spectrum of a noise sample.
 
-    White noise convolved with the sample: the spectrum is that of the sample, squared and smoothed.
+    White noise is convolved with the sample: the spectrum is the squared, smoothed spectrum of the sample.
     """
     from scipy.signal import fftconvolve
 

@@ -1,4 +1,4 @@
-"""From a recorded channel to what drives a body: SI values without offset and gaps, linear between the samples."""
+"""The drive signal of a body from a recorded channel: SI values without offset and gaps, linear between samples."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from vibroimpact.fmus.errors import DatasetError
 
 Floats = NDArray[np.float64]
 
-#: Parts that a channel is cut into to find its quietest.
+#: Number of equal parts of a signal, from which its quietest is chosen.
 QUIET_PARTS = 20
-#: Steps of one replay: a minute or more of processor time.
+#: Most steps of one replay: they take a minute or more of processor time.
 MOST_STEPS = 10**7
-#: SI units of what can be driven.
+#: SI unit of each kind of drive.
 DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
 VOLTS = "V"
-"""Unit of what drives through an exciter."""
+"""Unit of a drive through an exciter."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveSignal:
-    """What drives a body."""
+    """The drive of a body."""
 
     time: Floats
     """s, on the clock of its channel, shape (sample,)."""
     values: Floats
-    """m/s^2 or N, V of an exciter; offset taken off, gaps bridged by straight lines."""
+    """m/s^2 or N, V with an exciter; without offset, with gaps bridged by straight lines."""
     bridged: NDArray[np.bool_]
-    """Where a gap was bridged: what follows from it is a guess."""
+    """Mask of bridged gaps: the motion after them is a guess."""
     offset: float
-    """What was taken off, in the unit of the channel."""
+    """The offset removed, in the unit of the channel."""
     remarks: tuple[str, ...]
-    """What a reader must know."""
+    """Remarks for the results."""
 
 
 def drive_of(
@@ -47,11 +47,11 @@ def drive_of(
     *,
     designed: bool = False,
 ) -> DriveSignal:
-    """Return what a channel drives a body with, `base_acceleration` or `force`.
+    """Return the drive signal of a channel for the drive `base_acceleration` or `force`.
 
-    The offset, in the unit of the channel, is taken off every sample (None: `quiet_level`). The expected SI unit is
-    that of the drive where it is empty. A designed channel was computed, not measured: without an offset that is given,
-    its mean is kept. A channel of something else, or of less than two samples, raises DatasetError.
+    The offset, in the unit of the channel, is subtracted from every sample (None: `quiet_level`). `expected` is the SI
+    unit, by default the drive's. A designed channel was computed, not measured: without a given offset its mean is
+    kept. DatasetError: the channel measures another quantity, or has less than two samples.
     """
     expected, unit = expected or DRIVEN_UNITS[drive], measured_unit(channel.unit)
     if unit.si not in (expected, "1"):
@@ -65,7 +65,7 @@ def drive_of(
     remarks = []
     if offset is None:
         quiet = quiet_level(channel.values[known])
-        simulated = channel.attrs.get("role") == "simulated"  # it has no offset to be taken off
+        simulated = channel.attrs.get("role") == "simulated"  # a simulated channel has no offset
         offset = 0.0 if designed or simulated else quiet
         if designed and quiet and not simulated:
             remarks.append(f"{channel.name}: {_designed(channel, quiet)}")
@@ -98,11 +98,11 @@ def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list
 
 
 def quiet_level(values: Floats) -> float:
-    """Return the level of a signal where nothing happens: the median of its quietest part.
+    """Return the rest level of a signal: the median of its quietest part.
 
-    The signal is cut into `QUIET_PARTS` equal parts; the quietest has the least median distance from its median. A
-    signal that never rests (of a shaker) has the middle of its whole instead: its quietest part is no quieter than a
-    third of all of it.
+    The signal is cut into `QUIET_PARTS` equal parts; the quietest part has the least median distance from its median.
+    A signal that never rests (of a shaker) has its overall mean instead. In such a signal the spread of the quietest
+    part exceeds a third of the overall spread.
 
     >>> pulse = 0.25 + np.exp(-(((np.arange(1000) - 300) / 40.0) ** 2))
     >>> round(quiet_level(pulse), 9)
@@ -118,11 +118,11 @@ def quiet_level(values: Floats) -> float:
 
 
 def step_instants(signal_time: Floats, finest: float, end: float) -> Floats:
-    """Return the instants to step through: every sample of the drive, with steps no longer than `finest` (s).
+    """Return the instants of the steps: every sample of the drive, with steps no longer than `finest` (s).
 
-    The slope changes at the drive's samples; `finest` is for motion that is compared with a faster channel. Beyond the
-    last sample the steps to the end (s) are `finest` or the drive's last, whichever is shorter. More than `MOST_STEPS`,
-    of clocks that are far apart or a hole of hours, raise DatasetError.
+    The slope changes at the drive's samples; `finest` is for motion that is compared with a faster channel. After the
+    last sample the steps up to `end` (s) are `finest` or the drive's last, whichever is shorter. DatasetError: more
+    than `MOST_STEPS`, because of clocks far apart or a hole of hours.
 
     >>> step_instants(np.array([0.0, 1.0, 3.0]), 1.0, 4.0).tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]

@@ -1,7 +1,7 @@
-"""Fits of a replay: the numbers of a scene that bring what it simulates nearest to what was measured.
+"""Fits of a replay: the numbers of a scene that bring the simulated motion nearest to the measured one.
 
 Least squares over all compared channels of all recordings. Lag and polarity are found from the start of the event
-alone and then held while the numbers are fitted, so that an error of the model cannot hide in them; with better
+alone. They are held while the numbers are fitted, so that an error of the model cannot hide in them. With better
 numbers they are found again, until they stay.
 """
 
@@ -27,20 +27,21 @@ from vibroimpact.orchestrator.scene.keys import MODES, numeric_key
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: How the natural frequency enters a number: frequencies as such, stiffnesses by their square.
+#: Power of the natural frequency in each kind of number: 1 in frequencies, 2 in stiffnesses.
 _FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
 MOST_ALIGNMENTS = 6
-#: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
+#: Condition of the scaled normal matrix above which two numbers are inseparable: their difference is derivative noise.
 MOST_CONDITION = 1e8
 #: Relative effect of doubling a number below which it is treated as having none.
 LEAST_CHANGE = 1e-9
-#: Step beside a start without effect, relative to the larger of a number and its scale.
-BESIDE = 0.1
-#: Number of its standard errors below which a square is not told from 0.
+#: Offset of a second start from a start without effect, relative to the larger of a number and its scale.
+NEIGHBOUR_DISTANCE = 0.1
+#: Squared distance of a number from its flat value, in standard errors of the square; below it the two are not
+#: distinct.
 FLAT_ERRORS = 3.0
-#: Change of a lag, as a share of its standard error, below which it has settled.
+#: Change of a lag, as a share of its standard error, below which the lag has settled.
 LAG_STAYS = 0.1
-#: Draws of the noise of what drives: standard errors from it are good to about 1/sqrt(2 draws), a sixth.
+#: Draws of the drive noise; standard errors from them are good to about 1/sqrt(2 draws), a sixth.
 NOISE_DRAWS, NOISE_SEED = 20, 5
 #: Step of the numeric derivatives, relative to the larger of a number and its scale.
 DERIVATIVE_STEP = 1e-5
@@ -48,25 +49,25 @@ DERIVATIVE_STEP = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class ReplayFit:
-    """What a fit found.
+    """Result of a fit.
 
     Attributes
     ----------
     keys : tuple of str
     start, values, standard_error : ndarray, shape (key,)
-        Each in the unit of its key. The errors are those of least squares with residuals that are correlated in
-        time, of the lags found beside, and of noise of the drive as it shows before the event: they hold where the
-        model is right, and do not see what a wrong one misses.
+        Each in the unit of its key. The errors are for least squares with residuals correlated in time. They include
+        the errors of the fitted lags, and the noise of the drive as measured before the event. They hold if the model
+        is right, and do not cover the error of a wrong model.
     correlation : ndarray, shape (key, key)
-        Of the errors.
+        Correlation of the errors.
     comparisons : tuple of list of Comparison
-        Of each recording that was fitted, with the numbers found.
+        Comparisons of each fitted recording, with the fitted numbers.
     alignments : int
-        How often lag and polarity were found.
+        Number of searches for lag and polarity.
     simulations : int
-        How often all recordings were simulated.
+        Number of simulations of all recordings.
     remarks : tuple of str
-        Numbers at a bound, pairs that the data do not separate, a lag that did not settle.
+        Numbers at a bound, inseparable pairs of numbers, a lag that did not settle.
     """
 
     keys: tuple[str, ...]
@@ -88,7 +89,7 @@ class ReplayFit:
 def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
     """Return the keys of `--fit body.damping_ratio,sensor.gain`.
 
-    A key that is no number of the scene, or is there twice, raises UsageError.
+    UsageError: a key is no number of the scene, or occurs twice.
     """
     keys = tuple(key.strip() for key in text.split(",") if key.strip())
     if not keys or len(set(keys)) < len(keys):
@@ -115,34 +116,34 @@ def fit_replay(
     replayers: Sequence[Replayer],
     keys: Sequence[str],
     *,
-    told: Callable[[int, float], None] = lambda simulations, error: None,
+    progress: Callable[[int, float], None] = lambda simulations, error: None,
 ) -> ReplayFit:
     """Fit numbers of a scene to recordings.
 
     Parameters
     ----------
     replayers : sequence of Replayer
-        Of one scene, one for each recording; the scene compares something.
+        Replayers of one scene, one for each recording; the scene compares something.
     keys : sequence of str
-        Numbers of the scene to be found; it gives where to start.
-    told : callable
-        Called after each simulation with their number and the root-mean-square error (1: that of the mean).
+        Numbers of the scene to fit; the scene has their start values.
+    progress : callable
+        Called after each simulation with the number of simulations and the root-mean-square error (1: the mean's).
 
     Raises
     ------
     UsageError
         Nothing is compared.
     EstimationError
-        The data say nothing of a number, or the search does not end.
+        A number has no effect on the data, or the search does not end.
     """
-    return _Fit(replayers, tuple(keys), told).run()
+    return _Fit(replayers, tuple(keys), progress).run()
 
 
 class _Fit:
     def __init__(
-        self, replayers: Sequence[Replayer], keys: tuple[str, ...], told: Callable[[int, float], None]
+        self, replayers: Sequence[Replayer], keys: tuple[str, ...], progress: Callable[[int, float], None]
     ) -> None:
-        self.replayers, self.keys, self.told = replayers, keys, told
+        self.replayers, self.keys, self.progress = replayers, keys, progress
         scene = replayers[0].scene
         if not replayers[0].readings:
             raise UsageError(
@@ -161,9 +162,9 @@ class _Fit:
         values, remarks = self.start.copy(), []
         comparisons = self.compared(values)
         values, comparisons = self.better_start(values, comparisons)
-        values, comparisons, told = self.start_with_effect(values, comparisons)
-        remarks += told
-        self.refuse_alike(self._slopes(values, comparisons))  # before a search that would wander about
+        values, comparisons, new_remarks = self.start_with_effect(values, comparisons)
+        remarks += new_remarks
+        self.refuse_alike(self._slopes(values, comparisons))  # before a search that would fail
         alignments = 0
         while alignments < MOST_ALIGNMENTS:
             alignments += 1
@@ -187,9 +188,9 @@ class _Fit:
     def better_start(
         self, values: Floats, comparisons: tuple[list[Comparison], ...]
     ) -> tuple[Floats, tuple[list[Comparison], ...]]:
-        """Begin at the dominant frequency that was measured where that explains more: far off, the search gets lost.
+        """Scale the start by the measured dominant frequency if that explains more: a distant start gets lost.
 
-        Numbers of the frequency are scaled by the ratio of the two frequencies, stiffnesses by its square.
+        Numbers of the frequency are scaled by the ratio of measured to simulated frequency, stiffnesses by its square.
         """
         first = comparisons[0][0]
         ratio = first.measured_frequency.frequency / first.simulated_frequency.frequency
@@ -203,51 +204,54 @@ class _Fit:
     def start_with_effect(
         self, values: Floats, comparisons: tuple[list[Comparison], ...]
     ) -> tuple[Floats, tuple[list[Comparison], ...], list[str]]:
-        """Begin where each number has an effect, if there is such a start beside the one that was given.
+        """Move the start to values at which each number has an effect, if there are such values near the given start.
 
-        First beside a number that has none, such as the place of a sensor where the shape is flat. Where nothing moves
-        or is read (a gain of 0), no other number has one: those that do are found first.
+        The first case is a single number without effect, such as the place of a sensor where the shape is flat. If
+        nothing moves or is read (a gain of 0), no other number has an effect: the numbers with an effect are fitted
+        first.
         """
-        values, told = self._beside_idle(values, comparisons)
+        values, new_remarks = self._away_from_idle(values, comparisons)
         idle = self._idle(self._slopes(values, comparisons))
         if idle.any() and not idle.all():
             values = self.solve(values, comparisons, ~idle)
             comparisons = self.compared(values)
             late = ", ".join(self.keys[place] for place in np.flatnonzero(idle))
-            told.append(f"{late}: without effect where the search began; the other numbers were found first")
-            values, more = self._beside_idle(values, comparisons)
-            told += more
-        return values, comparisons, told
+            new_remarks.append(
+                f"{late}: without effect where the search began; the other numbers were found first"
+            )
+            values, more = self._away_from_idle(values, comparisons)
+            new_remarks += more
+        return values, comparisons, new_remarks
 
-    def _beside_idle(
+    def _away_from_idle(
         self, values: Floats, comparisons: Sequence[Sequence[Comparison]]
     ) -> tuple[Floats, list[str]]:
-        told = []
+        new_remarks = []
         for place in np.flatnonzero(self._idle(self._slopes(values, comparisons))).tolist():
             tried = [
                 (sum(float(one @ one) for one in self.residuals(other, comparisons)), float(other[place]))
-                for other in self._beside(values, place)
+                for other in self._neighbours(values, place)
                 if not self._idle(self._slopes(other, comparisons))[place]
             ]
             if tried:
-                told.append(
+                new_remarks.append(
                     f"{self.keys[place]} has no effect at {values[place]:.6g}: the search began beside it, at "
                     f"{min(tried)[1]:.6g}"
                 )
                 self.flat[place] = float(values[place])
                 values = np.where(np.arange(len(values)) == place, min(tried)[1], values)
-        return values, told
+        return values, new_remarks
 
     def _idle(self, slopes: Sequence[Floats]) -> Flags:
-        """Return which numbers do not change what is compared, beyond rounding."""
+        """Return a mask of numbers that do not change the compared signals beyond rounding, shape (key,)."""
         energy = sum((np.sum(slope**2, axis=0) for slope in slopes), np.zeros(len(self.keys)))
         moved = np.sqrt(energy / sum(len(slope) for slope in slopes)) * self.scale
         idle: Flags = ~(moved > LEAST_CHANGE)
         return idle
 
-    def _beside(self, values: Floats, place: int) -> list[Floats]:
-        """Return values with one number a little larger, and a little smaller, within its bounds."""
-        step = BESIDE * self.scale[place] * np.eye(len(values))[place]
+    def _neighbours(self, values: Floats, place: int) -> list[Floats]:
+        """Return the values with one number a little larger, and a little smaller, within its bounds."""
+        step = NEIGHBOUR_DISTANCE * self.scale[place] * np.eye(len(values))[place]
         both = (values + step, values - step)
         return [other for other in both if self.lower[place] < other[place] < self.upper[place]]
 
@@ -266,9 +270,9 @@ class _Fit:
         comparisons: Sequence[Sequence[Comparison]],
         random: np.random.Generator | None = None,
     ) -> list[Floats]:
-        """Return the residual of each channel over its own standard deviation, lag and polarity held.
+        """Return the residual of each channel over its own standard deviation, with lag and polarity held.
 
-        With `random`, what drives has noise as before its event, drawn anew, on top.
+        With `random`, new noise as before the event is added to the drive.
         """
         numbers = self._numbers(values)
         found = []
@@ -279,13 +283,13 @@ class _Fit:
                 simulated = comparison.alignment.polarity * Interpolated(motion.time, reading)(at)
                 measured = comparison.values[comparison.scored]
                 found.append((measured - simulated) / np.std(measured))
-        self.told(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
+        self.progress(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
         return found
 
     def solve(
         self, values: Floats, comparisons: Sequence[Sequence[Comparison]], chosen: Flags | None = None
     ) -> Floats:
-        """Return the values of least squares from a start, lag and polarity held; only the chosen ones are changed."""
+        """Return the least-squares values from a start, with lag and polarity held; only chosen numbers change."""
         from scipy.optimize import least_squares
 
         rows = np.flatnonzero(np.ones(len(values)) if chosen is None else chosen)
@@ -316,7 +320,7 @@ class _Fit:
         return with_chosen(solution.x)
 
     def covariance(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Floats:
-        """Return the covariance of the numbers, see `covariance`."""
+        """Return the covariance of the numbers: see `covariance_of`."""
         residuals = self.residuals(values, comparisons)
         slopes = self._slopes(values, comparisons)
         self.refuse_alike(slopes)
@@ -340,7 +344,7 @@ class _Fit:
         return found
 
     def refuse_alike(self, slopes: Sequence[Floats]) -> None:
-        """Refuse numbers that the recordings do not tell apart, by the normal matrix of their slopes."""
+        """Raise EstimationError for numbers that the recordings do not separate, by the normal matrix of slopes."""
         idle = self._idle(slopes)
         if idle.any():
             raise EstimationError(
@@ -361,7 +365,7 @@ class _Fit:
     def _slopes(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
         """Return the derivative of each residual by each number, shape (sample, key) for each channel.
 
-        Those of the last values are kept: at the start they are asked for three times.
+        The last result is kept: the start is evaluated three times.
         """
         if not (self._at and self._at[0] is comparisons and np.array_equal(self._at[1], values)):
             self._at = comparisons, values.copy(), self._slopes_at(values, comparisons)
@@ -371,7 +375,7 @@ class _Fit:
         columns = []
         for place in range(len(values)):
             step = 10.0 * DERIVATIVE_STEP * self.scale[place]
-            # beside a bound the difference is one-sided: beyond it the body refuses its parameters
+            # at a bound the difference is one-sided, as the body refuses parameters beyond it
             below, above = (min(step, room) for room in self._room(values, place))
             along = np.eye(len(values))[place]
             ahead = self.residuals(values + above * along, comparisons)
@@ -398,7 +402,7 @@ class _Fit:
         return remarks
 
     def _at_flat(self, values: Floats, errors: Floats) -> list[str]:
-        """Say which numbers ended where they have no effect: the data tell (value - flat)^2, and its error."""
+        """Return remarks on numbers that ended where they have no effect: the data give only (value - flat)^2."""
         return [
             f"{self.keys[place]} is not told from {flat:.6g}, where it has no effect: its error is not to be relied on"
             for place, flat in self.flat.items()
@@ -411,7 +415,7 @@ def _name(key: str) -> str:
 
 
 def _explained(comparisons: Sequence[Sequence[Comparison]]) -> float:
-    """Return the mean squared correlation of simulated and measured signals, whatever their gains."""
+    """Return the mean squared correlation of simulated and measured signals, independent of their gains."""
     found = []
     for comparison in (one for compared in comparisons for one in compared):
         pair = comparison.values[comparison.scored], comparison.simulated[comparison.scored]

@@ -1,4 +1,4 @@
-"""What a replay leaves: one dataset of measured and simulated signals, scores, drives, impacts and fitted numbers."""
+"""The dataset of a replay: measured and simulated signals, scores, drives, impacts and fitted numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.scene.changes import text_with_values
 
 _HEAD = "# Fitted by vibroimpact replay to"
 _HEADING = re.compile(rf"\A{_HEAD} .*\n(?:# [^\n]* \+- .*\n)*\n?")
-"""What `fitted_scene_text` writes above a scene, to be replaced when it is fitted anew."""
+"""The lines that `fitted_scene_text` writes above a scene, to be replaced by a new fit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Replayed:
     motion: Motion
     comparisons: list[Comparison]
     use: str
-    """`fitted`, `scored` (not fitted on), or `replayed` (nothing was fitted)."""
+    """`fitted`, `scored` (not fitted), or `replayed` (without a fit)."""
 
     @property
     def name(self) -> str:
@@ -51,9 +51,9 @@ def replay_dataset(
 ) -> xr.Dataset:
     """Return the dataset of replays of one scene, ready for `write_results`.
 
-    Signals and scores are those of `comparison_dataset`, of all recordings one after the other; `recording` and `use`
-    say which. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1). Fitted numbers are
-    on `parameter`. At least one replay is given, each with something compared or a drive.
+    Signals and scores are from `comparison_dataset`, for all recordings one after the other; `recording` and `use`
+    name the recording of each. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1).
+    Fitted numbers are on `parameter`. At least one replay is needed, each with a comparison or a drive.
     """
     compared = [comparison for replay in replays for comparison in replay.comparisons]
     dataset = comparison_dataset(compared) if compared else xr.Dataset()
@@ -78,7 +78,7 @@ def replay_dataset(
 
 
 def fitted_scene_text(scene: Scene, fit: ReplayFit, recordings: Sequence[str], folder: Path) -> str:
-    """Return the file of a scene with the numbers found, and above it what they were fitted to and their errors.
+    """Return the text of a scene with the fitted numbers; comments above it name the recordings and the errors.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ def fitted_scene_text(scene: Scene, fit: ReplayFit, recordings: Sequence[str], f
         As it was loaded.
     fit : ReplayFit
     recordings : sequence of str
-        Files that it was fitted to.
+        Files of the fitted recordings.
     folder : Path
-        Where the text will lie: recordings that the scene names are named from there.
+        Folder of the text: recordings in the scene get paths relative to it.
     """
     here = Path(scene.source).parent
     named = replay_table(scene).recordings

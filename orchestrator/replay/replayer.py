@@ -1,7 +1,7 @@
-"""Replay: recorded channels drive a scene's body, and its motion is compared with what was measured.
+"""Replay: recorded channels drive a scene's body, and its motion is compared with measured channels.
 
-Two ways, one physics: `fused`, the body alone, its input set at every sample; `coupled`, a Replay FMU beside the
-body and its stops. `auto` takes the first.
+Two ways, one physics. `fused`: the body alone, its input set at every sample. `coupled`: a Replay FMU with the body
+and its stops. `auto` takes the first.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ from vibroimpact.orchestrator.scene.rules.replay import plain_variable
 
 Floats = NDArray[np.float64]
 
-#: Name of the component that replays, and of its one channel.
+#: Names of the component that replays, and of its one channel.
 REPLAY, DRIVE = "replay", "drive"
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelReading:
-    """How a simulated variable becomes what a channel reads, in the SI unit of the channel."""
+    """Converts a simulated variable to the reading of a channel, in the SI unit of the channel."""
 
     compared: Compared
     variable: str
-    """As a time series names it."""
+    """Name of the variable in a time series."""
     channel: Channel
-    """What measured it."""
+    """The measured channel."""
     is_sensor: bool
-    """Whether `[sensor]` makes the reading: gain * value + offset."""
+    """Whether `[sensor]` applies to the reading: gain * value + offset."""
     same_kind: bool
-    """Whether variable and channel measure the same kind, so that the gain is a pure number."""
+    """Whether variable and channel measure the same quantity, so that the gain is a pure number."""
 
     def of(self, values: Floats, scene: Scene) -> Floats:
-        """Return readings of SI values of the variable, shape (sample,)."""
+        """Return the readings for SI values of the variable, shape (sample,)."""
         if not self.is_sensor or scene.sensor is None:
             return values
         unit = measured_unit(self.channel.unit).factor
@@ -64,12 +64,12 @@ class ChannelReading:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What a replay simulated.
+    """The simulated motion of a replay.
 
     Attributes
     ----------
     time : ndarray, shape (sample,)
-        s, on the clock of the drive; without one, on that of the first channel compared.
+        s, on the clock of the drive; without a drive, on the clock of the first compared channel.
     readings : tuple of ndarray, shape (sample,)
         One for each compared pair, in the SI unit of its channel.
     impacts : ndarray, shape (impact, 8)
@@ -77,7 +77,7 @@ class Motion:
     sticks : ndarray, shape (stick, 3)
         Columns `analysis.schema.STICK_COLUMNS`, on the same clock.
     warnings : tuple of str
-        What the body said when it began.
+        Warnings of the body at its start.
     """
 
     time: Floats
@@ -88,21 +88,21 @@ class Motion:
 
 
 class Replayer:
-    """A scene and a recording, opened: simulates the replay as often as it is asked.
+    """A scene and a recording, opened: simulates the replay any number of times.
 
     Parameters
     ----------
     scene : Scene
         A scene with `[replay]`.
     recording : Recording
-        What `open_signals` gives.
+        As from `open_signals`.
     execution : str
         `auto`, `fused` or `coupled`.
 
     Raises
     ------
     DatasetError
-        A channel is not in the recording, or measures something else.
+        A channel is not in the recording, or measures another quantity.
     SceneError
         The scene has no `[replay]`.
     """
@@ -127,9 +127,9 @@ class Replayer:
         return drive_of(channel, replay.drive, replay.drive_offset, unit, designed=self._is_designed(channel))
 
     def _is_designed(self, channel: Channel) -> bool:
-        """Return whether a drive is a force that somebody computed: nothing measured is compared with its motion."""
+        """Return whether the drive is a computed force: no measured channel is compared with its motion."""
         computed = self.replay.drive == "force" and self.scene.exciter is None and not self.replay.compare
-        return computed and "terminal" not in channel.attrs  # which a channel of a rig has
+        return computed and "terminal" not in channel.attrs  # a channel of a rig has a terminal
 
     def _instants(self) -> tuple[Floats, Floats | None]:
         """Return the instants of the simulation, and the drive there."""
@@ -159,7 +159,7 @@ class Replayer:
         return Session(self.scene, names, execution="coupled", others=others, connections=connections)
 
     def _component(self, path: Path) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
-        """Make the Replay FMU of the drive, on the simulation's own clock."""
+        """Write the Replay FMU of the drive, on the simulation's own clock."""
         assert self.drive is not None
         assert self._values is not None
         kind = str(self.replay.drive)
@@ -178,12 +178,12 @@ class Replayer:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader must know of the recording and of the drive."""
+        """Remarks on the recording and on the drive."""
         return (*self.recording.remarks_counted, *(self.drive.remarks if self.drive is not None else ()))
 
     @cached_property
     def drive_noise(self) -> Floats | None:
-        """What the drive shows before its event, in its SI unit; None where it never rests or a component plays it."""
+        """Noise of the drive before its event, in its SI unit; None if it never rests or a component plays it."""
         if self.replay.drive is None or self._folder is not None:
             return None
         return quiet_noise(self.recording.channel(self.replay.channel))
@@ -197,7 +197,7 @@ class Replayer:
         ----------
         values : mapping of str to float, optional
         noise : Generator, optional
-            Draws noise as before the event, which the drive gets on top.
+            Draws noise as before the event, which is added to the drive.
 
         Raises
         ------
@@ -226,7 +226,7 @@ class Replayer:
     def _follow(self, session: Session, scene: Scene, noise: np.random.Generator | None) -> Floats:
         relative = self.time - self.time[0]
         if self._folder is not None or self._values is None:
-            return session.follow(relative)  # a Replay drives the body, or nothing does
+            return session.follow(relative)  # a Replay component drives the body, or there is no drive
         values, drive = self._values, self.drive
         if noise is not None and drive is not None and self.drive_noise is not None:
             drawn = drawn_noise(self.drive_noise, len(drive.time), noise)
@@ -236,7 +236,7 @@ class Replayer:
         return session.follow(relative, self.replay.drive, values)
 
     def final_state(self) -> tuple[float, float, Floats | None]:
-        """Return displacement (m), velocity (m/s) and, of chains and beams, the whole state at the end."""
+        """Return displacement (m), velocity (m/s) and, for chains and beams, the whole state at the end."""
         return *self._session.observed(), self._session.whole_state()
 
     def close(self) -> None:
@@ -253,7 +253,7 @@ class Replayer:
 
 
 def replay_table(scene: Scene) -> Replay:
-    """Return the `[replay]` of a scene; raise SceneError if it has none."""
+    """Return the `[replay]` table of a scene; SceneError without one."""
     if scene.replay is None:
         raise SceneError(
             [f"{scene.source}: replay: expected a [replay] table, got none. Add drive, from and compare."]
@@ -262,14 +262,14 @@ def replay_table(scene: Scene) -> Replay:
 
 
 def is_linear(scene: Scene) -> bool:
-    """Whether a multiple of a motion of this scene is one too: no stops, and nothing that follows the amplitude."""
+    """Whether multiples of a motion are motions too: no stops, and no parameter that depends on amplitude."""
     model = type(scene.body)
     following = [key for key in numeric_keys(model) if rule_of(field_of(model, key)).effect == AMPLITUDE]
     return not scene.stops and not any(np.any(getattr(scene.body, key)) for key in following)
 
 
 def recording_of(scene: Scene, number: int) -> Path:
-    """Return the file of a recording (1-based) that a scene names; paths count from the scene's folder."""
+    """Return the file of a recording (1-based) of a scene; paths are relative to the scene's folder."""
     names = replay_table(scene).recordings
     if not names:
         raise UsageError(
@@ -281,7 +281,7 @@ def recording_of(scene: Scene, number: int) -> Path:
 
 @contextmanager
 def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto") -> Iterator[list[Replayer]]:
-    """Open a replay of a scene for each recording, and close all of them at the end."""
+    """Open a replay of a scene for each recording, and close all at the end."""
     replayers: list[Replayer] = []
     try:
         for path in paths:
@@ -293,7 +293,7 @@ def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto")
 
 
 def opened_replay(scene: Scene, path: Path, execution: str) -> Replayer:
-    """Open a replay of a scene for a recording; a problem of it begins with the name of its file."""
+    """Open a replay of a scene for a recording; its error messages begin with the name of the file."""
     try:
         return Replayer(scene, open_signals(path), execution=execution)
     except DatasetError as problem:

@@ -1,4 +1,4 @@
-"""A whole replay: recordings named, numbers fitted on some of them, all simulated, compared, judged."""
+"""A whole replay: recordings named, numbers fitted to some of them, all simulated, compared, judged."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from vibroimpact.orchestrator.scene.changes import text_with_values
 
 @dataclass(frozen=True, slots=True)
 class WholeReplay:
-    """What a scene and recordings gave.
+    """Result of a scene and its recordings.
 
     Attributes
     ----------
     scene : Scene
-        With the recordings that were replayed.
+        The scene with the replayed recordings.
     replays : tuple of Replayed
-        Those to which numbers were fitted first, then those that were only scored.
+        The fitted recordings first, then the recordings that were only scored.
     fit : ReplayFit or None
-        None where nothing was fitted.
+        None without a fit.
     verdict : Verdict or None
-        None where nothing was compared.
+        None without a comparison.
     dataset : xarray.Dataset
-        As `replay_dataset` makes it.
+        As from `replay_dataset`.
     """
 
     scene: Scene
@@ -57,30 +57,30 @@ def replay_scene(
     fit: str | None = None,
     score: Sequence[Path] = (),
     execution: str | None = None,
-    told: Callable[[int, float], None] = lambda simulations, error: None,
+    progress: Callable[[int, float], None] = lambda simulations, error: None,
 ) -> WholeReplay:
-    """Drive a scene by recordings and compare its motion with what was measured.
+    """Drive a scene by recordings and compare its motion with measured channels.
 
     Parameters
     ----------
     scene : Scene
-        With `[replay]`.
+        A scene with `[replay]`.
     recordings : sequence of Path
-        Those to replay, and to fit to; none: those that the scene names.
+        Recordings to replay and to fit; without any, the recordings of the scene.
     fit : str, optional
         Numbers of the scene to fit, by key, with commas between them.
     score : sequence of Path
-        Recordings to score that were not fitted on.
+        Recordings to score without fitting.
     execution : str, optional
-        `auto`, `fused` or `coupled`; None: as the scene says.
-    told : callable, optional
-        Told during a fit how many simulations there were, and the relative error of the best one.
+        `auto`, `fused` or `coupled`; None: as in the scene.
+    progress : callable, optional
+        Called during a fit with the number of simulations, and the relative error of the best one.
 
     Raises
     ------
     UsageError
-        The scene sweeps other things than recordings, names recordings too, there are none, or a recording to be
-        scored is one that is fitted.
+        The scene sweeps other keys than recordings, recordings are given twice or not at all, or a recording to score
+        is fitted too.
     EstimationError
         The numbers cannot be fitted.
     """
@@ -102,21 +102,21 @@ def replay_scene(
         )
     _refuse_scoring_fitted(paths, score)
     keys = fit_keys(scene, fit) if fit is not None else ()
-    # a number that the scene leaves at its default counts as written from now on
+    # a number at its default in the scene counts as written from now on
     scene = scene.at({key: scene.value(key) for key in keys})
     with opened_replays(scene, [*paths, *score], execution or scene.execution.how) as replayers:
-        found = fit_replay(replayers[: len(paths)], keys, told=told) if keys else None
+        found = fit_replay(replayers[: len(paths)], keys, progress=progress) if keys else None
         replays, verdict = _judged(scene, replayers, found, len(paths))
         return WholeReplay(named, replays, found, verdict, replay_dataset(replays, found, verdict))
 
 
 def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
-    """Return a scene that names recordings, as if its file did: workers read them by themselves.
+    """Return a scene that names the recordings as its file could: workers read them by themselves.
 
     Raises
     ------
     UsageError
-        The scene names recordings too, or there are none.
+        Recordings are named both in the scene and in the call, or not at all.
     """
     there = replay_table(scene).recordings
     if there and recordings:
@@ -138,7 +138,7 @@ def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
 
 
 def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> None:
-    """Refuse a recording to be scored that is fitted too: it would earn a trust that it cannot give."""
+    """Raise UsageError for a recording that is both scored and fitted: its score would earn false trust."""
     fitted = {path.resolve() for path in paths}
     for path in scored:
         if path.resolve() in fitted:
@@ -153,7 +153,7 @@ def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> Non
 def _judged(
     scene: Scene, replayers: Sequence[Replayer], found: ReplayFit | None, given: int
 ) -> tuple[tuple[Replayed, ...], Verdict | None]:
-    """Simulate and compare every recording, fitted to the first `given` or not; say how far the model is trusted."""
+    """Simulate and compare every recording, the first `given` fitted if `found` has numbers; judge the model."""
     numbers = found.numbers if found is not None else None
     replays = []
     for place, replayer in enumerate(replayers):

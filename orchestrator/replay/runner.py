@@ -1,4 +1,4 @@
-"""Replays as points of a campaign: over recordings, and over the grid that the scene sweeps."""
+"""Replays as points of a campaign: over recordings, and over the swept keys of the scene."""
 
 from __future__ import annotations
 
@@ -74,13 +74,15 @@ class ReplayRunner(Runner):
         self, replayer: Replayer, motion: Motion, comparisons: list[Comparison], seconds: float
     ) -> RunRecord:
         displacement, velocity, state = replayer.final_state()
-        # what was not scored is the same for all points; an alignment that is doubtful is not
-        doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
-        told = [*motion.warnings, *doubts]
+        # remarks on skipped samples are equal for all points; remarks on a doubtful alignment are not
+        alignment_remarks = [
+            f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks
+        ]
+        remarks = [*motion.warnings, *alignment_remarks]
         impacts = self.scene.record.impacts
         return RunRecord(
             outcome=Outcome.ok,
-            message="; ".join(told),
+            message="; ".join(remarks),
             impacts=motion.impacts if impacts else None,
             sticks=motion.sticks if impacts else None,
             final_displacement=displacement,

@@ -1,4 +1,4 @@
-"""The score of a replay: what it simulated beside what was measured, each compared pair by itself."""
+"""The score of a replay: simulated against measured signals, for each compared pair."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from vibroimpact.orchestrator.replay.replayer import ChannelReading, Motion, Rep
 
 #: Longest lag tried between channels of separate triggers, as a share of the shorter record.
 MOST_LAG_SHARE = 0.5
-#: A record with less than this share of the motion of those fitted has nothing to be scored: its drive did not act.
+#: Energy of a record's motion relative to the largest record's, below which there is no score: its drive did not act.
 LEAST_MOTION = 1e-4
 
 
 def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
-    """Compare what was simulated with every channel that the scene names.
+    """Compare the simulated motion with every channel that the scene names.
 
     Raises
     ------
     EstimationError
-        A channel has too little that is good, or was not simulated.
+        A channel has too few good samples, or was not simulated.
     """
     try:
         return [
@@ -59,7 +59,7 @@ def _compared(replayer: Replayer, reading: ChannelReading, motion: Motion, place
         windows=list(replay.windows),
         peak_window=replay.peaks,
         measured_events=impacts,
-        # without measured instants every simulated impact would count as one too many
+        # without measured instants every simulated impact would count as surplus
         simulated_events=None if impacts is None else motion.impacts[:, 0],
         simulated_name=reading.compared.simulated,
     )
@@ -68,7 +68,7 @@ def _compared(replayer: Replayer, reading: ChannelReading, motion: Motion, place
 def _clock(
     replayer: Replayer, reading: ChannelReading
 ) -> tuple[Literal["auto"] | float, Literal["auto"] | int]:
-    """Return lag and polarity: as the scene says, none on one clock, else to be found."""
+    """Return lag and polarity: as in the scene, zero lag on one clock, else to be found."""
     replay = replayer.replay
     if is_on_the_clock(replayer, reading):
         return replay.lag or 0.0, replay.polarity or 1
@@ -78,7 +78,7 @@ def _clock(
 
 
 def is_on_the_clock(replayer: Replayer, reading: ChannelReading) -> bool:
-    """Whether a channel was recorded on the clock that the simulation runs on: one axis, one trigger."""
+    """Whether a channel was recorded on the clock of the simulation: one axis, one trigger."""
     if replayer.drive is None:
         return True
     driven = replayer.recording.channel(replayer.replay.channel).axis
@@ -93,7 +93,7 @@ def _most_lag(replayer: Replayer, reading: ChannelReading) -> float:
     driven, measured = (_span(times) for times in (replayer.drive.time, reading.channel.time))
     if given is None:
         return MOST_LAG_SHARE * min(driven[1] - driven[0], measured[1] - measured[0])
-    # beyond this the records do not overlap: nothing could be found there
+    # beyond this the records do not overlap
     return min(given, max(abs(driven[1] - measured[0]), abs(measured[1] - driven[0])))
 
 
@@ -102,11 +102,11 @@ def _span(times: Floats) -> tuple[float, float]:
 
 
 def _offset(replayer: Replayer, reading: ChannelReading) -> Literal["before", "none"] | float:
-    """A scene that gives its sensor an offset simulates it; else the level of rest is taken off.
+    """Return the offset to remove from a channel: the simulated one of a sensor, or the rest level.
 
-    That is the mean before the event or, where the record does not begin quietly, the level of an acceleration where
-    it is quietest: an acceleration has no mean in the long run; a displacement may well have one. What was simulated
-    has no offset.
+    A sensor offset in the scene is simulated, so none is removed; a simulated channel has none. The rest level is the
+    mean before the event. If the record does not begin quietly, an acceleration has the level of its quietest part, as
+    its long-run mean is zero. A displacement may have a mean.
     """
     sensor = replayer.scene.sensor
     simulated = sensor is not None and reading.is_sensor and "offset" in sensor.model_fields_set
@@ -119,9 +119,9 @@ def _offset(replayer: Replayer, reading: ChannelReading) -> Literal["before", "n
 
 
 def score_without_dynamics(replayer: Replayer, reading: ChannelReading, comparison: Comparison) -> float:
-    """Return the score, percent, of the best prediction without dynamics: nothing moves, or all as the base does.
+    """Return the score, percent, of the best prediction without dynamics: no motion, or the motion of the base.
 
-    The drive times the gain that suits the record best, on the same clock and the same samples.
+    The prediction is the drive times its best gain, on the same clock and the same samples.
     """
     drive = replayer.drive
     if drive is None or replayer.replay.drive != "base_acceleration" or reading.variable != "acceleration":
@@ -137,12 +137,11 @@ class Scores:
     Attributes
     ----------
     fitted, others : mapping of str to float
-        Variance accounted for, of the recordings that were fitted and of those that were not; NaN where nothing
-        happened in a record.
+        Variance accounted for, of fitted recordings and of the others; NaN if the record has no motion.
     without_dynamics : mapping of str to float
-        Of the best prediction without dynamics, of all of them.
+        Score of the best prediction without dynamics, for all recordings.
     held : mapping of str to Held
-        Over which span of each the replay holds.
+        The span of each recording over which the replay holds.
     remarks : tuple of str
     """
 
@@ -158,14 +157,13 @@ def scores_of(
 ) -> Scores:
     """Return the score of each channel of each recording; a recording with several channels has several rows.
 
-    A record in which nothing happened has nothing to be scored: beside the largest motion of the same channel in any
-    of them, it has less than `LEAST_MOTION` of the energy.
+    A record without motion has no score: its energy is below `LEAST_MOTION` of the largest of the same channel.
 
     Parameters
     ----------
     replayers, comparisons : sequences, one for each recording
     fitted : int
-        The first so many recordings were fitted.
+        Number of fitted recordings, which come first.
     """
     motions = [[_motion(comparison) for comparison in compared] for compared in comparisons]
     own: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""One point of a scene, simulated in this process; `dataset` makes the dataset of such runs."""
+"""One point of a scene, simulated in this process; `dataset` makes the dataset of the runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which effects a scene calls for, at one of its points at least: by its numbers, or by its components."""
+"""Effects that a scene asks for at one or more of its points, by its numbers or by its components."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
 STRUCTURES = ("Chain", "Beam")
-"""Bodies that follow their energies only where these are asked for."""
+"""Bodies that follow their energies only on request."""
 BODIES = ("Oscillator", *STRUCTURES)
 _PLACE = r"(\[\d+\])?"
 _OF_A_BODY = {
@@ -26,7 +26,7 @@ _OF_A_BODY = {
     "stops": re.compile(rf"contact{_PLACE}\.law"),
     FALLING_RESTITUTION: re.compile(rf"contact{_PLACE}\.yield_velocity"),
 }
-"""Parameters of bodies that call for an effect where they are not 0; all of them start with 0."""
+"""Parameters of bodies that ask for an effect where they are not 0; the default of each is 0."""
 _OF_OTHERS = {
     "ImpactStop": {FALLING_RESTITUTION: re.compile("yield_velocity")},
     "Exciter": {FALLING_FORCE: re.compile("distance")},
@@ -44,19 +44,19 @@ _WHOLE = {
 
 
 def called_by_numbers(scene: Parts) -> set[str]:
-    """Return the effects that numbers other than 0 call for."""
+    """Return the effects that numbers other than 0 ask for."""
     return {rule_of(scene.field(key)).effect for key, largest in _largest(scene).items() if largest > 0.0}
 
 
 def _largest(scene: Parts) -> dict[str, float]:
-    """Return the largest magnitude that each number of a scene has over its sweep, by key."""
+    """Return the largest magnitude of each number of a scene over its sweep, by key."""
     numbers = [axis for axis in scene.sweep if axis.key != RECORDING_KEY]
     swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in numbers}
     return {key: abs(number) for key, number in scene.constants().items()} | swept
 
 
 def called_by_components(scene: Parts) -> set[str]:
-    """Return the effects that the components of a scene call for, at one point of its sweep at least."""
+    """Return the effects that the components of a scene ask for at one or more points of its sweep."""
     swept = {axis.key: max(map(abs, axis.values)) for axis in scene.sweep}
     found: set[str] = set()
     for component in scene.components:
@@ -75,12 +75,12 @@ def called_by_components(scene: Parts) -> set[str]:
 
 
 def shipped_kind(component: ComponentSpec) -> str:
-    """Return which component of the package a component of a scene is; empty for any other FMU."""
+    """Return the name of the package's FMU that a component uses; empty for any other FMU."""
     return component.fmu.stem if component.fmu.is_relative_to(package_folder()) else ""
 
 
 def _numbers(component: ComponentSpec, swept: dict[str, float]) -> Iterator[tuple[str, bool]]:
-    """Yield each parameter, and whether it is not 0 at one point of the sweep at least."""
+    """Yield each parameter, and whether it differs from 0 at one or more points of the sweep."""
     for name, value in component.parameters.items():
         largest = swept.get(f"{component.name}.{name}", value)
         yield name, largest not in ("none", "", "0") and bool(largest)

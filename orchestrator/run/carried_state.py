@@ -1,8 +1,8 @@
 """The state of a structure that a sweep carries to its next point, where a stop may have moved into the body.
 
-A rigid stop that has moved beyond the body pushes it back by the smallest motion in the metric of its masses:
-along the mobility of the contact, which is the way an impulse at the stop would move it, and the contact points
-then rest on their stops. All other motion is kept. A compliant stop is just pressed in.
+A rigid stop that has moved beyond the body pushes the body back by the smallest motion in the metric of its masses.
+This motion follows the mobility of the contact, as an impulse at the stop would. The contact points then rest on
+their stops, and all other motion is kept. A compliant stop is only pressed in.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from vibroimpact.orchestrator.scene.models import Stop
 Floats = NDArray[np.float64]
 State = tuple[float, ...]
 
-#: Distance beyond a stop, relative to the sum of what the modes contribute, above which the stop has moved.
+#: Distance beyond a stop over the sum of all modal contributions, above which the stop has moved.
 MOVED = 1e-12
-#: Relative distance below which a contact is on its stop, as in its FMU.
+#: Relative distance beyond a stop, up to which a contact is on its stop, as in its FMU.
 ROUNDING = 2.0 * float(np.finfo(np.float64).eps)
-#: Relative distance in front of its stop at which a contact is put, lest rounding has it beyond in its FMU.
+#: Relative distance in front of its stop at which a contact is put, so that rounding in its FMU keeps it in front.
 MARGIN = 1e-14
 
 
 def on_free_side(body: BodyPoints, stops: Sequence[Stop], state: State) -> State:
-    """Return a state of a structure that passes no rigid stop."""
+    """Return the state of a structure, pushed back where it is beyond a rigid stop."""
     rigid = [number for number, stop in enumerate(stops) if LAWS[stop.law].is_rigid]
     if not rigid:
         return state
@@ -53,7 +53,7 @@ def on_free_side(body: BodyPoints, stops: Sequence[Stop], state: State) -> State
     return (*q.tolist(), *p.tolist())
 
 
-def _smallest(shapes: Floats, motions: Floats, wanted: Floats) -> Floats:
-    """Return the smallest motion, by its kinetic energy, that moves the contacts by so much."""
-    forces = np.linalg.lstsq(shapes @ motions.T, wanted, rcond=None)[0]
+def _smallest(shapes: Floats, motions: Floats, distances: Floats) -> Floats:
+    """Return the motion with the smallest kinetic energy that moves the contacts by the given distances."""
+    forces = np.linalg.lstsq(shapes @ motions.T, distances, rcond=None)[0]
     return np.asarray(motions.T @ forces, dtype=np.float64)

@@ -1,6 +1,6 @@
 """A short-form scene with every component its own FMU: the body, and one ImpactStop for each stop (`coupled`).
 
-The same interface as `fused.BodyDriver`, so that a run does not know which of the two carries it.
+It has the interface of `fused.BodyDriver`, so a run works with either of the two.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
 from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
 
-#: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
+#: Events after which the body's record is emptied: an impact writes at most two rows, and there is room for 512.
 IMPACTS_PER_BLOCK = 200
 BODY = "body"
-#: What of a contact port is its stop's own too.
+#: Parameters of a contact port that its stop has, too.
 LAW_PARAMETERS = ("position", "restitution", "yield_velocity", "stiffness", "damping", "exponent")
 ANSWERS = ("applied_restitution", "applied_force", "applied_stiffness", "applied_damping")
 
 
 def stop_name(k: int) -> str:
-    """Name of the component of stop `k` (1-based)."""
+    """Return the name of the component of stop `k` (1-based)."""
     return f"stop{k}"
 
 
@@ -48,7 +48,7 @@ def connections_of(stops: int) -> list[ConnectionSpec]:
 
 
 def body_integers(integers: Mapping[str, int]) -> dict[str, int]:
-    """Return a body's integer parameters for stops that are FMUs of their own: their laws become external."""
+    """Return a body's integer parameters for stops that are separate FMUs: their laws become external."""
     answers = {"rigid": contact_law("external").number, "yielding": contact_law("external_force").number}
 
     def law_of(number: int) -> int:
@@ -68,7 +68,7 @@ def stop_of(k: int, integers: Mapping[str, int], version: str = "3.0") -> Compon
 
 
 def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
-    """Return the parameters of the stops, with the names of the body's parameters that they come from."""
+    """Return the parameters of the stops, each with the name of the body's parameter that gives its value."""
     known = value_references(unpack(fmu_path("ImpactStop")))
     return {
         (stop_name(k), name): f"contact[{k}].{name}"
@@ -81,12 +81,13 @@ def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, 
 class CoupledDriver(RecordedBody):
     """Drives a body and its stops through whole runs.
 
-    The numbers of the body are those of `BodyDriver`, with the laws of its stops as they are in a scene. Each stop gets
-    its own, and the body is told that they are external; numbers of laws that are external already stay. `macro_step`
-    is the longest communication step, s; `exchange` says how values are exchanged, on which contacts do not depend.
-    `body` names the body's FMU: `Oscillator`, `Chain` or `Beam`. `others` are further components, such as a Replay, and
-    `connections` say how they are connected to the body. `wrap` is given a component's name, and returns what wraps the
-    functions of its FMU.
+    `floats` and `integers` are the parameters of `BodyDriver`, with the laws of the stops as in a scene. Each stop gets
+    its law, and the body gets external laws instead; laws that are external already stay.
+
+    `macro_step` is the longest communication step, s. `exchange` is the way of exchanging values; contacts do not
+    depend on it. `body` names the body's FMU: `Oscillator`, `Chain` or `Beam`. `others` are further components, such as
+    a Replay, and `connections` are their connections to the body. `wrap` returns, for a component's name, the wrapper
+    of its FMU's functions.
     """
 
     def __init__(
@@ -139,7 +140,7 @@ class CoupledDriver(RecordedBody):
         values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
         values |= {target: floats[source] for target, source in self._stop_floats.items()}
         log = self.importer.components[BODY].instance.log
-        log.take()  # what the run before has left is not said of this one
+        log.take()  # discard messages of the run before
         self.importer.begin(0.0, values)
         self.warnings = log.take()
 
@@ -149,12 +150,12 @@ class CoupledDriver(RecordedBody):
         self.take_rows()
 
     def _make_room(self) -> None:
-        """Empty the record; the body pauses when it is full, and after some hundredths of a second of work."""
+        """Empty the record and check the deadline, each time the body pauses or a block of events is full."""
         self.take_rows()
         self._deadline.refuse_late()
 
     def _uncounted(self) -> int:
-        """Return how many events may pass until the record is to be emptied, or the run to end."""
+        """Return the number of events that may pass before the record must be emptied, or the run end."""
         return min(IMPACTS_PER_BLOCK - 1 - self._events % IMPACTS_PER_BLOCK, self._limit - self._events)
 
     def _count_late(self, events: NDArray[np.float64]) -> None:

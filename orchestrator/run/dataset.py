@@ -1,4 +1,4 @@
-"""The dataset of runs: what a scene says of names, units and groups, handed to the dataset's writer."""
+"""The dataset of runs: names, units and groups of a scene, handed to the dataset's writer."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1",
 
 
 class DatasetForm:
-    """What a scene says of its dataset, found once: names, units, groups, and the numbers that it does not sweep.
+    """The names, units, groups and constants of a scene's dataset, found once.
 
     Parameters
     ----------
@@ -73,17 +73,17 @@ class DatasetForm:
         *,
         constants: bool = False,
     ) -> xr.Dataset:
-        """Return the one-dimensional dataset of points and what became of them; impossible values are marked.
+        """Return the one-dimensional dataset of points and their results; impossible values are marked.
 
         Parameters
         ----------
         points : PointColumns
         records : sequence of RunRecord, or RunColumns
-            What became of each.
+            Results of the points, in their order.
         attrs : mapping
             Attributes of the file.
         constants : bool
-            Whether what the scene does not sweep is among the coordinates.
+            Whether numbers that are not swept are among the coordinates.
         """
         scene = self._scene
         if scene.channels and not isinstance(records, RunColumns):
@@ -108,16 +108,16 @@ class DatasetForm:
         return omitted
 
     def arrays(self, columns: RunColumns) -> dict[str, Any]:
-        """Return what points recorded as arrays, by their names in the dataset and in its types."""
+        """Return the results of points as arrays, with the names and the types of the dataset."""
         return arrays_of(columns, self.omitted, each_period=self._said["each_period"])
 
     def refuse_impossible(self) -> None:
-        """Raise DatasetError where no dataset of the scene can be made, whatever its points record."""
+        """Raise DatasetError unless the scene can have a dataset, whatever its points record."""
         point = columns_of_points(expand(self._scene), 0, 1)
         self.dataset(point, [empty_record(self._scene, Outcome.error, "", 0.0)], {}, constants=True)
 
     def constants(self) -> dict[str, Described]:
-        """Return what the scene does not sweep as scalar coordinates."""
+        """Return the numbers that the scene does not sweep as scalar coordinates."""
         return {
             name: (dims, value.copy(), dict(attrs)) for name, (dims, value, attrs) in self._constants.items()
         }
@@ -158,12 +158,12 @@ def tally(dataset: xr.Dataset) -> dict[str, int]:
 
 
 def has_messages(dataset: xr.Dataset) -> bool:
-    """Say whether a run failed, or warns of something: either has a message."""
+    """Return whether any run has a message: it failed, or it warns."""
     return any(dataset.variables["message"].values.tolist())
 
 
 def _described(scene: Scene, names: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """Return the attributes that numbers of a scene have beside name and unit, by their names in the file."""
+    """Return further attributes of a scene's numbers, besides name and unit, by their names in the file."""
     found = {file: {"long_name": long_name} for file, long_name in _long_names(scene, names).items()}
     for key, dimension in shared_dimensions(scene.sweep).items():
         if key in names:
@@ -172,39 +172,39 @@ def _described(scene: Scene, names: Mapping[str, str]) -> dict[str, dict[str, An
 
 
 def with_constants_of(dataset: xr.Dataset, scene: Scene) -> xr.Dataset:
-    """Return the dataset of a scene's runs with what the scene does not sweep as scalar coordinates."""
+    """Return the dataset of a scene's runs with the numbers that are not swept as scalar coordinates."""
     return dataset.assign_coords(wrapped(DatasetForm(scene).constants()))
 
 
 def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
-    """Return the name in the file of each key that is not swept: named as if swept, beside those that are."""
+    """Return the name in the file of each key that is not swept, named like a swept key."""
     every = [*keys, *(axis.key for axis in scene.sweep)]
     short = {key: coordinate_name(key, every) for key in keys}
     twice = Counter(short.values())
     taken = _taken(scene) | set(coordinate_names(scene).values()) | set(stored_samples(scene))
-    wanted = [name if twice[name] == 1 else key for key, name in short.items()]
-    return dict(zip(short, file_names(wanted, taken), strict=True))
+    preferred = [name if twice[name] == 1 else key for key, name in short.items()]
+    return dict(zip(short, file_names(preferred, taken), strict=True))
 
 
 def coordinate_names(scene: Scene) -> dict[str, str]:
-    """Return the name that each swept key has in the file, by key."""
+    """Return the name in the file of each swept key, by key."""
     keys = [axis.key for axis in scene.sweep]
-    wanted = [scene.sweep_coordinate_name(key) for key in keys]
-    return dict(zip(keys, file_names(wanted, _taken(scene)), strict=True))
+    preferred = [scene.sweep_coordinate_name(key) for key in keys]
+    return dict(zip(keys, file_names(preferred, _taken(scene)), strict=True))
 
 
 def _taken(scene: Scene) -> frozenset[str]:
-    """Return the names that no number of a scene may have in the file: what has the name of a dimension is along it."""
+    """Return the names that no number of a scene may have in the file, among them the names of dimensions."""
     return RESERVED_NAMES | set(shared_dimensions(scene.sweep).values())
 
 
 def stored_samples(scene: Scene) -> tuple[str, ...]:
-    """Return the name that each sampled variable has in the file, in the order of the scene."""
+    """Return the name in the file of each sampled variable, in the order of the scene."""
     return file_names(scene.sampled, _taken(scene) | set(coordinate_names(scene).values()))
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
-    """Units that the names do not say."""
+    """Return the units that the dataset cannot derive from the names alone, by name in the file."""
     if not scene.is_one_body:
         units = dict(scene.declared_units)
         stored = {file: units[key] for key, file in names.items() if key in units}
@@ -215,7 +215,7 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
 
 
 def cf_unit(scene: Scene, key: str) -> str | None:
-    """Return the unit of a number of the short form as CF writes it; None where CF cannot write it."""
+    """Return the unit of a number of the short form in CF notation; None where CF has no notation for it."""
     if key == RECORDING_KEY:
         return "1"
     if key.startswith("forcing.amplitude") and scene.forcing is not None:
@@ -231,7 +231,7 @@ def _unit(scene: Scene, key: str) -> str:
 
 
 def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
-    """Names of swept keys whose unit cannot be said otherwise."""
+    """Return long names with the unit, for keys whose unit CF cannot write, by name in the file."""
     if not scene.is_one_body or scene.units != "SI":
         return {}
     unsaid = {file: key for key, file in names.items() if cf_unit(scene, key) is None}
@@ -239,7 +239,7 @@ def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _named_contacts(names: Sequence[str]) -> dict[str, Any]:
-    """Return the attributes of the number of a contact: what each number means."""
+    """Return the attributes of the number of a contact, with the meaning of each number."""
     return {
         "long_name": "number of the contact of the scene, from 1",
         "flag_values": np.arange(1, len(names) + 1, dtype=RULES["impact_contact"].dtype),
@@ -253,7 +253,7 @@ def _omitted(scene: Scene) -> tuple[str, ...]:
 
 
 def compared_names(scene: Scene) -> tuple[str, ...]:
-    """Return the names of what a replay compares."""
+    """Return the names of the pairs that a replay compares."""
     if scene.replay is None:
         return ()
     return tuple(f"{pair.simulated} ~ {pair.measured}" for pair in scene.replay.compare)

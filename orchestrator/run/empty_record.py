@@ -1,4 +1,4 @@
-"""The record of a run that has no results, with the groups that its scene asks for, all empty."""
+"""The record of a run without results, with the groups of its scene, all empty."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 
 MOST_CONTACTS = int(np.iinfo(RULES["impact_contact"].dtype).max)
-"""Contacts of a scene of components that a table of impacts can number."""
+"""Largest number of contacts of a scene of components that its table of impacts can number."""
 
 
 def records_impacts(scene: Scene) -> bool:
-    """Say whether runs of a scene have a table of impacts: of components it is that of their contacts."""
+    """Return whether runs of a scene have a table of impacts; scenes of components need contacts for it."""
     return scene.record.impacts and (scene.is_one_body or 0 < len(scene.contacts) <= MOST_CONTACTS)
 
 
@@ -32,11 +32,11 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     Parameters
     ----------
     scene : Scene
-        Says which groups the record has.
+        Scene with the groups of the record.
     outcome, message
-        How the run ended, and why.
+        Outcome of the run, and its reason.
     seconds : float
-        Wall time it took, s.
+        Wall time of the run, s.
     """
     record, names = scene.record, scene.sampled
     elements = most_elements(scene)

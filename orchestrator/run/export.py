@@ -23,18 +23,18 @@ def export_scene(
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
-    """Write an FMU of a scene's body, stops and forcing; a default run of it takes as long as the scene records.
+    """Write an FMU of a scene's body, stops and forcing; its default experiment ends with the scene's recording.
 
     Parameters
     ----------
     scene : Scene
-        Of one body, not replayed. What it sweeps has the value that it has in its own table.
+        A scene of one body without a replay. Swept keys have the values of their own tables.
     output : path
         File to write.
     fmi : str
         `3.0` or `2.0`.
     full, external, enumerations, platform, note
-        As `vibroimpact.fmus.export` has them.
+        See `vibroimpact.fmus.export`.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def export_scene(
     Raises
     ------
     UsageError
-        The scene has another kind of body, or the file cannot be written.
+        The scene has components, a replay or a force that falls with the distance, or the file cannot be written.
     """
     if not scene.is_one_body:
         raise UsageError(

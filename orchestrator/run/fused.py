@@ -1,4 +1,4 @@
-"""One body FMU of ours driven alone: its contacts are resolved inside its own long steps (`fused`)."""
+"""One body FMU of the package driven alone: it resolves its contacts inside its own long steps (`fused`)."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from vibroimpact.orchestrator.run.record import (
 
 @dataclass(frozen=True, slots=True)
 class HeldExciter:
-    """What makes a force of a voltage where a step begins: its numbers, and the body's displacement there by name."""
+    """An exciter that turns a voltage into a force at the start of a step: its numbers, its displacement variable."""
 
     magnet: stepping.Magnet
     displacement: str
 
 
 class BodyDriver(RecordedBody):
-    """Drives one instance of a body FMU (FMI 3.0), which is used again for every run.
+    """Drives one instance of a body FMU (FMI 3.0), which all runs share.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ class BodyDriver(RecordedBody):
     body : str
         Name of the FMU: `Oscillator`, `Chain` or `Beam`.
     wrap : callable or None
-        Given a component's name: what wraps the functions of its FMU.
+        Returns, for a component's name, the wrapper of its FMU's functions.
 
     Attributes
     ----------
     references : dict of str to int
         Value reference of each variable of the body.
     float_names : tuple of str
-        Real parameters in the order in which they are set.
+        Names of the real parameters, in the order of their values.
     integers : list of VariableGroup
         Integer and Boolean parameters, with their values.
     """
@@ -72,7 +72,7 @@ class BodyDriver(RecordedBody):
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
         self.float_names = tuple(floats)
-        self._held: tuple[str, ...] | None = None  # what a block of samples reads that is not recorded
+        self._held: tuple[str, ...] | None = None  # outputs of the last block without a record
         self.integers = []
         for kind, is_boolean in (("Int64", False), ("Boolean", True)):
             values = {name: v for name, v in integers.items() if isinstance(v, bool) is is_boolean}
@@ -100,7 +100,7 @@ class BodyDriver(RecordedBody):
         self.rows.blocks = []
         self._held = None
         instance = self.instance
-        instance.log.take()  # what the run before has left is not said of this one
+        instance.log.take()  # discard messages of the run before
         instance.reset()
         self._floats.values[:] = [floats[name] for name in self.float_names]
         self._floats.set()
@@ -113,8 +113,8 @@ class BodyDriver(RecordedBody):
     def advance(self, end: float) -> None:
         """Advance to time `end`, s.
 
-        The body ends a step early when its record is full, and after some hundredths of a second of work: then
-        rows are taken, and the clock and signals are heard.
+        The body ends a step early when its record is full, and after some hundredths of a second of work. The rows are
+        then taken, and Python checks the deadline and signals.
         """
         instance = self.instance
         while instance.time < end:
@@ -127,7 +127,7 @@ class BodyDriver(RecordedBody):
                 instance.time = end
 
     def advance_sampling(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Advance from one instant to the next by one call; return the sampled variables at each."""
+        """Advance through all instants by one call; return the sampled variables at each of them."""
         return self.hold(times, None, self._sampled_names, recording=True)
 
     def hold(
@@ -140,17 +140,18 @@ class BodyDriver(RecordedBody):
         exciter: HeldExciter | None = None,
         recording: bool = False,
     ) -> NDArray[np.float64]:
-        """Advance from sample to sample by one call, a force held before each; return outputs, shape (sample, output).
+        """Advance through all samples by one call, a force held before each; return outputs, shape (sample, output).
 
-        The ends, s, ascend from the time reached. A force, N, is held until the sample at its place; of an exciter it
-        is a voltage, V. Without forces the force stays as it is. `renewed` says by 1 where the force is made anew as
-        the step to a sample begins; left out, before each. `outputs` are variables of the body, read at each sample.
-        With `recording` it records as `record` says; else it records nothing from the first call on.
-        ImpactLimitReached, DeadlineReached: the run ends before, and they have its samples. ComponentError: the body
+        The ends, s, ascend from the time reached. Each force, N, is held until its sample; with an exciter the forces
+        are voltages, V. Without forces the force stays as it is. `renewed` is 1 where the force is set anew for the
+        step to a sample; the default is every step. `outputs` are variables of the body, read at each sample. With
+        `recording` the body records as set by `record`; without it, it records nothing from the first call on.
+
+        ImpactLimitReached, DeadlineReached: the run ends early; the error has its samples. ComponentError: the body
         fails, or touches the exciter.
         """
         if recording:
-            self._held = None  # the next block that does not record says so
+            self._held = None  # the next block without a record switches the record off
         elif self._held != tuple(outputs):
             self.record(impacts=False, extrema=False, periods=False)
             self._held = tuple(outputs)
@@ -196,7 +197,7 @@ class BodyDriver(RecordedBody):
     ) -> stepping.HoldPlan:
         references = self.references
         plan = stepping.HoldPlan(
-            # a chain has inputs of its own, which nobody sets here
+            # a chain has other inputs, which are not set here
             force=references.get("force", 0),
             force_rate=references.get("force_rate", 0),
             outputs=runs.RunsVariables(runs.address(read), len(read)),

@@ -32,16 +32,16 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.component_numbers import component_variable
 
 NO_ROWS = np.empty((0, 3))
-#: What components that are counted from 0 are counted from 1 with, in rows of events.
+#: Added to rows of events, whose column of components counts from 0; the dataset counts from 1.
 COUNTED_FROM_ONE = np.array([0.0, 0.0, 1.0])
 
 
 class GeneralRunner(Runner):
-    """Runs points of one scene of components in this process, with component instances that are used again.
+    """Runs points of one scene of components in this process; all points share the component instances.
 
-    `execution` is `coupled`, or `auto`, which takes it. `log` and `wrap` are given a component's name: where its log
-    lines go, and what wraps the functions of its FMU. Of the identity of a runner, `instruction_set` is the machine
-    architecture and `fmu_hashes` has the SHA-256 of each component's FMU.
+    `execution` is `coupled`, or `auto`, which means `coupled`. For a component's name, `log` returns the receiver of
+    its log lines, and `wrap` the wrapper of its FMU's functions. `instruction_set` is the machine architecture, and
+    `fmu_hashes` has the SHA-256 of each component's FMU.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class GeneralRunner(Runner):
         return [next(pairs if isinstance(each, PairSpec) else stops) for each in self.scene.contacts]
 
     def _build(self) -> None:
-        """Make the importer with all that watches it."""
+        """Make the importer with its watchers, its sampler and its energy balance."""
         scene = self.scene
         self._importer = Importer(
             scene.components,
@@ -101,7 +101,7 @@ class GeneralRunner(Runner):
         return Sampler(self._importer, names, scene.sampling_rate) if names else None
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
-        """Run one point from the scene's start values; a general scene carries no state over.
+        """Run one point from the scene's start values; a general scene does not carry states over.
 
         ComponentError: a component fails, with its instance, function and time.
         """
@@ -109,13 +109,13 @@ class GeneralRunner(Runner):
         scene = self.scene.at(values) if values else self.scene
         if self._broken:
             self._rebuild()
-        self._broken = True  # until this run ends well: after an error FMI allows little but to free
+        self._broken = True  # until this run ends well: after an error FMI allows little but freeing
         try:
             outcome, message = self._run(scene)
         except ComponentError as error:
             if not error.function.endswith("Reset"):
                 raise
-            self._rebuild()  # the end of the run before has failed: no fault of this one
+            self._rebuild()  # the reset after the run before has failed, which is no fault of this run
             outcome, message = self._run(scene)
         self._broken = False
         return self._record(outcome, message, time.perf_counter() - began)
@@ -129,20 +129,20 @@ class GeneralRunner(Runner):
         record, execution = scene.record, scene.execution
         self._deadline.begin(execution.deadline)
         self._limit, self._seen = execution.impact_limit, 0
-        # what happens where the motion begins belongs to a recording that begins there
+        # a recording from time 0 includes the events at time 0
         self._events, self._recording = [], record.transient_time == 0.0
         start: dict[tuple[str, str], Value] = {
             (c.name, name): value for c in scene.components for name, value in c.parameters.items()
         }
         self._importer.keeps_start = False
         for component in self._importer.components.values():
-            component.instance.log.take()  # what it said in the point before is no reason for this one's end
+            component.instance.log.take()  # discard messages of the point before
         self._set_gains(scene)
         self._importer.macro_step = scene.macro_step
         self._importer.contacts.take_numbers(scene.stop_contacts, scene.pairs)
         end = record.transient_time + record.recorded_time
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end
+            with np.errstate(over="ignore", invalid="ignore"):  # overflow is refused at the end of the run
                 self._importer.begin(0.0, start)
                 self._energy.begin(scene.connections)
                 self._importer.advance(record.transient_time)
@@ -165,7 +165,7 @@ class GeneralRunner(Runner):
         return Outcome.ok, "; ".join(self._remarks())
 
     def _remarks(self) -> list[str]:
-        """What a reader of the results must know of a run that went well."""
+        """Return remarks on a successful run that a reader of its results must know."""
         remarks = [
             f"{watch.component.name}.{watch.event.variable}: its events accumulated at time {watch.last_time:.17g}; "
             "those after it are not located"
@@ -206,9 +206,9 @@ class GeneralRunner(Runner):
             self._importer.plan_moves()
 
     def _refuse_not_finite(self) -> None:
-        """A component that answers NaN is broken: say which and when, where samples show it.
+        """Raise ComponentError with component and time unless all samples are finite.
 
-        A variable whose description names NaN has it as a value, as the phase of the last impact before the first.
+        NaN is allowed in variables whose description names it, such as the phase of the last impact before the first.
         """
         if self._sampler is None:
             return
@@ -230,7 +230,7 @@ class GeneralRunner(Runner):
         variable = self._importer.components[component].variables[name]
         return "nan" in re.findall(r"\w+", (variable.description or "").lower())
 
-    # ---- what happens during a run ----
+    # ---- events of a run ----
 
     def _note_late(self, events: NDArray[np.float64]) -> None:
         self._seen += len(events)

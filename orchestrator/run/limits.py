@@ -1,8 +1,8 @@
-"""What lanes, orbits and ways of the studies cannot take: one table, and what a scene has of it.
+"""The limits of lanes, orbits and the studies' ways: one table, and the entries of the table that a scene has.
 
-`execution.how = "auto"` lets the points of a sweep run in lanes (`fmus.core.run_lanes`) where its bodies have few modes
-between restitution stops and each point is a run by itself or continues the one before. A point that chatters, rests
-or is rare in another way is left by the lanes: it runs by the scalar engine, from its start, as in a fused run.
+`execution.how = "auto"` lets the points of a sweep run in lanes (`fmus.core.run_lanes`). Its bodies then have few modes
+between restitution stops, and each point is independent or continues the point before. Lanes leave out points that
+chatter, rest or are rare in another way. These points run by the scalar engine from their start, as in a fused run.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
 
 MOST_SENSORS = 4
-"""Places where the FMU of a beam shows its motion."""
+"""Largest number of places where the FMU of a beam has outputs of its motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Who cannot take something of a scene."""
+    """The users that cannot take one feature of a scene."""
 
     lanes: bool = False
-    """Whether lanes leave the scene; of modes that are coupled, or none, they leave each point."""
+    """Whether lanes cannot run the scene at all; coupled or missing modes are left out point by point instead."""
     orbits: str = ""
-    """What a search for orbits expects in its place."""
+    """Feature that a search for orbits expects instead; empty where it takes this one."""
     pushed: str = ""
-    """Why no force acts at its stops on a body that knows nothing of them."""
+    """Reason why no force can act at the stops on a body without stops in its FMU."""
     thrown_back: str = ""
-    """Why its state after an impact on a rigid stop does not follow from its modes or masses."""
+    """Reason why the state after an impact on a rigid stop does not follow from the modes or masses."""
 
 
 _NONE = "0 where orbits are followed"
@@ -64,7 +64,7 @@ LIMITS = {
 
 
 class Seen(NamedTuple):
-    """Something of a scene that is in the table: its row, its key, and what the scene has."""
+    """A feature of a scene in the table of limits: its row, its key, and the scene's value."""
 
     row: str
     where: str
@@ -72,7 +72,7 @@ class Seen(NamedTuple):
 
 
 def seen(scene: Scene) -> Iterator[Seen]:
-    """Yield what the tables of a scene have that somebody cannot take."""
+    """Yield the features of a scene that have a row in the table of limits."""
     if not scene.is_lone_body:
         yield Seen("body", "body", "a scene of components" if scene.replay is None else "a replay")
     if scene.period is None:
@@ -98,7 +98,7 @@ def seen(scene: Scene) -> Iterator[Seen]:
 
 
 def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
-    """Return whether a scene of the short form has what lanes alone cannot take."""
+    """Return, by feature, whether a scene of the short form has a feature that only lanes cannot take."""
     body = scene.body
     return {
         "measuring chain": scene.is_measured or scene.exciter is not None,
@@ -112,7 +112,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
 
 
 def seen_of_flaw(scene: Scene, flaw: str) -> Seen:
-    """Return what keeps a scene's body from flying in modes: see `flaw` of `BodyPoints`."""
+    """Return the feature that keeps a scene's body from flying in modes: see `flaw` of `BodyPoints`."""
     if flaw == "coupled":
         got = "one that does. Dampings in proportion to the stiffnesses do not"
         return Seen("coupled", "body.dampings", got)
@@ -121,37 +121,37 @@ def seen_of_flaw(scene: Scene, flaw: str) -> Seen:
 
 
 def refuse_orbits(scene: Scene, found: Iterable[Seen]) -> None:
-    """Raise UsageError with the first thing that a search for orbits cannot take."""
+    """Raise UsageError unless a search for orbits can take all features of a scene."""
     for row, where, got in found:
         if LIMITS[row].orbits:
             raise UsageError(f"{scene.source}: {where}: expected {LIMITS[row].orbits}, got {got}.")
 
 
 def why_not_pushed(scene: Scene) -> str:
-    """Return why no force can act on a body where its stops are; empty where one can."""
+    """Return the reason why no force can act on a body at its stops; empty where a force can act."""
     return "" if body_points(scene).is_pushed() else LIMITS["force"].pushed
 
 
 def why_not_thrown_back(scene: Scene) -> str:
-    """Return why the state of a body after an impact on a rigid stop cannot be told by its modes or masses alone."""
+    """Return the reason why the state after an impact on a rigid stop does not follow from the modes or masses."""
     return next((LIMITS[each.row].thrown_back for each in seen(scene) if LIMITS[each.row].thrown_back), "")
 
 
 def may_go_by_lanes(scene: Scene) -> bool:
-    """Whether lanes can run the points of a scene: its body flies as few modes between few rigid stops."""
+    """Return whether lanes can run the points of a scene: its body flies as few modes between few rigid stops."""
     return not any(LIMITS[each.row].lanes for each in seen(scene)) and not any(
         _kept_from_lanes(scene).values()
     )
 
 
 def goes_by_lanes(scene: Scene) -> bool:
-    """Whether the points of a scene run many at once: it depends on what it sweeps, not on the number of points."""
+    """Return whether the points of a scene run in lanes, which does not depend on the number of points."""
     execution = scene.execution
     return (
         execution.how == "auto"
         and bool(scene.sweep)
         and not execution.guard
-        # the clock of a point that shares its lanes is not its own
+        # points that share lanes have no clock of their own
         and execution.deadline is None
         and may_go_by_lanes(scene)
         and _has_many_branches(scene)
@@ -159,9 +159,9 @@ def goes_by_lanes(scene: Scene) -> bool:
 
 
 def _has_many_branches(scene: Scene) -> bool:
-    """Whether points can run beside each other: along one path alone each waits for the one before.
+    """Return whether points can run side by side; along a single path each point waits for the point before.
 
-    A chain hands on the state of its masses, which its modes have only to rounding: its points go one by one.
+    The points of a chain run one by one: it hands on the state of its masses, which modes give only to rounding.
     """
     chained = [axis for axis in scene.sweep if axis.continuation]
     if not chained:

@@ -1,4 +1,4 @@
-"""Which runner a scene gets in this process: of one body, of any components, or of a replay."""
+"""The choice of a scene's runner in this process: of one body, of any components, or of a replay."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
 
 REPLAY_RUNNER = "vibroimpact.orchestrator.replay.runner:ReplayRunner"
-"""Replays are a floor above: named here, loaded by those who replay."""
+"""Runner of replays, by name: replays belong to a higher layer, which only scenes with a replay import."""
 
 
 def open_runner(
@@ -24,7 +24,7 @@ def open_runner(
         The scene cannot run this way, or a component cannot be loaded.
     """
     if not scene.is_one_body:
-        # loaded by those who couple components
+        # imported only for scenes of components
         from vibroimpact.orchestrator.run.general import GeneralRunner
 
         return GeneralRunner(scene, execution=execution, log=log, wrap=wrap)
@@ -34,7 +34,7 @@ def open_runner(
 
 
 def named_runner(scene: Scene, dotted: str, execution: str | None = None) -> Runner:
-    """Return the runner of a scene whose class is given as `module:name`, so that a worker can find it by itself."""
+    """Return the runner of a scene by its class as `module:name`, which a worker process can import."""
     module, _, name = dotted.partition(":")
     make = getattr(importlib.import_module(module), name)
     runner: Runner = make(scene, execution=execution or scene.execution.how)

@@ -1,4 +1,4 @@
-"""From a scene to its body: the parameters of its FMU, what a continuation carries, and one object of modes."""
+"""From a scene to its body: the parameters of its FMU, the carried state of a continuation, the modes."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
     scene : Scene
         A scene of the short form.
     start : tuple of float or None
-        State carried over from the run before, at forcing phase 0: of an oscillator displacement (m) and
-        velocity (m/s), else the values of `state_variables`. What lies beyond a rigid stop (the stop moved)
-        is put on it, at rest. None: the scene's own start.
+        State carried over from the run before, at forcing phase 0: displacement (m) and velocity (m/s) of an
+        oscillator, else the values of `state_variables`. A state beyond a rigid stop that has moved is put back, see
+        `free_state`. None: the scene's own start.
     """
     body = scene.body
     parameters = named_numbers(body, body.size) | body.fmu_floats(scene.forcing, scene.stops, scene.sensor)
@@ -49,10 +49,10 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
 
 
 def exported_floats(scene: Scene) -> dict[str, float]:
-    """Return the real parameters of the body's FMU in other tools, which know nothing of the scene.
+    """Return the real parameters of the body's FMU for other tools, which do not have the scene.
 
-    They are `float_parameters`, but for a base that moves under an oscillator or a chain. A run gives such a body
-    the inertial force, and adds the base to the accelerations itself; an export has the base.
+    They equal `float_parameters`, except for a moving base of an oscillator or a chain. A run gives such a body the
+    inertial force and adds the base to the accelerations itself; an export has the base.
     """
     parameters, forcing = float_parameters(scene, None), scene.forcing
     if forcing is None or forcing.kind != "base_acceleration" or scene.body.KNOWS_BASE:
@@ -62,10 +62,10 @@ def exported_floats(scene: Scene) -> dict[str, float]:
 
 
 def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
-    """Return the numbers of a table of a scene by the names that its fields say they have in the FMU, SI.
+    """Return the numbers of a table of a scene by their variable names in the FMU, SI.
 
-    What the table leaves out, and has no default, is left out. `size` is the number of elements of each array, masses
-    or modes. One number is that of all of them; those that are left out at the end are 0.
+    Fields without a value and without a default are left out. `size` is the number of elements of each array (masses or
+    modes). A single number holds for all elements; missing elements at the end of a list are 0.
     """
     parameters: dict[str, float] = {}
     for variable in fmu_variables_of(type(table)):
@@ -81,9 +81,9 @@ def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
 
 
 def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float]) -> dict[str, float]:
-    """Return the force of an exciter: its amplitude is in V, its offset an input of the body, for a run to change.
+    """Return the parameters of an exciter's force, N: the amplitude from volts, and the offset as input of the body.
 
-    A force that falls with the distance is not known before: it is all input, see `measuring.held_exciter`.
+    A force that falls with the distance is not known in advance: all of it is input, see `measuring.held_exciter`.
     """
     if scene.falling_force:
         parameters = dict.fromkeys(forced.keys() & {"forcing.amplitude"}, 0.0)
@@ -95,7 +95,7 @@ def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float])
 
 
 def refuse_unknown_modes(scene: Scene) -> None:
-    """Refuse to run a scene with `modes = "auto"`, of which it is not yet known how many modes it has: UsageError."""
+    """Raise UsageError unless the number of modes of a scene is known, not still `modes = "auto"`."""
     if scene.body.finds_modes:
         raise UsageError(
             f'{scene.source}: body.modes: expected a number of modes, got "auto". run and campaign find it; '
@@ -117,21 +117,21 @@ def integer_parameters(scene: Scene) -> dict[str, int]:
 def state_variables(scene: Scene) -> tuple[str, ...]:
     """Return the outputs that are the whole state of a structure: displacements, then velocities.
 
-    Of a chain those of its masses, of a beam those of its modes. Empty for an oscillator, whose state is that
-    of the observed point, and for a general scene.
+    The outputs belong to the masses of a chain or to the modes of a beam. They are empty for a general scene, and for
+    an oscillator, whose state is the motion of the observed point.
     """
     return scene.body.state_variables if scene.is_one_body else ()
 
 
 def most_elements(scene: Scene) -> int:
-    """Return how many masses or modes a structure has, where a sweep varies them the most of them; else 0."""
+    """Return the number of masses or modes of a structure, the largest of a sweep; 0 for other bodies."""
     grows = scene.is_one_body and scene.body.KEEPS_MODES
     swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES and grows]
     return int(swept[0]) if swept else len(state_variables(scene)) // 2
 
 
 def padded_state(state: Floats | None, elements: int) -> Floats | None:
-    """Return a whole state with 0 for the modes that a point has not: all states of a sweep are of one size.
+    """Return a whole state with 0 for missing modes, so that all states of a sweep have one size.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def padded_state(state: Floats | None, elements: int) -> Floats | None:
 
 
 def without_padding(state: tuple[float, ...] | None, elements: int) -> tuple[float, ...] | None:
-    """Return a whole state as the body of its point has it, with fewer modes: see `padded_state`."""
+    """Return a whole state with only the modes of the body of its point: see `padded_state`."""
     if state is None or not elements:
         return state
     half = len(state) // 2
@@ -164,9 +164,9 @@ def contact_floats(scene: Scene) -> dict[str, float]:
 def free_state(
     scene: Scene, state: tuple[float, ...], floats: Mapping[str, float] | None = None
 ) -> tuple[float, ...]:
-    """Return a state that passes no rigid stop: N displacements (m), then N velocities (m/s), of masses or modes.
+    """Return a state put back where it is beyond a rigid stop: N displacements (m), then N velocities (m/s).
 
-    A stop that has moved puts an oscillator at rest on it, and pushes a structure back: see `carried_state`.
+    An oscillator beyond its stop is put on the stop, at rest; a structure is pushed back: see `carried_state`.
     """
     if scene.body.IS_STRUCTURE:
         from vibroimpact.orchestrator.run.carried_state import on_free_side  # few scenes need it
@@ -181,14 +181,14 @@ def free_state(
 
 
 def body_points(scene: Scene, columns: Columns | Mapping[str, float] | None = None) -> BodyPoints:
-    """Return the body of a scene as one object: modes, contacts, forcing and what is observed.
+    """Return the body of a scene as one object: modes, contacts, forcing and the observed point.
 
     Parameters
     ----------
     scene : Scene
-        Of the short form.
+        A scene of the short form.
     columns : mapping of str to ndarray, shape (point,), or to float, or None
-        Real parameters of the body's FMU at the points of the sweep, or at one; None: those of the scene as it is.
+        Real parameters of the body's FMU at many points of the sweep or at one; None: the parameters of the scene.
     """
     floats = float_parameters(scene, None) if columns is None else columns
     return POINTS_OF_FMU[scene.body.FMU](floats, integer_parameters(scene), len(scene.stops))

@@ -1,7 +1,7 @@
 """Runs the points of a scene: one point in, one `RunRecord` out.
 
-`fused` execution: the contact law runs inside the body FMU, and one step covers as many periods as the scene
-lets pass unrecorded. `coupled`: each stop is an FMU of its own, and the importer carries every contact between them.
+`fused` execution: the contact law runs inside the body FMU, and one step covers all periods that are not recorded.
+`coupled`: each stop is a separate FMU, and the importer transfers every contact between the FMUs.
 """
 
 from __future__ import annotations
@@ -55,38 +55,38 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
 ENGINE = 6
-"""Version of what follows our bodies, in C; with another one results differ, and no campaign mixes two."""
+"""Version of the C engine that follows the package's bodies; other versions give other results in a campaign."""
 
 SAMPLES_OF_A_BLOCK = 16_384
-"""Samples that are taken by one call, between two looks at the clock and for signals that C does not make itself."""
+"""Largest number of samples of one call, after which Python stores them and hears signals."""
 
 _DURATION = IMPACT_COLUMNS.index("impact_duration")
 
 
 class PointRunner(Runner):
-    """Runs points of one scene in this process, with component instances that are used again.
+    """Runs points of one scene in this process; all points share the component instances.
 
     Parameters
     ----------
     scene : Scene
         The scene; swept keys take their values from each point.
     execution : str
-        `fused`, `coupled`, or `auto`, which takes `lanes` for the points of a sweep that can go so, else `fused`.
+        `fused`, `coupled`, or `auto`, which takes `lanes` for sweeps that lanes can run, else `fused`.
     wrap : callable or None
-        Given a component's name: what wraps the functions of its FMU.
+        Returns, for a component's name, the wrapper of its FMU's functions.
 
     Attributes
     ----------
     execution : str
-        What runs: `fused`, `coupled`, or `lanes`, which run many points at once (`many_points`); a single one is fused.
+        `fused`, `coupled`, or `lanes` for many points at once (`many_points`); a single point of `lanes` runs fused.
     engine : int
-        Version of what follows the body.
+        Version of the engine that follows the body.
     instruction_set : str
-        Machine architecture the components are compiled for.
+        Machine architecture of the components.
     fmu_hashes : dict of str to str
         SHA-256 of each component's FMU, by instance.
     driver : RecordedBody
-        What drives the body.
+        The driver of the body.
     """
 
     engine = ENGINE
@@ -112,7 +112,7 @@ class PointRunner(Runner):
         self._built_for = built_for(scene)
 
     def _reopen_if_other(self, scene: Scene) -> None:
-        """Make the components anew where they were made for another number of modes, or another step."""
+        """Make the components anew unless they were made for the scene's number of modes and macro step."""
         if self._built_for != built_for(scene):
             self.driver.close()
             self._open(scene)
@@ -125,8 +125,8 @@ class PointRunner(Runner):
         values : mapping of str to float
             Values of the swept keys.
         start : tuple of float or None
-            State carried over at forcing phase 0, see `parameters.float_parameters`; None for the
-            scene's start state.
+            State carried over at forcing phase 0, see `parameters.float_parameters`; None: the scene's own
+            start state.
 
         Raises
         ------
@@ -144,17 +144,17 @@ class PointRunner(Runner):
 
     @cached_property
     def loop(self) -> PointLoop | None:
-        """The loop in C over points of the scene; None where they need Python in between."""
+        """The loop in C over points of the scene; None where the points need Python in between."""
         return loop_of(self.scene, self.driver, by_lanes=self.execution == "lanes")
 
     def rows(self, points: PointColumns, start: State | None = None, deadline: float = math.inf) -> Rows:
-        """Run the points of a sweep by one call where they allow it, see `Runner.rows`.
+        """Run the points of a sweep, by one call where possible, see `Runner.rows`.
 
-        The loop has the results of `run`, lanes have them to rounding.
+        The results of the loop equal those of `run`; the results of lanes equal them to rounding.
         """
         if not self.scene.sweep or self.loop is None:
             return super().rows(points, start, deadline)
-        # what runs many points takes time to load
+        # the import takes time
         from vibroimpact.orchestrator.run.many_points.rows import rows_of
 
         ran = rows_of(self.loop, points, start, deadline, self.record_of)
@@ -166,7 +166,7 @@ class PointRunner(Runner):
 
 
 def built_for(scene: Scene) -> tuple[object, ...]:
-    """Return what the components of a scene are made for, and no new parameter changes."""
+    """Return the numbers for which a scene's components are made, and which parameters cannot change later."""
     return scene.body.size, scene.body.kept_modes, scene.execution.macro_step
 
 
@@ -178,13 +178,13 @@ def driver_of(
     *,
     wrap: WrapOf | None = None,
 ) -> RecordedBody:
-    """Return what drives a scene's body: fused, or coupled to its stops and to other components."""
+    """Return the driver of a scene's body: fused, or coupled to its stops and to other components."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
     fmu = scene.body.FMU
     if execution in ("fused", "lanes"):
         return BodyDriver(floats, integers, fmu, wrap=wrap)
     if execution == "coupled":
-        # loaded by those who couple
+        # imported only for coupled execution
         from vibroimpact.orchestrator.run.coupled import CoupledDriver
 
         step = scene.execution.macro_step
@@ -203,7 +203,7 @@ def driver_of(
 
 
 class _Run:
-    """One run: when its recording begins and ends, and what it records."""
+    """One run: the times of its recording, and its record."""
 
     def __init__(
         self, scene: Scene, driver: RecordedBody, plan: TimeSeriesPlan, start: tuple[float, ...] | None
@@ -217,7 +217,7 @@ class _Run:
         self.measured: MeasuredRun | None = None
 
     def run(self) -> tuple[Outcome, str]:
-        """Run to the end; returns how that went."""
+        """Run to the end; return the outcome and its message."""
         execution, driver = self.scene.execution, self.driver
         driver.begin(self.parameters, execution.deadline)
         try:
@@ -235,7 +235,7 @@ class _Run:
         return self._ended()
 
     def _ended(self) -> tuple[Outcome, str]:
-        """Return how a run ended that came to its end."""
+        """Return the outcome and the message of a run that came to its end."""
         resting = self.driver.sticks_open()
         pressed = [(contact, start) for contact, start in resting if self._load(contact) > 0.0]
         idle = [contact for contact, _ in resting if contact not in dict(pressed)]
@@ -248,14 +248,14 @@ class _Run:
         return Outcome.stuck if stuck else Outcome.ok, "; ".join(filter(None, remarks))
 
     def _load(self, contact: int) -> float:
-        """Return the force that presses the body on a stop now, N."""
+        """Return the present force that presses the body on a stop, N."""
         return float(self.driver.values_of([f"contact[{contact}].force"])[0])
 
     def _go_measured(self) -> None:
-        # only a scene with a measuring chain needs what follows it
+        # only a scene with a measuring chain needs this import
         from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-        assert isinstance(self.driver, BodyDriver)  # the rules of scenes see to it
+        assert isinstance(self.driver, BodyDriver)  # the rules of scenes allow no other driver
         window = self.begin_time, self.end_time
         self.measured = MeasuredRun(self.scene, self.driver, self.plan, self.parameters, window)
         self.measured.go(self._begin_recording)
@@ -292,14 +292,14 @@ class _Run:
             rows = self.plan.rows(values, self.plan.variables, forcing, parameters, times)
             self.samples.append(np.column_stack([times, rows]))
 
-    # ---- what was recorded ----
+    # ---- record ----
 
     def _rests_for_ever(self, resting: Sequence[tuple[int, float]]) -> bool:
-        """Does the body rest for good on stops that it is pressed on, each with the start of its rest?
+        """Return whether the body rests for good on pressed stops, each given with the start of its rest.
 
-        An oscillator: no phase of the force can lift it. A structure, whose other modes go on: an observation.
-        The contact force has not reached zero over the whole recording or, without a period, over one of the
-        slowest mode, within which every mode of the held body has pulled at its strongest.
+        An oscillator rests for good if no phase of the force can lift it. A structure, whose other modes go on, is
+        observed: its contact force has not reached zero over the whole recording. Without a forcing period, one period
+        of the slowest mode is enough, since every mode of the held body has its strongest pull within it.
         """
         if not self.scene.body.IS_STRUCTURE:
             return self._is_pressed(resting[0][0])
@@ -312,13 +312,13 @@ class _Run:
         sign = 1.0 if stop.side == "upper" else -1.0
         press = sign * (self.parameters.get("force", 0.0) - self.parameters["stiffness"] * stop.position)
         if self.scene.falling_force:
-            return self.scene.period is None  # what the force is elsewhere nobody knows before
+            return self.scene.period is None  # the force at other phases is not known in advance
         return self.scene.period is None or press > abs(self.parameters.get("forcing.amplitude", 0.0))
 
     def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         """Return the record of the run."""
         self.driver.take_rows()
-        wanted = self.scene.record.impacts
+        has_impacts = self.scene.record.impacts
         displacement, velocity = self.driver.observed()
         if not math.isfinite(displacement):
             where = f"displacement: expected a finite number, got {displacement}"
@@ -327,8 +327,8 @@ class _Run:
             outcome=outcome,
             message=message,
             periods=self._period_rows(),
-            impacts=self.driver.impacts() if wanted else None,
-            sticks=self.driver.sticks() if wanted else None,
+            impacts=self.driver.impacts() if has_impacts else None,
+            sticks=self.driver.sticks() if has_impacts else None,
             samples=self._sample_rows(),
             final_displacement=displacement,
             final_velocity=velocity,
@@ -341,7 +341,7 @@ class _Run:
         if self.scene.period is None:
             return math.nan
         if outcome in (Outcome.ok, Outcome.stuck):
-            return 0.0  # runs end at forcing phase 0, exactly
+            return 0.0  # runs end exactly at forcing phase 0
         angle = self.parameters["forcing.angular_frequency"] * self.driver.time
         return (angle + self.parameters["forcing.phase"]) % TWO_PI
 

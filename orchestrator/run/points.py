@@ -1,4 +1,4 @@
-"""Points of a sweep as runners take them: swept values as arrays, the branch that each point is on, carried states."""
+"""Points of a sweep in the form for runners: swept values as arrays, branches, carried states."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from vibroimpact.analysis.dataset import Direction
 from vibroimpact.orchestrator.scene.sweep import Branch, Point
 
 State = tuple[float, ...]
-"""Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
+"""Displacement (m) and velocity (m/s) of an oscillator; N displacements, then N velocities of a structure."""
 
 
 @dataclass(frozen=True, slots=True)
 class BranchPoint:
-    """A point, the direction it is travelled in, whether its branch begins with it, and from which state then."""
+    """A point with the direction of its branch, whether it is first in its branch, and then its start state."""
 
     point: Point
     direction: Direction
@@ -27,9 +27,9 @@ class BranchPoint:
 
 @dataclass(frozen=True, slots=True)
 class PointColumns:
-    """Points as arrays, shape (point,): swept values, direction, place in the campaign, where a branch begins.
+    """Points as arrays, shape (point,): swept values, direction, place in the campaign, first points of branches.
 
-    `starts` has the states of those branches that do not begin where the scene does, by the index of their first point.
+    `starts` has the start states of branches that do not begin at the scene's start, by index of their first point.
     """
 
     values: Mapping[str, NDArray[np.float64]]
@@ -42,7 +42,7 @@ class PointColumns:
         return len(self.index)
 
     def chosen(self, which: slice | NDArray[np.bool_]) -> PointColumns:
-        """Return some of the points."""
+        """Return the chosen points."""
         values = {key: column[which] for key, column in self.values.items()}
         return PointColumns(values, self.direction[which], self.index[which], self.first[which], self.starts)
 
@@ -51,7 +51,7 @@ class PointColumns:
         return self.chosen(slice(count))
 
     def place(self, number: int) -> BranchPoint:
-        """Return one point."""
+        """Return the point at a place."""
         values = {key: float(column[number]) for key, column in self.values.items()}
         index, direction = int(self.index[number]), Direction(int(self.direction[number]))
         first = bool(self.first[number])
@@ -63,12 +63,12 @@ class PointColumns:
 
     @property
     def are_independent(self) -> bool:
-        """Whether no point starts from the state where another one ended."""
+        """Whether no point starts from the final state of another point."""
         return not self.direction.any()
 
 
 def independent_points(values: Mapping[str, NDArray[np.float64]], count: int) -> PointColumns:
-    """Return points that each start as the scene says, by their swept values, shape (point,)."""
+    """Return points that each begin at the scene's start, by their swept values, shape (point,)."""
     direction = np.full(count, Direction.independent, dtype=np.int8)
     return PointColumns(values, direction, np.arange(count), np.ones(count, dtype=np.bool_), {})
 

@@ -1,4 +1,4 @@
-"""What a person sees while a campaign runs: how far it is, how fast, and how long it will still take."""
+"""The progress of a running campaign on the screen: points done, speed and remaining time."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
 
 LINE_SECONDS = 5.0
-"""How often a line is written where the output is not a terminal, s."""
+"""Least time between two lines where the output is not a terminal, s."""
 
 REFRESHES_PER_SECOND = 2
-"""How often the bar is drawn; each drawing is taken from the workers where they use all processors."""
+"""Number of times per second that the bar is drawn; drawing takes processor time from the workers."""
 
 
 class Progress:
-    """Told by a campaign how far it is; shows nothing, its subclasses show what it counts."""
+    """Counts the points of a campaign without showing them; its subclasses show the counts."""
 
     def __init__(self) -> None:
         self._total = self._done = self._resumed = 0
@@ -31,24 +31,24 @@ class Progress:
         self._began = time.monotonic()
 
     def begin(self, total: int, done: int, said: str = "") -> None:
-        """Take note that `done` of `total` points are there already, and start the clock; `said` names their round."""
+        """Start the clock with `done` of `total` points finished already; `said` names the round of points."""
         self._stage = said
         self._total, self._done, self._resumed = total, done, done
         self._began = time.monotonic()
 
     def advance(self, points: int) -> None:
-        """Take note that more points are done."""
+        """Count more points as done."""
         self._done += points
 
     def lost_workers(self, count: int) -> None:
-        """Take note that so many workers have died so far."""
+        """Set the number of workers that have died so far."""
         self._lost = lost_text(count)
 
     def note(self, text: str) -> None:
-        """Say something once."""
+        """Show a text once."""
 
     def _pace(self) -> tuple[str, str]:
-        """Return points a second and the time that the others will take, both in words."""
+        """Return points a second and the remaining time, both in words."""
         rate = (self._done - self._resumed) / max(time.monotonic() - self._began, 1e-9)
         remaining = clock((self._total - self._done) / rate) if rate > 0 else "?"
         return f"{rate:.0f} points/s", remaining
@@ -91,13 +91,13 @@ class Bar(Progress):
         self._bar.update(self._task, total=total, completed=done, round=said)
 
     def advance(self, points: int) -> None:
-        """Move the bar; it is drawn by a clock, not here."""
+        """Move the bar; a timer of the bar draws it."""
         super().advance(points)
         rate, remaining = self._pace()
         self._bar.update(self._task, completed=self._done, rate=rate, remaining=remaining)
 
     def lost_workers(self, count: int) -> None:
-        """Say it at the end of the bar."""
+        """Show the number at the end of the bar."""
         self._bar.update(self._task, lost=lost_text(count))
 
     def note(self, text: str) -> None:
@@ -106,7 +106,7 @@ class Bar(Progress):
 
 
 class NotebookBar(Progress):
-    """Draws a bar below the cell of a notebook; `show` replaces what is there."""
+    """Draws a bar below the cell of a notebook; `show` replaces the HTML there."""
 
     def __init__(self, show: Callable[[str], None]) -> None:
         super().__init__()
@@ -138,7 +138,7 @@ class NotebookBar(Progress):
 
 
 def _notebook() -> Callable[[str], None] | None:
-    """Return what shows HTML below the cell that runs; None where no notebook does."""
+    """Return a function that shows HTML below the running cell; None outside a notebook."""
     interactive = sys.modules.get("IPython")
     shell = interactive.get_ipython() if interactive is not None else None
     if shell is None or not hasattr(shell, "kernel"):
@@ -150,7 +150,7 @@ def _notebook() -> Callable[[str], None] | None:
 
 
 def lost_text(count: int) -> str:
-    """Return what a line of progress says of lost workers.
+    """Return the words on lost workers for a line of progress.
 
     >>> lost_text(0), lost_text(1), lost_text(2)
     ('', ', 1 worker lost', ', 2 workers lost')
@@ -159,7 +159,7 @@ def lost_text(count: int) -> str:
 
 
 def clock(seconds: float) -> str:
-    """Return a duration as a person reads it.
+    """Return a duration as minutes and seconds, with hours from one hour on.
 
     >>> clock(59.6), clock(3725.0)
     ('1:00', '1:02:05')

@@ -1,4 +1,4 @@
-"""Where a dataset comes from: the attributes that let someone else make it again."""
+"""The origin of a dataset: the attributes with which someone else can make it again."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
 
 
 def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
-    """Return the global attributes of what a study found of a scene."""
+    """Return the global attributes of a study's dataset, for a study of a scene."""
     return {
         "title": scene.title or Path(scene.source).stem,
         "history": history,
@@ -41,12 +41,12 @@ def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
 
 
 def runs_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the global attributes of what a study found of the runs of a dataset with these attributes."""
+    """Return the global attributes of a study's dataset, for a study of runs in a dataset with `attrs`."""
     return {name: attrs[name] for name in ("title", "scene", "units_system") if name in attrs}
 
 
 def _seed(scene: Scene) -> str:
-    """Return what is random in a dataset: noise where channels are sampled that have some."""
+    """Return the seed of a dataset and its random quantities, in words: the noise of sampled channels."""
     if not scene.is_one_body:
         return "none of the scene's own; an FMU may have one among its parameters"
     if scene.noise is None or not scene.channels:

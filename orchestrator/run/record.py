@@ -1,7 +1,7 @@
-"""What a body FMU of ours records during a run, and how it is fetched; the same for both drivers.
+"""The record of a run inside one of the package's body FMUs, and its transfer to Python; the same for both drivers.
 
-The body keeps impacts, sticks and periods as rows of eight numbers (`core/body/record.h`), so that no call into Python
-or FMI is made for them.
+The body keeps impacts, sticks and periods as rows of eight numbers (`core/body/record.h`), without calls of Python or
+FMI.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ ROW_WIDTH = 8
 ROW_CAPACITY = 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD, ROW_PEAK = 1.0, 2.0, 3.0, 4.0
 IMPACT_WIDTH = 8
-"""Columns of an impact: those of its row, and the largest force, whose row comes after it."""
+"""Number of columns of an impact: the seven of its row, and the largest force from the row after it."""
 _NOTHING: NDArray[np.float64] = np.empty(0)
 OBSERVED = ("displacement", "velocity")
 TOUCH_DOWN = ("last_time", "last_phase", "last_velocity")
-"""What a contact port tells of the contact that goes on there: when (s, rad) and how fast (m/s) it began."""
+"""Outputs of a contact port for its open contact: time (s), phase (rad) and velocity (m/s) of the touch-down."""
 
 
 class RunEnded(Exception):
-    """A run ends before its end, with what it has: the samples of a block before its end, shape (sample, output)."""
+    """A run ends early; `samples` are the samples of the last block until then, shape (sample, output)."""
 
     def __init__(self, samples: NDArray[np.float64] | None = None) -> None:
         self.samples = np.empty((0, 0)) if samples is None else samples
@@ -51,7 +51,7 @@ class DeadlineReached(RunEnded):
 
 @dataclass(frozen=True, slots=True)
 class _Limit:
-    """What the runs of a block are given up by: a clock, and the most that one of them takes, s."""
+    """The limit of the runs of a block: a clock, and the longest time of one run, s."""
 
     clock: Callable[[], float] = time.perf_counter
     most: float = math.inf
@@ -63,7 +63,7 @@ _ABANDONED: ContextVar[float] = ContextVar("time at which runs are abandoned", d
 
 
 class RunsAbandonedError(Exception):
-    """Runs took longer than whoever asked for them wants to wait; nothing of them counts."""
+    """Runs took longer than their caller wants to wait; their results do not count."""
 
 
 @contextmanager
@@ -73,7 +73,7 @@ def runs_abandoned(time_of_it: float) -> Iterator[None]:
     Raises
     ------
     RunsAbandonedError
-        In whatever runs then.
+        Raised inside the run that is under way then.
     """
     before = _ABANDONED.set(time_of_it)
     try:
@@ -83,7 +83,7 @@ def runs_abandoned(time_of_it: float) -> Iterator[None]:
 
 
 def refuse_abandoned() -> None:
-    """Raise RunsAbandonedError where the runs of this thread are abandoned."""
+    """Raise RunsAbandonedError if the runs of this thread are abandoned."""
     if time.perf_counter() > _ABANDONED.get():
         raise RunsAbandonedError
 
@@ -92,12 +92,12 @@ def refuse_abandoned() -> None:
 def runs_limited(most: float, clock: Callable[[], float]) -> Iterator[None]:
     """Give up each run of this thread that takes longer than `most` seconds of a clock.
 
-    Deadlines of scenes count by that clock, too. Runs in other processes do not hear of it.
+    Deadlines of scenes use this clock, too. Runs in other processes are not limited.
 
     Parameters
     ----------
     most : float
-        s.
+        Longest time of a run, s.
     clock : callable
         Returns the time since some instant, s: `time.process_time` for processor time.
     """
@@ -109,13 +109,13 @@ def runs_limited(most: float, clock: Callable[[], float]) -> Iterator[None]:
 
 
 class Deadline:
-    """The time at which a run is given up: wall time, or that of the clock of `runs_limited`."""
+    """The time at which a run is given up, by wall time or by the clock of `runs_limited`."""
 
     def __init__(self) -> None:
         self.begin(None)
 
     def begin(self, seconds: float | None) -> None:
-        """Give the run that begins so many seconds; None: as long as it takes."""
+        """Start the clock of a run that may take `seconds`; None: no limit."""
         limit = _LIMIT.get(_UNLIMITED)
         most = limit.most if seconds is None else min(seconds, limit.most)
         self._now = limit.clock
@@ -128,24 +128,24 @@ class Deadline:
         return self._now() > self._end
 
     def refuse_late(self) -> None:
-        """Raise DeadlineReached when the time is over."""
+        """Raise DeadlineReached if the time is over."""
         if self.is_over:
             raise DeadlineReached
 
     def look_on(self, step_start: float) -> None:
-        """Look at the clock before a communication step: one step of a stiff component may take .1 s."""
+        """Check the clock before a communication step: one step of a stiff component may take 0.1 s."""
         self.refuse_late()
 
     @property
     def watcher(self) -> StepWatcher:
-        """What looks on at the steps of an importer."""
+        """Watcher that checks the clock at the steps of an importer."""
         return StepWatcher(self.look_on, lambda time, end: None, lambda: self._end - self._now())
 
 
 def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return rows in the order of their first column, a time; rows of equal times keep their order.
 
-    What lasts is recorded when it ends: a contact within which another one begins and ends comes after it.
+    A lasting contact is recorded at its end: it comes after another contact that begins and ends within it.
 
     Examples
     --------
@@ -157,9 +157,9 @@ def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def impact_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the impacts of a record with the largest force of each, NaN where the stop does not yield; shape (n, 8).
+    """Return the impacts of a record with their largest forces, NaN at rigid stops; shape (n, 8).
 
-    The rows, of eight columns, are as a body has written them: that of a largest force comes after that of its impact.
+    The rows, of eight columns, are in the order of the body, which writes a largest force right after its impact.
     """
     places = np.flatnonzero(rows[:, 0] == ROW_IMPACT)
     found = np.full((len(places), IMPACT_WIDTH), np.nan)
@@ -172,7 +172,7 @@ def impact_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 def open_contacts(
     touch_downs: NDArray[np.float64], contacts: NDArray[np.floating[Any]]
 ) -> NDArray[np.float64]:
-    """Return the impacts of contacts that are open, shape (n, 8): all that is known at their end is NaN.
+    """Return the impacts of open contacts, shape (n, 8); quantities known only at the end of a contact are NaN.
 
     The rows of `touch_downs` have the columns `TOUCH_DOWN`; contacts are numbered from 1.
 
@@ -188,7 +188,7 @@ def open_contacts(
 
 @dataclass(slots=True)
 class Rows:
-    """Rows taken from a body's record, in the order they were written; shape (row, 8) each."""
+    """Blocks of rows taken from a body's record, in the order of writing; shape (row, 8) each."""
 
     blocks: list[NDArray[np.float64]] = field(default_factory=list)
 
@@ -204,10 +204,10 @@ class Rows:
 
 
 class RecordedBody(ABC):
-    """A body whose runs are driven; its subclasses say how it is stepped.
+    """A body whose runs are driven; its subclasses step it.
 
     `group` makes a group of the body's variables: kind, names, number of values (None: one for each name). `warnings`
-    are what the body had to say when the run began; they go with the results.
+    are the messages of the body at the start of the run; they go with the results.
     """
 
     def __init__(self, group: Callable[[str, Sequence[str], int | None], VariableGroup]) -> None:
@@ -232,11 +232,11 @@ class RecordedBody(ABC):
         energies: bool = False,
         slowest: bool = False,
     ) -> None:
-        """Say what of the body is read; nothing else costs a call.
+        """Choose the variables of the body that are read; other variables cost no calls.
 
-        `contacts` is the number of ports in use, `sampled` are the variables of a time series. `state` are those that
-        are the whole state, where it is more than the observed point. `energies` has the body follow its energies while
-        it records; `slowest` says that it can tell its lowest natural frequency.
+        `contacts` is the number of ports in use, `sampled` are the variables of a time series. `state` has the
+        variables of the whole state, where it is more than the observed point. With `energies` the body follows its
+        energies during a recording; with `slowest` its lowest natural frequency is read.
         """
         ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
         self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
@@ -267,21 +267,21 @@ class RecordedBody(ABC):
 
     @abstractmethod
     def advance(self, end: float) -> None:
-        """Advance to time `end`, s, looking at the clock and for signals on the way.
+        """Advance to time `end`, s, with checks of the clock and of signals on the way.
 
-        ImpactLimitReached, DeadlineReached: the run ends before.
+        ImpactLimitReached, DeadlineReached: the run ends earlier.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Free what is driven."""
+        """Free the components."""
 
     def inputs(self, names: Sequence[str]) -> VariableGroup:
-        """Return the body's real inputs of these names as a group: fill its buffer, then `set`."""
+        """Return the body's real inputs of these names as a group: fill its buffer, then call `set`."""
         return self._group_of("Float64", names, None)
 
     def record(self, *, impacts: bool, extrema: bool, periods: bool) -> None:
-        """Begin a recording: say what the body records from now on; its energies count from here."""
+        """Begin a recording of the given kinds of rows; the energies of the body count from here."""
         for switches in ((False, False, False), (impacts, extrema, periods)):
             self._switches.values[:] = switches
             self._switches.set()
@@ -290,9 +290,9 @@ class RecordedBody(ABC):
             self._energies.set()
 
     def take_rows(self) -> None:
-        """Take the rows that the body has recorded since the last time.
+        """Take the rows that the body has recorded since the last call.
 
-        ComponentError: rows are lost, as whoever drives the body has not emptied its record in time.
+        ComponentError: rows are lost, as the driver has not emptied the record in time.
         """
         count, lost = self._counts.get().tolist()
         if lost:
@@ -306,13 +306,13 @@ class RecordedBody(ABC):
     def impacts(self) -> NDArray[np.float64]:
         """Return the impacts so far by time of touch-down, shape (n, 8): columns `schema.IMPACT_COLUMNS`.
 
-        A contact that is open has no impulse, restitution, duration and largest force yet: NaN.
+        An open contact has NaN for impulse, restitution, duration and largest force, which are not known yet.
         """
         self.take_rows()
         return in_time_order(np.concatenate([self.rows.impacts(), self._contacts_open()]))
 
     def _contacts_open(self) -> NDArray[np.float64]:
-        """Return the contacts with stops that yield that began in the recording and go on, shape (n, 8)."""
+        """Return the open contacts with compliant stops that began in the recording, shape (n, 8)."""
         if self._open is None or self._touch_downs is None or self._stuck is None:
             return np.empty((0, IMPACT_WIDTH))
         going = np.flatnonzero(self._open.get() & ~self._stuck.get())
@@ -338,10 +338,10 @@ class RecordedBody(ABC):
         return float(displacement), float(velocity)
 
     def advance_sampling(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Advance from one instant to the next, as `advance`; return the sampled variables, shape (instant, variable).
+        """Advance through all instants, as by `advance`; return the sampled variables, shape (instant, variable).
 
-        The times ascend, s; the first is not before the time reached. ImpactLimitReached, DeadlineReached have the
-        samples so far.
+        The times ascend, s; the first is not before the time reached. ImpactLimitReached, DeadlineReached: the run ends
+        early; the error has the samples so far.
         """
         rows: list[NDArray[np.float64]] = []
         try:
@@ -354,7 +354,7 @@ class RecordedBody(ABC):
         return np.array(rows)
 
     def sampled(self) -> NDArray[np.float64]:
-        """Return the present values of the sampled variables; the buffer is used again at the next call."""
+        """Return the present values of the sampled variables; the next call overwrites the buffer."""
         return _NOTHING if self._sampled is None else self._sampled.get()
 
     def values_of(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -362,15 +362,15 @@ class RecordedBody(ABC):
         return self._group_of("Float64", names, None).get().copy() if names else _NOTHING
 
     def whole_state(self) -> NDArray[np.float64] | None:
-        """Return the whole state; None where the observed point is all of it."""
+        """Return the whole state; None where the observed point is the whole state."""
         return None if self._state is None else self._state.get().copy()
 
     def slowest(self) -> float:
-        """Return the lowest natural angular frequency, rad/s; 0 where the body does not tell it."""
+        """Return the lowest natural angular frequency, rad/s; 0 where it is not read."""
         return 0.0 if self._slowest is None else float(self._slowest.get()[0])
 
     def sticks_open(self) -> list[tuple[int, float]]:
-        """Return the contacts (1-based) that the body rests on, with the time it came to rest, s."""
+        """Return the contacts (1-based) on which the body rests, each with the start of the rest, s."""
         if self._stuck is None or self._stick_starts is None:
             return []
         stuck, starts = self._stuck.get(), self._stick_starts.get()

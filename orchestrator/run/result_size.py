@@ -1,4 +1,4 @@
-"""How much memory the results of a scene take, known before anything is computed."""
+"""The size of a scene's results in memory, known before anything is computed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
 
 MOST_BYTES = 10**9
-"""Results that are kept in memory at once; arranging and writing them takes up to four times as much."""
+"""Largest size of results in memory, bytes; arranging and writing them takes up to four times as much."""
 
 _RUN_BYTES = 1000
 _NUMBER_BYTES = 8
@@ -17,10 +17,10 @@ _SIZES = ("B", "kB", "MB", "GB", "TB", "PB")
 
 
 def bytes_of_a_run(scene: Scene) -> int:
-    """Return the size of what one run records, but for impacts, whose number nobody knows before."""
+    """Return the size of one run's record, bytes, without impacts, whose number is not known in advance."""
     record = scene.record
     periods = record.recorded_periods if (record.extrema or record.strobe) else 0
-    # a period beyond all numbers is the body's to refuse
+    # the body refuses an infinite period
     rate = scene.sampling_rate
     samples = round(rate * _recorded_seconds(scene)) if rate else 0
     periods = periods if record.each_period else min(periods, 1)
@@ -35,7 +35,7 @@ def _recorded_seconds(scene: Scene) -> float:
 
 
 def size(count: float) -> str:
-    """Return a number of bytes as a person reads it.
+    """Return a number of bytes in words, with a decimal prefix.
 
     >>> size(999), size(157e6), size(2.34e12)
     ('999 B', '157 MB', '2.3 TB')
@@ -47,12 +47,12 @@ def size(count: float) -> str:
 
 
 def refuse_large_results(scene: Scene) -> None:
-    """Refuse a scene whose results do not fit into the memory of one process.
+    """Raise UsageError unless the results of a scene fit into the memory of one process.
 
     Raises
     ------
     UsageError
-        With the size and what to do.
+        The message has the size and a remedy.
     """
     runs, each = run_count(scene.sweep), bytes_of_a_run(scene)
     if runs * each <= MOST_BYTES:

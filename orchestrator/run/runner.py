@@ -1,7 +1,7 @@
-"""The protocol of runners: a scene is opened, what is opened runs points, and a point becomes a row.
+"""The protocol of runners: a runner opens a scene and runs its points, and each point becomes a row.
 
-A runner gives `run` and `close`. One that can take many points at once gives `rows` too; whoever asks for rows does
-not know how they are made.
+A runner has `run` and `close`. A runner that can take many points at once has its own `rows`, too; callers of `rows`
+need not know the difference.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from vibroimpact.orchestrator.run.points import BranchPoint, PointColumns, State
 from vibroimpact.orchestrator.scene import Scene
 
 OTHER_ENGINE = 1
-"""Version of the engine of components that are not ours, and of bodies before there was a number."""
+"""Version of the engine for other components, and for bodies of releases without a version number."""
 
 CARRYING = (Outcome.ok, Outcome.stuck)
 """Outcomes whose final state is handed on along a branch: the run came to its end, at forcing phase 0."""
 
 Rows = tuple[Sequence[RunRecord] | RunColumns, State | None]
-"""What points recorded, and the state that the next point of the branch starts from."""
+"""The records of points, and the start state of the next point of the branch."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerIdentity:
-    """What must be the same for all points of a campaign, or its rows could not be compared."""
+    """The properties of a runner that all points of a campaign share, so that their rows can be compared."""
 
     execution: str
     instruction_set: str
@@ -47,13 +47,13 @@ class Runner(ABC):
     ----------
     scene : Scene
     execution : str
-        Which way of running the scene it uses.
+        Way of running the scene.
     instruction_set : str
-        The instruction set of the machine code it runs.
+        Instruction set of the machine code.
     fmu_hashes : mapping of str to str
-        Content hash of each FMU it loaded.
+        Content hash of each loaded FMU.
     engine : int
-        Version of what follows the bodies.
+        Version of the engine that follows the bodies.
     """
 
     scene: Scene
@@ -64,7 +64,7 @@ class Runner(ABC):
 
     @property
     def identity(self) -> RunnerIdentity:
-        """What a campaign wants to be the same for all of its points."""
+        """The properties that all points of a campaign share."""
         return RunnerIdentity(self.execution, self.instruction_set, dict(self.fmu_hashes), self.engine)
 
     @abstractmethod
@@ -76,38 +76,38 @@ class Runner(ABC):
         """Free the components."""
 
     def record_of(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
-        """Run one point; whatever goes wrong with it becomes a record with the outcome `error`."""
+        """Return the record of one point; a failure becomes a record with the outcome `error`."""
         began = time.perf_counter()
         try:
             return self.run(values, start)
         except (VibroimpactError, ArithmeticError, ValueError) as error:
-            # A point that fails is a row that says so: the sweep is worth more than the point.
+            # a failed point becomes a row with its message, so that the sweep goes on
             return empty_record(self.scene, Outcome.error, str(error), time.perf_counter() - began)
 
     def rows(self, points: PointColumns, start: State | None = None, deadline: float = math.inf) -> Rows:
-        """Run points in their order; along a branch with a direction each starts where the one before ended.
+        """Run points in their order; along a branch with a direction each starts where the point before ended.
 
         Parameters
         ----------
         points : PointColumns
         start : tuple of float or None
-            State that the first one goes on from, where it does not begin a branch.
+            Start state of the first point, where it does not begin a branch.
         deadline : float
-            No point begins after it, except the first; s of `time.perf_counter`.
+            Time after which no point begins, except the first; s of `time.perf_counter`.
 
         Returns
         -------
         records : sequence of RunRecord, or RunColumns
-            Of the points that were run: the first of them.
+            Records of the points that ran, from the first point on.
         carried : tuple of float or None
-            Where the next point of the branch starts; a run that did not come to its end hands on what it was given.
+            Start state of the next point of the branch; a run that ended early hands on its own start state.
         """
         return self.rows_one_by_one(points.places(), start, deadline)
 
     def rows_one_by_one(
         self, points: Iterable[BranchPoint], start: State | None, deadline: float
     ) -> tuple[list[RunRecord], State | None]:
-        """Run points each by itself, see `rows`."""
+        """Run points one by one, see `rows`."""
         carried = start
         records = []
         for place in points:
@@ -127,7 +127,7 @@ class Runner(ABC):
 
 
 def next_start(record: RunRecord, start: State | None) -> State | None:
-    """Return the state that a run from a state hands on along its branch."""
+    """Return the state that a run, started from `start`, hands on along its branch."""
     end: State = (record.final_displacement, record.final_velocity)
     if record.final_state is not None:
         end = tuple(record.final_state.tolist())

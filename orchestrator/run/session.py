@@ -1,4 +1,4 @@
-"""An opened scene that can be stepped: inputs in, outputs out; replays and plants of a rig are made of it."""
+"""An opened scene that can be stepped, with inputs and outputs; replays and plants of a rig use it."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
 INPUTS = ("force", "base_acceleration")
-"""Inputs of the bodies, each with its slope over a step: `force_rate` and `base_acceleration_rate`."""
+"""Inputs of the bodies; the slope of each over a step is `force_rate` or `base_acceleration_rate`."""
 
 
 class Session:
-    """A scene of the short form, opened: it goes on from step to step until it is closed.
+    """An opened scene of the short form, which advances step by step until it is closed.
 
     Parameters
     ----------
     scene : Scene
         A scene with a body.
     outputs : sequence of str
-        What each step answers, in the names of a time series: `displacement`, `contact_force[1]`, ...
+        Outputs of each step, with the names of a time series: `displacement`, `contact_force[1]`, ...
     execution : str
         `auto`, `fused` or `coupled`.
     others, connections : sequences
@@ -68,8 +68,8 @@ class Session:
                 f"outputs: expected variables of the body, got {channels}. A MeasuredSession has them."
             )
         self.outputs = self._plan.names
-        wanted = "fused" if execution == "auto" and not others else execution
-        self.execution = "coupled" if others else wanted
+        chosen = "fused" if execution == "auto" and not others else execution
+        self.execution = "coupled" if others else chosen
         self._driver = driver_of(scene, self.execution, others, connections)
         self._driver.watch(
             contacts=len(scene.stops),
@@ -96,27 +96,27 @@ class Session:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the body said when the run began."""
+        """Messages of the body at the start of the run."""
         return self._driver.warnings
 
     def begin(
         self, values: Mapping[str, float] | None = None, start: tuple[float, ...] | None = None
     ) -> None:
-        """Begin at time 0, from the scene's start state or a carried one.
+        """Begin at time 0, from the scene's start state or a carried state.
 
         Parameters
         ----------
         values : mapping of str to float, optional
-            Values of keys of the scene, such as `body.damping_ratio`, from now on.
+            New values of keys of the scene, such as `body.damping_ratio`.
         start : tuple of float, optional
-            State to start from, see `parameters.float_parameters`.
+            Start state, see `parameters.float_parameters`.
 
         Raises
         ------
         ComponentError
             The body refuses its parameters.
         UsageError
-            A number of modes, or a step, that the components are not made for.
+            The components are made for another number of modes, or another macro step.
         """
         scene = self._scene.at(values) if values else self._scene
         if built_for(scene) != built_for(self._scene):
@@ -132,15 +132,15 @@ class Session:
     def advance(
         self, duration: float, inputs: Mapping[str, tuple[float, float]] | None = None
     ) -> dict[str, float]:
-        """Advance by `duration` s and return the outputs then.
+        """Advance by `duration` s and return the outputs at the end.
 
         Parameters
         ----------
         duration : float
-            s, > 0.
+            Length of the step, s, > 0.
         inputs : mapping of str to (float, float), optional
-            Value at the start of the step and slope over it, of `force` (N) and `base_acceleration`
-            (m/s^2); those left out keep their last value, with no slope.
+            Value at the start of the step and slope over the step, of `force` (N) and `base_acceleration` (m/s^2).
+            Other inputs keep their last value, without a slope.
         """
         buffer = self._inputs.values
         buffer[1::2] = 0.0
@@ -155,20 +155,20 @@ class Session:
         return dict(zip(self.outputs, self.sample(), strict=True))
 
     def sample(self) -> Sequence[float]:
-        """Return the outputs now, in the order of `outputs`."""
+        """Return the present outputs, in the order of `outputs`."""
         return self._plan.row(self._driver.sampled(), self._forcing, self._parameters, self.time)
 
     def follow(self, times: Floats, name: str | None = None, values: Floats | None = None) -> Floats:
-        """Go through all instants with an input that is linear between them; return the outputs at each.
+        """Advance through all instants with an input that is linear between them; return the outputs at each.
 
         Parameters
         ----------
         times : ndarray, shape (step + 1,)
-            s from the session's time 0, ascending; the first is now.
+            Instants in s from the session's time 0, ascending; the first is the present time.
         name : str or None
-            The input that follows `values`; None for none.
+            The input that follows `values`; None: no input.
         values : ndarray, shape (step + 1,)
-            Its values at the instants.
+            Values of the input at the instants.
 
         Returns
         -------
@@ -191,17 +191,17 @@ class Session:
         return rows
 
     def hold(self, times: Floats, forces: Floats) -> Floats:
-        """Go through all instants, a force held between them; return the outputs at the end of each step.
+        """Advance through all instants with a force held between them; return the outputs at the end of each step.
 
-        The loop runs in C: one call for all samples, bit for bit what `advance` gives one by one. From the first call
-        on nothing is recorded, so that a session may go on for days.
+        One call runs all samples in C, bit for bit as single calls of `advance`. From the first call on nothing is
+        recorded, so that a session may go on for days.
 
         Parameters
         ----------
         times : ndarray, shape (sample + 1,)
-            s from the session's time 0, ascending; the first is now.
+            Instants in s from the session's time 0, ascending; the first is the present time.
         forces : ndarray, shape (sample,)
-            N, each from one of the instants to the next.
+            Forces, N, each held from one instant to the next.
 
         Returns
         -------
@@ -210,8 +210,8 @@ class Session:
         Raises
         ------
         UsageError
-            Instants that do not ascend from now, another number of forces, a force that is no number, a coupled
-            session, a chain, or outputs that the FMU does not have as they are (accelerations under forcing).
+            The instants do not ascend from the present time, or the forces have another number or are not finite. Or
+            the session is coupled, has a chain, or has outputs that the FMU lacks (accelerations under forcing).
         ImpactLimitReached
             The run has met `execution.impact_limit`.
 

@@ -1,4 +1,4 @@
-"""What runs a scene, in words: the engine, the laws of its stops, the effects that it calls for and the others."""
+"""The engine of a scene, the laws of its stops, and its effects, in words."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ EFFECTS_OF_THE_SHORT_FORM = (
     *("forcing", "recorded drive", DAMPING, "stops", FALLING_RESTITUTION, AMPLITUDE, "energies"),
     *("sensor", "load cell", "exciter", FALLING_FORCE, "noise", "AD conversion"),
 )
-"""Effects that tables and numbers of the short form call for, and shipped components of a general scene."""
+"""Effects that tables and numbers of the short form ask for, and the package's components in a general scene."""
 
 
 def engine(scene: Scene, execution: str = "auto") -> str:
-    """Return what follows the motion: as the scene says, or as a campaign runs it (`fused`, `lanes`, ...).
+    """Return the engine of a scene in words, by the scene's own execution or a campaign's (`fused`, `lanes`, ...).
 
     Examples
     --------
@@ -63,7 +63,7 @@ def laws(scene: Scene) -> dict[str, str]:
 
 
 def contacts(scene: Scene) -> dict[str, str]:
-    """Return what meets what in each contact of a general scene, by the key of the contact."""
+    """Return the partners of each contact of a general scene in words, by the key of the contact."""
     meetings = enumerate(scene.meetings, start=1)
     return {f"contact[{number}]": _met(contact) for number, contact in meetings}
 
@@ -75,7 +75,7 @@ def _met(contact: StopContactSpec | PairSpec) -> str:
 
 
 def effects(scene: Scene) -> dict[str, bool]:
-    """Return by its name whether a scene calls for an effect, at one of its points at least."""
+    """Return whether a scene asks for each effect at one or more of its points, by the name of the effect."""
     common = {
         "time series": scene.record.time_series is not None,
         "continuation": any(axis.continuation for axis in scene.sweep),
@@ -104,7 +104,7 @@ def effects(scene: Scene) -> dict[str, bool]:
 
 
 def chain_effects(scene: Scene) -> dict[str, list[str]]:
-    """Return by its name which tables or numbers of a scene of the short form ask for a part of the measuring chain."""
+    """Return the keys of a scene of the short form that ask for each part of the measuring chain, by its name."""
     sensor, exciter = scene.sensor, scene.exciter
     readings = sensor is not None and (
         scene.replay is not None or any(name in MEASURED_SENSOR for name in scene.sampled)
@@ -122,6 +122,6 @@ def chain_effects(scene: Scene) -> dict[str, list[str]]:
 def in_one_line(scene: Scene, execution: str = "auto") -> str:
     """Return engine, laws and effects as one line."""
     stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
-    told = ("stops" if scene.stops else "", "contacts")
-    called = [name for name, there in effects(scene).items() if there and name not in told]
+    listed = ("stops" if scene.stops else "", "contacts")
+    called = [name for name, there in effects(scene).items() if there and name not in listed]
     return "; ".join(part for part in (engine(scene, execution), ", ".join(stops), ", ".join(called)) if part)

@@ -1,4 +1,4 @@
-"""The time series of a scene of the short form: which variables of the FMU it takes, and what they become."""
+"""The time series of a scene of the short form: sampled variables, made from variables of the FMU."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.sampled_names import AT_CONTACT
 
 FEWEST_SAMPLES = 10
-"""Samples of a contact; with fewer they miss its largest force."""
+"""Number of samples of a contact, below which they miss its largest force."""
 _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 _FOLLOWED = ("modal_energy[", "energy.")
 
 
 class TimeSeriesPlan:
-    """What a scene of the short form samples: `names`, or else what its `record.time_series` names.
+    """The sampled variables of a scene of the short form: `names`, or by default those of `record.time_series`.
 
-    Of its attributes, `all_names` are the sampled variables as the scene names them, empty without a time series;
-    `names` those that are no channels of a measuring chain; `variables` those of the body's FMU that they are made of,
-    each once. `energies` says that the body must follow its energies for them; `feels_contacts` that a contact with a
-    stop that yields shows in them, in a force or an acceleration.
+    `all_names` are the sampled variables with the names of the scene, empty without a time series. `names` leaves out
+    the channels of a measuring chain. `variables` are the variables of the body's FMU for `names`, each once.
+    `energies`: whether the body must follow its energies for them. `feels_contacts`: whether a contact with a compliant
+    stop shows in them, in a force or an acceleration.
     """
 
     def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
         series = scene.record.time_series
-        asked = series.variables if series is not None else ()
-        self.all_names: tuple[str, ...] = asked if names is None else tuple(names)
+        series_names = series.variables if series is not None else ()
+        self.all_names: tuple[str, ...] = series_names if names is None else tuple(names)
         self.names = tuple(name for name in self.all_names if name not in CHANNELS)
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
@@ -41,12 +41,12 @@ class TimeSeriesPlan:
         yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
         felt = ("contact_force", "acceleration")
         self.feels_contacts = yields and any(name.startswith(felt) for name in self.names)
-        # a beam knows that its base moves; the others see it as forces on their masses only
+        # a beam has a moving base in its FMU; other bodies get only forces on their masses
         self._relative = not scene.body.KNOWS_BASE
         self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
 
     def is_plain(self, forcing: Forcing | None) -> bool:
-        """Whether the sampled variables are those of the FMU, one by one: nothing is left for `row` to do."""
+        """Return whether the sampled variables are the FMU's own, one by one, so that `row` changes nothing."""
         untouched = forcing is None or not any(n.startswith(("forcing", "acceleration")) for n in self.names)
         return untouched and self._columns == [[place] for place in range(len(self.names))]
 
@@ -57,9 +57,9 @@ class TimeSeriesPlan:
         parameters: Mapping[str, float],
         time: float,
     ) -> Sequence[float]:
-        """Return the sampled variables at one instant, s, of what the FMU says, shape (variables,).
+        """Return the sampled variables at one instant, s, from the values of the FMU, shape (variables,).
 
-        The parameters are the body's, see `parameters.float_parameters`; `forcing` drives it.
+        The parameters are the body's, see `parameters.float_parameters`; `forcing` drives the body.
         """
         cosine = 0.0
         if forcing is not None:
@@ -76,13 +76,13 @@ class TimeSeriesPlan:
         return row
 
     def _is_relative(self, forcing: Forcing) -> bool:
-        """Whether the base moves and the body does not know it, so that its accelerations are relative to the base."""
+        """Return whether the accelerations of the FMU are relative to the base: it moves, and the FMU has no base."""
         return forcing.kind == "base_acceleration" and self._relative
 
     def base(
         self, forcing: Forcing | None, parameters: Mapping[str, float], times: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return what is added to an acceleration of the body's FMU at instants, m/s^2, shape (instant,)."""
+        """Return the acceleration of the base to be added to the FMU's at instants, m/s^2, shape (instant,)."""
         if forcing is None or not self._is_relative(forcing):
             return np.zeros(len(times))
         return forcing.scalar_amplitude * _cosines(forcing, parameters, times)
@@ -95,9 +95,9 @@ class TimeSeriesPlan:
         parameters: Mapping[str, float],
         times: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return the sampled variables at many instants, those of `names`, shape (instant, name): as `row`.
+        """Return the sampled variables `names` at many instants, shape (instant, name): see `row`.
 
-        What the FMU says has the shape (instant, variable); `variables` name its columns, those of the plan among them.
+        The values of the FMU have shape (instant, variable); `variables` names their columns, the plan's among them.
         """
         place = {name: column for column, name in enumerate(variables)}
         own = [place[name] for name in self.variables]
@@ -114,10 +114,10 @@ class TimeSeriesPlan:
 
 
 def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peaks: bool) -> str:
-    """Return what a run says whose contacts have too few samples for their largest forces; empty where none has.
+    """Return a message on contacts with too few samples for their largest forces; empty if there are none.
 
-    Durations of contacts are in s, 0 of a rigid stop, NaN of one that has not ended; the rate is in Hz. `has_peaks`
-    says that impacts are recorded, and their largest forces with them.
+    Durations of contacts are in s, 0 at rigid stops, NaN for open contacts; the rate is in Hz. `has_peaks`: whether
+    impacts are recorded, with their largest forces.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peak
 def _cosines(
     forcing: Forcing, parameters: Mapping[str, float], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the cosine of the forcing phase at instants: one by one, as the last bits of numpy's are the machine's."""
+    """Return the cosine of the forcing phase at instants, one by one: numpy's last bits depend on the machine."""
     angles = forcing.angular_frequency * times + parameters["forcing.phase"]
     return np.array([math.cos(angle) for angle in angles.tolist()])
 
@@ -162,7 +162,7 @@ def _amplitude(forcing: Forcing | None, name: str) -> float:
 
 
 def fmu_variables(name: str, stops: int) -> tuple[str, ...]:
-    """Return the variables of the body's FMU whose sum a sampled variable is; none for the forcing.
+    """Return the variables of the body's FMU whose sum is the sampled variable; none for the forcing.
 
     Examples
     --------
@@ -189,5 +189,5 @@ def forced_mass(name: str) -> int | None:
 
 
 def follow_energies(names: Iterable[str]) -> bool:
-    """Whether the body must follow its energies for these variables; that costs time at every step."""
+    """Return whether the body must follow its energies for these variables, which costs time at every step."""
     return any(name.startswith(_FOLLOWED) for name in names)

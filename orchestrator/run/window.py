@@ -1,4 +1,4 @@
-"""When the recording of a point begins and ends, and what a run says that did not come to a plain end."""
+"""The start and the end of a point's recording, and the messages of runs with a special end."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Numbers = TypeVar("Numbers", float, NDArray[np.float64])
 
 
 def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[float, float]:
-    """Return start and end of the recording, s; those of a forced scene are at forcing phase 0.
+    """Return start and end of the recording, s; in a forced scene both are at forcing phase 0.
 
     Parameters
     ----------
     scene : Scene
-        Of the short form.
+        A scene of the short form.
     parameters : mapping of str to float
-        Of its body, as `float_parameters` gives them.
+        Parameters of its body, from `float_parameters`.
     """
     if scene.period is None:
         record = scene.record
@@ -34,9 +34,9 @@ def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[floa
 
 
 def forced_window(record: Record, phase: Numbers, angular_frequency: Numbers) -> tuple[Numbers, Numbers]:
-    """Return start and end of the recording of a forced scene, s; of one point, or of many as arrays.
+    """Return start and end of the recording of a forced scene, s, for one point, or for many as arrays.
 
-    The phase is that of the force at time 0, rad; its angular frequency is in rad/s.
+    `phase` is the phase of the force at time 0, rad; its angular frequency is in rad/s.
     """
     period, lead = TWO_PI / angular_frequency, phase % TWO_PI
     lag = lead / angular_frequency
@@ -45,15 +45,15 @@ def forced_window(record: Record, phase: Numbers, angular_frequency: Numbers) ->
 
 
 def limit_message(limit: int, time: float) -> str:
-    """Return what a run that came to its impact limit says, `time` s after its start."""
+    """Return the message of a run that reached its impact limit, `time` s after its start."""
     return f"impact_limit: {limit} impacts, touch-downs and rests at time {time:.17g}"
 
 
 def late_message(deadline: float | None, time: float) -> str:
-    """Return what a run that took longer than its deadline says, `time` s after its start."""
+    """Return the message of a run that took longer than its deadline, `time` s after its start."""
     return f"deadline: {deadline} s passed at time {time:.17g}"
 
 
 def no_load_message(contact: int) -> str:
-    """Return what a run says that ends at rest on a stop (from 1) on which nothing presses the body."""
+    """Return the message of a run that ends at rest on a stop (1-based) without a load on the stop."""
     return f"rests on stop[{contact}] without load"

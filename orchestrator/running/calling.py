@@ -25,25 +25,25 @@ Floats = NDArray[np.float64]
 
 
 class SceneRunner:
-    """A scene, opened, as a callable of the values of some keys.
+    """An opened scene as a function of the values of some keys.
 
     Parameters
     ----------
     scene : Scene
-        Its sweep is left out.
+        The scene; its sweep is left out.
     keys : sequence of str
-        The keys that calls give values to, each a number that a sweep may vary.
+        Keys of the arguments of a call, each a number that a sweep may vary.
 
     Attributes
     ----------
     scene : Scene
-        Without its sweep.
+        The scene without its sweep.
     keys : tuple of str
 
     Raises
     ------
     SceneError, UsageError
-        A key is none of the scene, cannot be varied, or has no value.
+        A key is unknown in the scene, cannot be varied, or has no value.
     ComponentError
         A component cannot be loaded.
     """
@@ -69,7 +69,7 @@ class SceneRunner:
         self._point = self._one_point()
 
     def _one_point(self) -> OnePoint | None:
-        """Return the loop over one point; None where points are run alone: see `one_point_of`."""
+        """Return the loop over one point; None where points must run alone: see `one_point_of`."""
         if not isinstance(self._alone, PointRunner) or self._alone.loop is None:
             return None
         return one_point_of(self._alone.loop, self.keys, self._form)
@@ -83,7 +83,7 @@ class SceneRunner:
         try:
             if self._closed:
                 raise UsageError("runner: expected one that is open, got one that was closed.")
-            if self._process != os.getpid():  # what is open belongs to the process that was forked
+            if self._process != os.getpid():  # open components belong to the parent of this fork
                 self._open()
             points = self._points(values)
             if points.ndim == 1:
@@ -141,7 +141,7 @@ class SceneRunner:
         return {name: array for name, array in found.items() if name not in NOT_OF_THE_MOTION}
 
     def close(self) -> None:
-        """Free the components; a call after it is refused."""
+        """Free the components; later calls are refused."""
         self._closed = True
         for runner in (self._alone, self._many):
             if runner is not None:
@@ -158,35 +158,35 @@ class SceneRunner:
 
 
 class _SoundValues:
-    """Values of keys that a scene without a sweep takes.
+    """Valid values of some keys of a scene without a sweep.
 
-    They are all between those that were checked, as the rules of its sweeps are intervals.
+    All values between two checked values are valid, as the rules of sweeps are intervals.
     """
 
     def __init__(self, scene: Scene, keys: Sequence[str]) -> None:
         self._scene, self._keys = scene, tuple(keys)
         self._low, self._high = [math.inf] * len(keys), [-math.inf] * len(keys)
-        # between whole numbers there are others, and other components have rules of their own
+        # values between whole numbers are invalid, and components have other rules
         self._has_gaps = not scene.is_one_body or any(is_whole(scene.field(key)) for key in keys)
 
     def holds(self, low: Sequence[float], high: Sequence[float]) -> bool:
-        """Return whether all values from the least to the largest of each key are known to be sound."""
+        """Return whether all values from the least to the largest of each key are known to be valid."""
         for least, most, first, last in zip(low, high, self._low, self._high, strict=True):
             if not first <= least <= most <= last:
                 return False
         return True
 
     def take(self, points: Floats) -> Scene:
-        """Check points, shape (point, key), as those of a campaign; return the scene that sweeps them.
+        """Check points, shape (point, key), like points of a campaign; return the scene that sweeps them.
 
-        SceneError: all that is wrong with them, each on one line.
+        SceneError: the points are invalid; the message has one line for each problem.
         """
         swept = self._swept([sorted(set(column)) for column in points.T.tolist()])
         if not self._has_gaps:
             low = np.minimum(self._low, points.min(axis=0))
             high = np.maximum(self._high, points.max(axis=0))
             wide = np.where(np.isfinite(self._low), high - low, 0.0)
-            # values that wander come back with a range that has doubled, not with each of them
+            # the checked range doubles each time, so that drifting values do not need a check each
             for beside in (wide, np.zeros_like(wide)):
                 least = np.where(low < self._low, low - beside, low)
                 most = np.where(high > self._high, high + beside, high)

@@ -1,7 +1,7 @@
-"""Scenes that stay open: whoever runs one again finds its runner, and what its dataset says, as they were left.
+"""Scenes that stay open, with their runners and the forms of their datasets, for the next run of the same scene.
 
-Only bodies of ours in this process are kept: each run of theirs begins with a reset, and depends on nothing outside.
-A scene in use is nobody else's; a process that is forked keeps none.
+Only scenes of the package's own bodies in this process are kept: each run begins with a reset and does not depend on
+other state. A scene in use has one user; a forked process keeps no scenes.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 
 MOST_KEPT = 8
-"""Scenes that stay open in a process; an opened oscillator takes 50 kB, with the loop over its points 2 MB."""
+"""Largest number of scenes kept open; an opened oscillator takes 50 kB, with the loop over its points 2 MB."""
 
 
 class OpenedScene:
-    """A scene with its runner, and what its dataset says of it.
+    """A scene with its runner, and the form and attributes of its dataset.
 
     Attributes
     ----------
     scene : Scene
     runner : Runner
     failed : bool
-        Whether a point of it ended in an error: its components are not run again.
+        Whether a point ended in an error, so that the components are not used again.
     """
 
     def __init__(self, scene: Scene, runner: Runner) -> None:
@@ -45,31 +45,31 @@ class OpenedScene:
 
     @cached_property
     def form(self) -> DatasetForm:
-        """What the scene says of its dataset; that it can be made is found out before an hour of work, not after it."""
+        """Form of the scene's dataset; DatasetError before the first run, if the dataset is impossible."""
         form = DatasetForm(self.scene)
         form.refuse_impossible()
         return form
 
     @cached_property
     def attributes(self) -> dict[str, Any]:
-        """Where its dataset comes from."""
+        """Attributes of the dataset with its origin."""
         return provenance(self.scene, self.runner.identity)
 
 
 class _Kept:
-    """The scenes that are open and not in use, by what they are; the last used comes last."""
+    """The scenes that are open and not in use, by key; the last used comes last."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._opened: dict[tuple[Any, ...], OpenedScene] = {}
 
     def take(self, key: tuple[Any, ...]) -> OpenedScene | None:
-        """Return an opened scene, which is then the caller's."""
+        """Return an opened scene and hand it over to the caller; None if it is not kept."""
         with self._lock:
             return self._opened.pop(key, None)
 
     def give_back(self, key: tuple[Any, ...], opened: OpenedScene) -> None:
-        """Keep a scene; one that is too many is closed."""
+        """Keep a scene, and close the oldest scene if there are too many."""
         with self._lock:
             surplus = [self._opened.pop(key, None)]
             self._opened[key] = opened
@@ -87,8 +87,8 @@ class _Kept:
             one.runner.close()
 
     def forget(self) -> None:
-        """Begin anew in a fork: what is open belongs to the other process, and the lock may be held there."""
-        self._others = self._opened  # not freed: that would end what it holds
+        """Begin anew in a fork: the open scenes belong to the parent, which may hold the lock."""
+        self._others = self._opened  # kept referenced, since freeing would close the scenes
         self._lock, self._opened = threading.Lock(), {}
 
 
@@ -102,15 +102,15 @@ if hasattr(os, "register_at_fork"):
 def opened_scene(
     scene: Scene, execution: str | None = None, runner: str = DEFAULT_RUNNER
 ) -> Iterator[OpenedScene]:
-    """Open a scene, or take it from those that are open; a run that fails closes it.
+    """Open a scene, or take it from the open scenes; a failed run closes it.
 
     Parameters
     ----------
     scene : Scene
     execution : str, optional
-        How its points run; by default as the scene says.
+        Execution of the points; by default the scene's own.
     runner : str
-        What opens it, as `module:name`; what others than the default one open is not kept.
+        Function that opens the scene, as `module:name`; only scenes of the default function are kept.
 
     Raises
     ------
@@ -133,17 +133,17 @@ def opened_scene(
 
 
 def _key(scene: Scene, execution: str | None) -> tuple[Any, ...] | None:
-    """Return what tells a scene and its components from others; None of a scene that is not kept."""
+    """Return the key of a scene with its components; None for a scene that is not kept."""
     if not scene.is_lone_body or scene.execution.guard:
         return None
     try:
         files = tuple(file_state(path.stat()) for path in _components(scene.body.FMU))
     except (OSError, ComponentFileError):
-        return None  # who opens it says what is wrong
+        return None  # the opening of the scene raises the error
     return pickle.dumps(scene), execution, files
 
 
 @cache
 def _components(body: str) -> tuple[Path, ...]:
-    """Return the files that a scene of a body may load."""
+    """Return the FMU files that a scene with this body may load."""
     return fmu_path(body), fmu_path("ImpactStop")

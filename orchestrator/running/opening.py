@@ -1,4 +1,4 @@
-"""A scene opened as it says itself: in this process, or in one of its own where its components may crash or hang."""
+"""The opening of a scene in this process, or in a child process if its components may crash or hang."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from vibroimpact.orchestrator.run import Runner, open_runner
 from vibroimpact.orchestrator.scene import Scene
 
 DEFAULT_RUNNER = f"{__name__}:open_scene"
-"""What opens a scene, as `module:name`, so that a worker can find it by itself."""
+"""Function that opens a scene, as `module:name`, which a worker process can import."""
 
 
 def open_scene(scene: Scene, *, execution: str | None = None) -> Runner:
@@ -16,7 +16,7 @@ def open_scene(scene: Scene, *, execution: str | None = None) -> Runner:
     ----------
     scene : Scene
     execution : str, optional
-        How its points run; by default as the scene says.
+        Execution of the points; by default the scene's own.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def open_scene(scene: Scene, *, execution: str | None = None) -> Runner:
     """
     how = scene.execution.how if execution is None else execution
     if scene.execution.guard:
-        # loaded by those whose components may crash
+        # imported only for guarded scenes
         from vibroimpact.orchestrator.guard import GuardedRunner
 
         return GuardedRunner(scene, execution=how)

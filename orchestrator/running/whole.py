@@ -24,13 +24,13 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count
 
 PROGRESS_SECONDS = 0.5
-"""Time after which progress is told of the points that are done, s."""
+"""Time between two reports of the points done to `progress`, s."""
 
 Recorded = Sequence[RunRecord] | RunColumns
 
 
 def run_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> xr.Dataset:
-    """Run every point of a scene and write one dataset; nothing is kept when it is interrupted.
+    """Run every point of a scene and write one dataset; an interrupted run leaves nothing behind.
 
     Parameters
     ----------
@@ -38,17 +38,17 @@ def run_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress 
     path : path
         The dataset to write, whole or not at all.
     progress : Progress, optional
-        Told how far it is, when there is more than one point.
+        Receives the progress, if there is more than one point.
 
     Returns
     -------
     xarray.Dataset
-        One-dimensional, as it is in the file.
+        The one-dimensional dataset in the file.
 
     Raises
     ------
     UsageError
-        When the dataset cannot be written, or would be larger than memory, or the sweep is adaptive.
+        The dataset cannot be written, or would be larger than memory, or the sweep is adaptive.
     """
     target = Path(path)
     refuse_adaptive(scene)
@@ -64,18 +64,18 @@ def run_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress 
 
 
 def run_in_memory(scene: Scene, *, progress: Progress | None = None) -> xr.Dataset:
-    """Run every point of a scene and return what `open_dataset` gives of its file, without one.
+    """Run every point of a scene and return the dataset that `open_dataset` would return, without a file.
 
     Parameters
     ----------
     scene : Scene
     progress : Progress, optional
-        Told how far it is, when there is more than one point.
+        Receives the progress, if there is more than one point.
 
     Raises
     ------
     UsageError
-        When the dataset would be larger than memory, or the sweep is adaptive.
+        The dataset would be larger than memory, or the sweep is adaptive.
     """
     refuse_adaptive(scene)
     refuse_large_results(scene)
@@ -84,7 +84,7 @@ def run_in_memory(scene: Scene, *, progress: Progress | None = None) -> xr.Datas
 
 
 def run_whole(opened: OpenedScene, progress: Progress | None = None) -> xr.Dataset:
-    """Run every point of an opened scene; return their one-dimensional dataset, as it is written to a file."""
+    """Run every point of an opened scene; return the one-dimensional dataset in the form for a file."""
     scene, form = opened.scene, opened.form
     points = columns_of_points(expand(scene), 0, run_count(scene.sweep))
     records = _run_all(opened.runner, points, progress or Progress())
@@ -94,7 +94,7 @@ def run_whole(opened: OpenedScene, progress: Progress | None = None) -> xr.Datas
 
 
 def refuse_adaptive(scene: Scene) -> None:
-    """Refuse a scene whose points are found round by round: UsageError, with what to do."""
+    """Raise UsageError if the points of a scene are found round by round; the message has a remedy."""
     if most_points(scene.sweep) is not None:
         raise UsageError(
             f"{scene.source}: sweep: expected points that are known before the first is computed, got adaptive axes. "
@@ -103,7 +103,7 @@ def refuse_adaptive(scene: Scene) -> None:
 
 
 def _run_all(runner: Runner, points: PointColumns, progress: Progress) -> Recorded:
-    """Run all points; now and then progress is told."""
+    """Run all points and return their records; report to `progress` now and then."""
     if len(points) == 1:
         return runner.rows(points)[0]
     progress.begin(len(points), 0)
@@ -119,14 +119,14 @@ def _run_all(runner: Runner, points: PointColumns, progress: Progress) -> Record
 
 
 def _together(pieces: Sequence[Recorded]) -> Recorded:
-    """Return what points recorded piece by piece."""
+    """Return the records of all pieces as one."""
     if any(isinstance(piece, RunColumns) for piece in pieces):
         return joined([piece if isinstance(piece, RunColumns) else columns_of(piece) for piece in pieces])
     return [record for piece in cast("Sequence[Sequence[RunRecord]]", pieces) for record in piece]
 
 
 def _refuse_unwritable(target: Path) -> None:
-    """Find out before an hour of work whether its results have a place to go."""
+    """Raise UsageError unless the dataset can be written, before the work begins."""
     trial = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         if target.is_dir():

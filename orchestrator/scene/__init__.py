@@ -1,4 +1,4 @@
-"""Scene files: what is simulated, recorded and swept; read, checked, frozen. `load_scene` is the way in."""
+"""Scene files: the simulated system, its record and its sweep, read, checked and frozen; start with `load_scene`."""
 
 from __future__ import annotations
 

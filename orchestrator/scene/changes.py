@@ -1,4 +1,4 @@
-"""Changes of a scene before it is checked, numbers in its text, and a start on its stops."""
+"""Changes of a scene before its checks, new numbers in its text, and a start on its stops."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Change:
 
     @property
     def key(self) -> str:
-        """The key as messages write it."""
+        """The key in the notation of messages."""
         return key_path(self.path)
 
 
 class _NoChange(Exception):
-    """Why a change cannot be made."""
+    """A change is impossible, with the problem."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -50,10 +50,10 @@ class _NoChange(Exception):
 def changed_document(
     document: Mapping[str, Any], texts: Sequence[str]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a document with other values, and the keys that were changed, as messages write them.
+    """Return a document with other values, and the changed keys in the notation of messages.
 
-    Of two changes of one key the later one counts. Of two keys for one thing, such as `damping` and `damping_ratio`,
-    the one that is changed takes the place of the other.
+    The later of two changes of one key counts. A changed key replaces its alternative, such as `damping_ratio` for
+    `damping`.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def changed_document(
     Raises
     ------
     SceneError
-        With all changes that cannot be made.
+        Some changes are impossible; the message has all of them.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def changed_document(
 
 
 def changed_values(document: Mapping[str, Any], values: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Return a document with other values, by key as messages write it; else as `changed_document`."""
+    """Return a document with other values by key, in the notation of messages; see `changed_document`."""
     problems, changes = [], []
     for key, value in values.items():
         path, rest = _path(key) if isinstance(key, str) else ((), "")
@@ -96,7 +96,7 @@ def changed_values(document: Mapping[str, Any], values: Mapping[str, Any], sourc
 def _changed(
     document: Mapping[str, Any], changes: Sequence[Change], problems: list[Problem], source: str
 ) -> dict[str, Any]:
-    """Make all changes of a copy."""
+    """Return a copy with all changes; raise SceneError with all problems."""
     changed, made = deepcopy(dict(document)), []
     for change in changes:
         try:
@@ -112,7 +112,7 @@ def _changed(
 
 
 def _read(text: str) -> Change:
-    """Take `KEY=VALUE` apart."""
+    """Return the change in `KEY=VALUE`."""
     path, rest = _path(text)
     if not path or not rest.startswith("="):
         raise _NoChange(Problem("", _FORM, quoted(text)))
@@ -120,7 +120,7 @@ def _read(text: str) -> Change:
 
 
 def _path(text: str) -> tuple[KeyPath, str]:
-    """Return the path of the key that a text begins with, and what follows it; no path where there is no key."""
+    """Return the path of the key at the start of a text, and the rest of the text; an empty path without a key."""
     path: list[str | int] = []
     position = 0
     while match := _PART.match(text, position):
@@ -140,7 +140,7 @@ def _value(key: str, text: str) -> Any:
         raise _NoChange(Problem(key, "a value", "nothing", 'Write "" for an empty text.'))
     try:
         [value] = parse_toml(f"value = {text}").values()
-    except ValueError:  # no TOML, or more than one value
+    except ValueError:  # invalid TOML, or more than one value
         if text[0].isalpha() and text.isprintable():
             return text
         raise _NoChange(Problem(key, _VALUE, quoted(text), _VALUE_HINT)) from None
@@ -148,7 +148,7 @@ def _value(key: str, text: str) -> Any:
 
 
 def _make(document: dict[str, Any], change: Change) -> None:
-    """Give a key its value; tables that are absent come into being, elements of arrays do not."""
+    """Set the value of a key; absent tables are created, absent elements of arrays are not."""
     owner: Any = document
     for depth, part in enumerate(change.path):
         _refuse_misfit(owner, part, change, depth)
@@ -161,7 +161,7 @@ def _make(document: dict[str, Any], change: Change) -> None:
 
 
 def _refuse_misfit(owner: Any, part: str | int, change: Change, depth: int) -> None:
-    """Refuse a name in what is no table, and a place in what is no array or too short."""
+    """Raise _NoChange unless a name is for a table, or a place is within an array."""
     where = key_path(change.path[:depth])
     if isinstance(part, str) and isinstance(owner, dict):
         return
@@ -184,12 +184,12 @@ def _leave_out_alternatives(document: dict[str, Any], changes: Sequence[Change])
         other = ALTERNATIVES.get(name) if isinstance(name, str) else None
         if table in (("body",), ("forcing",)) and other is not None and (*table, other) not in keys:
             owner = document[str(table[0])]
-            if isinstance(owner, dict):  # a later change may have put something else in its place
+            if isinstance(owner, dict):  # a later change may have replaced the table
                 owner.pop(other, None)
 
 
 def _without_effect(document: Mapping[str, Any], change: Change) -> list[Problem]:
-    """Return the problem of a number that the sweep replaces at every point."""
+    """Return the problem of a changed number that the sweep replaces at every point."""
     swept = document.get("sweep")
     match change.path:
         case ("component", component, "parameters", variable):
@@ -208,18 +208,17 @@ def _without_effect(document: Mapping[str, Any], change: Change) -> list[Problem
 def text_with_values(text: str, values: Mapping[str, float], recordings: Sequence[str] = ()) -> str:
     """Return the TOML text of a scene with other numbers.
 
-    A key that the text leaves at its default is added to its table, and one that would have the last word over a new
-    number (`damping_ratio` over `damping`) is taken out. Where an unusual layout cannot be kept, the same scene is
-    written without its comments.
+    A key at its default is added to its table. A key that would override a new number (`damping_ratio` over `damping`)
+    is removed. If an unusual layout cannot be kept, the same scene is written without its comments.
 
     Parameters
     ----------
     text : str
-        Of a scene that is valid.
+        Text of a valid scene.
     values : mapping of str to float
-        By key, each a number of the scene.
+        New values by key, each a number of the scene.
     recordings : sequence of str
-        What `replay.recordings` is to name; none to leave it as it is.
+        New `replay.recordings`; empty to leave them as they are.
 
     Examples
     --------
@@ -228,9 +227,9 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
     mass = 2.5 # kg
     stiffness = 4.0
     """
-    wanted = parse_toml(text)
-    _put_all(wanted, values, recordings)
-    # it takes time to load, and few scenes are written anew
+    target = parse_toml(text)
+    _put_all(target, values, recordings)
+    # the import takes time, and few scenes are written anew
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
@@ -238,11 +237,11 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
         document = tomlkit.parse(text)
         _put_all(document, values, recordings)
         edited = tomlkit.dumps(document)
-        if parse_toml(edited) == wanted:
+        if parse_toml(edited) == target:
             return edited
     except (TOMLKitError, ValueError):
-        pass  # what tomlkit cannot read or has written wrong is written anew
-    return tomlkit.dumps(wanted)
+        pass  # tomlkit cannot read the text, or has written it wrong: it is written anew
+    return tomlkit.dumps(target)
 
 
 def _put_all(
@@ -270,7 +269,7 @@ def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
 
 
 def _set(table: MutableMapping[str, Any], name: str, value: float | list[str]) -> None:
-    """Set a key; a new one goes after the last: comments at the end of a table are those of the next."""
+    """Set a key; a new key goes after the last key, as comments at the end of a table belong to the next table."""
     from tomlkit.items import Table
 
     if name in table or not isinstance(table, Table):
@@ -287,7 +286,7 @@ def _set(table: MutableMapping[str, Any], name: str, value: float | list[str]) -
 
 
 def with_resting_start(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a document in which a start that is not written is on the rigid stops that keep the body from 0.
+    """Return a document in which a missing start is on the rigid stops that keep the body from 0.
 
     Examples
     --------
@@ -311,7 +310,7 @@ def with_resting_start(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _rigid_limits(document: Mapping[str, Any], size: int) -> Iterator[tuple[str, float, int]]:
-    """Yield side, position at its worst over the sweep, and mass of each rigid stop: as given, or the last."""
+    """Yield side, worst position over the sweep, and mass (given, or the last) of each rigid stop."""
     stops, swept = document.get("stop"), _table_of(document.get("sweep"))
     for number, stop in enumerate(stops if isinstance(stops, list) else [], start=1):
         if not isinstance(stop, dict) or stop.get("law", "restitution") != "restitution":
@@ -324,7 +323,7 @@ def _rigid_limits(document: Mapping[str, Any], size: int) -> Iterator[tuple[str,
 
 
 def _axis_values(axis: Any) -> list[Any]:
-    """Return the ends or the values of a swept key, as written."""
+    """Return the ends and the values of a swept key, as written."""
     table = _table_of(axis)
     values = table.get("values")
     return [*(values if isinstance(values, list) else []), table.get("start"), table.get("stop")]

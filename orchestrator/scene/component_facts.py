@@ -1,6 +1,6 @@
-"""What a scene needs to know of an FMU: its variables, their types, units and causalities, and which values they take.
+"""The facts of an FMU for a scene: its variables with types, units and causalities, and the values that they accept.
 
-Facts come from the model description alone; no code of the FMU runs.
+Facts come only from the model description; no code of the FMU runs.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ class VariableFacts:
     Attributes
     ----------
     name, reference, kind, type
-        Its name, value reference, what it holds, and FMI's word for its type.
+        Name, value reference, kind of value, and FMI's word for the type.
     causality, variability, initial : str
         FMI's words.
     unit : Unit or None
-        None when the description does not say.
+        Declared unit; None without a definition in the description.
     unit_name : str
-        The unit as the description writes it; may be empty.
+        The unit in the words of the description; may be empty.
     minimum, maximum : float or None
-        What the description allows.
+        Limits in the description.
     items : mapping of str to int
-        Names of an enumeration.
+        Names and numbers of an enumeration.
     scalar : bool
-        Whether it is one number and not an array.
+        Whether the variable is one number, not an array.
     """
 
     name: str
@@ -74,38 +74,38 @@ class VariableFacts:
 
     @property
     def settable(self) -> bool:
-        """Whether FMI lets an importer give its start value."""
+        """Whether FMI allows an importer to set the start value."""
         if self.variability == "constant" or self.causality in ("structuralParameter", "independent"):
             return False
         return self.causality == "input" or self.initial in ("exact", "approx")
 
     @property
     def fed(self) -> bool:
-        """Whether a connection may feed it: an input at any time, a tunable parameter at events."""
+        """Whether a connection may feed the variable: an input at any time, a tunable parameter at events."""
         return self.causality == "input" or (self.causality == "parameter" and self.variability == "tunable")
 
     @property
     def shape(self) -> str:
-        """What it holds, in words."""
+        """Type of the variable in words, including arrays."""
         return self.type if self.scalar else f"array of {self.type}"
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentFacts:
-    """An FMU: its file, its variables by name, whether it steps itself, what it declares of that.
+    """An FMU: its file, its variables by name, and its co-simulation as declared.
 
     Attributes
     ----------
     scheduled : bool
-        It can be run by scheduled execution.
+        Whether the FMU supports scheduled execution.
     step : float or None
-        Communication step that it proposes, s.
+        Proposed communication step, s.
     capabilities : Capabilities
-        What it declares of its co-simulation.
+        Declared capabilities of its co-simulation.
     doubts : tuple of str
-        What its description leaves open, and what is assumed.
+        Open points of the description, each with the assumption.
     remarks : int
-        How much else is odd in its description, and changes no number.
+        Number of other oddities in the description, which change no number.
     """
 
     file: str
@@ -119,17 +119,17 @@ class ComponentFacts:
 
     @property
     def restorable(self) -> bool:
-        """Whether its state can be kept and restored."""
+        """Whether the state of the FMU can be kept and restored."""
         return self.capabilities.restorable
 
     @property
     def event_mode(self) -> bool:
-        """Whether it handles events in event mode when it steps itself."""
+        """Whether the FMU handles events in event mode during co-simulation."""
         return self.capabilities.event_mode
 
 
 def component_facts(path: Path) -> ComponentFacts:
-    """Read the facts of an FMU, or take them from the cache if a file of the same contents was read before.
+    """Return the facts of an FMU, from the cache if a file of the same content was read before.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _proposed_step(description: ModelDescription) -> float | None:
 
 
 def _unit(definition: Any) -> Unit | None:
-    """Return a defined unit; a definition may be a name alone, which says nothing of its meaning."""
+    """Return a defined unit; None for a definition with only a name, without base units."""
     base = definition.baseUnit
     if base is None:
         return None
@@ -207,14 +207,14 @@ def _limit(own: str | None, declared: str | None) -> float | None:
 
 
 class Misfit(NamedTuple):
-    """What a variable expects instead of a value, and what to do."""
+    """The expected value of a variable in place of a wrong one, with a hint."""
 
     expected: str
     hint: str = ""
 
 
 def typed_value(variable: VariableFacts, value: object) -> StartValue | Misfit:
-    """Return a value as its variable takes it: float, int (also for enumerations), bool or str.
+    """Return a value in the type of its variable: float, int (also for enumerations), bool or str.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def typed_value(variable: VariableFacts, value: object) -> StartValue | Misfit:
 
 
 def swept_value(variable: VariableFacts, value: float) -> StartValue | Misfit:
-    """Return a swept number as its variable takes it."""
+    """Return a swept number in the type of its variable."""
     whole = variable.kind != "real" and value.is_integer()
     return typed_value(variable, int(value) if whole else value)
 
@@ -246,7 +246,7 @@ def _real(variable: VariableFacts, value: object) -> StartValue | Misfit:
         return expected
     try:
         number = float(value)
-    except OverflowError:  # TOML's whole numbers have no end
+    except OverflowError:  # TOML's whole numbers have no limit
         return expected
     return number if math.isfinite(number) and _is_within(variable, number) else expected
 

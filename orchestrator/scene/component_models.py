@@ -92,7 +92,7 @@ class ConnectionTable(SceneTable):
 
 
 class EventTable(SceneTable):
-    """`[[event]]`: a crossing to be found in a component that does not report events itself."""
+    """`[[event]]`: a crossing to locate in a component that does not report events itself."""
 
     watch: Annotated[
         _Text,
@@ -116,7 +116,7 @@ def _name_of(what: str, example: str) -> Rule:
 
 
 class StopContactTable(SceneTable):
-    """`[[contact]]` with `stop`: a body of any tool that meets a stop which yields."""
+    """`[[contact]]` with `stop`: a body of any tool that meets a compliant stop."""
 
     body: Annotated[_Text, _name_of("a component", "mass")]
     displacement: Annotated[
@@ -215,7 +215,7 @@ class RestitutionPair(PairTable):
 
 
 class KelvinVoigtPair(PairTable):
-    """`[[contact]]` with `between`: a spring beside a dashpot; it never pulls."""
+    """`[[contact]]` with `between`: a spring and a dashpot in parallel, which never pull."""
 
     law: Annotated[Literal["kelvin_voigt"], _PAIR_LAWS]
     stiffness: Annotated[Positive, Rule(unit="N/m")]
@@ -249,7 +249,7 @@ PAIR_MODELS: dict[str, type[BodyPair]] = {
 
 
 class GeneralRecord(SceneTable):
-    """`[record]` of a general scene: how long to wait, how long to record, and what."""
+    """`[record]` of a general scene: transient time, recorded time, and recorded variables."""
 
     transient_time: Annotated[NotNegative, Rule(unit="s", doc="not recorded")] = 0.0
     recorded_time: Annotated[Positive, Rule(unit="s")]

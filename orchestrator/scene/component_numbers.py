@@ -1,4 +1,4 @@
-"""Keys of scenes of components, and the numbers that they name."""
+"""Keys of scenes of components, and their numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CONTACT_KEY = re.compile(r"contact\[([1-9][0-9]{0,8})\]\.([a-z_]+)")
 
 
 def component_variable(reference: str) -> tuple[str, str]:
-    """Take `COMPONENT.VARIABLE` apart at its first dot.
+    """Return the component and the variable of `COMPONENT.VARIABLE`, split at the first dot.
 
     Examples
     --------
@@ -34,7 +34,7 @@ def component_variable(reference: str) -> tuple[str, str]:
 
 
 def gain_place(key: str) -> int | None:
-    """Return the 0-based place of the connection whose gain a key names; None when it names none.
+    """Return the 0-based place of the connection whose gain a key names; None for other keys.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def gain_place(key: str) -> int | None:
 
 
 def contact_key(key: str) -> tuple[int, str] | None:
-    """Return the 0-based place of the contact of which a key names a number, and that name; None when it names none.
+    """Return the 0-based place of a contact and the name of its number in a key; None for other keys.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def contact_key(key: str) -> tuple[int, str] | None:
 
 
 def is_step(components: Sequence[ComponentSpec], key: str) -> bool:
-    """Whether a key is the step of the exchange, and no number of a component of that name."""
+    """Return whether a key is the step of the exchange, not a number of a component named `execution`."""
     return key == STEP_KEY and all(component.name != "execution" for component in components)
 
 
@@ -67,7 +67,7 @@ Part = ComponentSpec | ConnectionSpec | StopContactSpec | PairSpec
 
 @dataclass(frozen=True, slots=True)
 class ComponentNumbers:
-    """The numbers of a scene of components by their keys: start values, gains, those of contacts, the step (s)."""
+    """The numbers of a scene of components by key: start values, gains, numbers of contacts, the step (s)."""
 
     components: tuple[ComponentSpec, ...]
     connections: tuple[ConnectionSpec, ...]
@@ -75,7 +75,7 @@ class ComponentNumbers:
     macro_step: float = math.inf
 
     def value(self, key: str) -> float:
-        """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].NAME` has.
+        """Return the number of `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].NAME`.
 
         UsageError: the scene gives no such number.
         """
@@ -95,13 +95,13 @@ class ComponentNumbers:
                 yield f"{owner}.{name}", float(number)
 
     def at(self, values: Mapping[str, float]) -> ComponentNumbers:
-        """Return other start values, gains and numbers of contacts, without validating them again.
+        """Return the numbers with other start values, gains and numbers of contacts, without validation.
 
         UsageError: a key is neither swept nor given in the scene.
         """
         parts, macro_step = self._parts(), self.macro_step
         for key, value in values.items():
-            self.value(key)  # refuses a key of no number
+            self.value(key)  # refuses an unknown key
             if is_step(self.components, key):
                 macro_step = float(value)
             else:
@@ -112,7 +112,7 @@ class ComponentNumbers:
         return ComponentNumbers(changed[:first], changed[first:last], changed[last:], macro_step)
 
     def _parts(self) -> dict[str, Part]:
-        """Return what has numbers, as keys name it."""
+        """Return the parts of the scene that have numbers, by their name in keys."""
         return {
             **{component.name: component for component in self.components},
             **{f"connection[{number}]": each for number, each in enumerate(self.connections, start=1)},
@@ -120,7 +120,7 @@ class ComponentNumbers:
         }
 
     def _known(self, key: str) -> str:
-        """Return what a key that names no number should have been."""
+        """Return the expected kind of key, in words, for a key without a number."""
         if gain_place(key) is not None:
             return f"one of {len(self.connections)} connections, got an absent one."
         if contact_key(key) is not None:
@@ -131,7 +131,7 @@ class ComponentNumbers:
 
 
 def _taken_apart(key: str) -> tuple[str, str]:
-    """Return the part of a scene that a key names, and the name of its number."""
+    """Return the name of the part of a scene in a key, and the name of its number."""
     if gain_place(key) is None and contact_key(key) is None:
         return component_variable(key)
     owner, _, name = key.rpartition(".")

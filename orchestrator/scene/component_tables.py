@@ -1,4 +1,4 @@
-"""From a document with components to what the importer is asked, or to all that is wrong in it."""
+"""From a document with components to the input of the importer, or to all its problems."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ from vibroimpact.orchestrator.scene.sweep_table import read_sweep
 
 
 def read_components(document: Mapping[str, Any], folder: Path) -> Reading:
-    """Read a document with components, whose FMU files count from a folder."""
+    """Read a document with components; paths of FMU files are relative to `folder`."""
     draft = GeneralDraft(document, folder)
     axes, wrong_axes = _read_sweep(draft)
     plan = plan_ports(draft)
@@ -66,9 +66,9 @@ def read_components(document: Mapping[str, Any], folder: Path) -> Reading:
 
 
 def _record(record: GeneralRecord) -> Record:
-    """Return what is recorded as every scene has it; there are no periods."""
+    """Return the record in the form of all scenes, without periods."""
     series = None
-    if record.variables:  # names of components and variables are longer than those of one body
+    if record.variables:  # names with components may be longer than the model allows
         series = TimeSeries.model_construct(rate=record.rate, variables=record.variables)
     return Record(
         transient_time=record.transient_time,
@@ -81,7 +81,7 @@ def _record(record: GeneralRecord) -> Record:
 
 
 def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
-    """Return the execution with the guard that it has by default: on as soon as there is foreign code."""
+    """Return the execution with its default guard: on if any component is not from the package."""
     if "guard" in execution.model_fields_set:
         return execution
     foreign = any(not component.shipped for component in draft.components.values())
@@ -89,7 +89,7 @@ def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
 
 
 def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
-    """Return the parts that a file with components names, with the units and the doubts that their FMUs declare."""
+    """Return the parts of a scene of components, with the declared units and the doubts of their FMUs."""
     assert draft.record is not None
     assert draft.execution is not None
     facts = [component.facts for component in draft.components.values() if component.facts]
@@ -120,7 +120,7 @@ def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis,
 
 
 def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict[str, StartValue]:
-    """Return the first swept value of each swept start value, so that the scene itself can run."""
+    """Return the first value of each swept start value, so that the scene itself can run."""
     assert component.facts is not None
     first: dict[str, StartValue] = {}
     for axis in axes:
@@ -171,7 +171,7 @@ def _contact(
 
 
 def _read_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Return the sound axes of a scene of components, and what is wrong with the others and between them."""
+    """Return the valid axes of a scene of components, and the problems of all other axes and between axes."""
     axes, problems = read_sweep(
         draft.document,
         lambda key, entry: _key_problems(key, entry, draft),
@@ -208,7 +208,7 @@ def _names_an_entry(key: str, name: str, draft: GeneralDraft) -> bool:
 
 
 def _quotes_hint(key: str, entry: Any, draft: GeneralDraft) -> str:
-    """Return the advice for a key without quotes, which TOML took for tables in each other."""
+    """Return the advice for a dotted key without quotes, which TOML reads as nested tables."""
     if "." in key or key not in draft.components or not isinstance(entry, dict) or not entry:
         return ""
     words = [key]

@@ -1,4 +1,4 @@
-"""The components of a general scene: from `[component.NAME]` to an FMU file and the facts of it."""
+"""The components of a general scene: from `[component.NAME]` to an FMU file and its facts."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class DraftComponent:
-    """A component on its way, with its valid start values; of one whose FMU cannot be read there are no facts."""
+    """A component during the checks, with its valid start values; without facts if its FMU cannot be read."""
 
     name: str
     fmu: Path | None = None
@@ -60,7 +60,7 @@ class DraftComponent:
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
-    """Return the components of a document by name; what is wrong with them joins the problems."""
+    """Return the components of a document by name, and add their problems to `problems`."""
     if not isinstance(raw, dict) or not raw:
         got = "nothing" if raw in (None, {}) else quoted(raw)
         hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
@@ -73,7 +73,7 @@ def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[st
 
 
 def _only_instances(components: Mapping[str, DraftComponent]) -> Iterator[Problem]:
-    """Yield each component beyond the first of an FMU of which a process may have one instance."""
+    """Yield a problem for each further component of an FMU that allows only one instance in a process."""
     first: dict[str, str] = {}
     for name, component in components.items():
         facts = component.facts
@@ -86,7 +86,7 @@ def _only_instances(components: Mapping[str, DraftComponent]) -> Iterator[Proble
 
 
 class _Shipped:
-    """The components of the package for one scene: the folder is looked into once, however many tables name them."""
+    """The components of the package for one scene: its folder is listed only once for all tables."""
 
     def __init__(self) -> None:
         self.names = components()
@@ -170,7 +170,7 @@ def _fmu_file(
 
 
 def _file_hint(file: Path) -> str:
-    """Return the nearest FMU of the folder that is meant."""
+    """Return a hint with the nearest FMU file in the folder."""
     folder = file.parent
     if not folder.is_dir():
         return f"There is no folder {folder}."
@@ -189,7 +189,7 @@ def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | N
         other = "scheduled execution" if facts.scheduled else "model exchange"
         hint = f"Export it for co-simulation: {other} is not available in this version."
         problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
-        return None  # what the scene asks of its variables makes no difference
+        return None  # problems of its variables do not matter then
     for needed in facts.capabilities.refusals:
         expected = (
             "an FMU whose clocks are input clocks of a constant or fixed interval, and that has an event mode"
@@ -225,7 +225,7 @@ def _start_problems(name: str, value: object, where: str, facts: ComponentFacts)
 
 
 def _quotes_hint(name: str, value: Any) -> str:
-    """Return the advice for a dotted name that TOML took for a table."""
+    """Return the advice for a dotted name without quotes, which TOML reads as a table."""
     words = [name]
     while isinstance(value, dict) and value:
         word, value = next(iter(value.items()))
@@ -234,7 +234,7 @@ def _quotes_hint(name: str, value: Any) -> str:
 
 
 def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
-    """Yield why a variable cannot be given a start value."""
+    """Yield the problem of a variable that cannot have a start value."""
     if not variable.settable:
         hint = "Parameters, inputs and start states have one."
         yield Problem(where, "a variable with a start value", _described(variable), hint)
@@ -243,7 +243,7 @@ def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
 
 
 def not_restorable(facts: ComponentFacts, where: str, hint: str) -> Problem:
-    """Return the problem of an FMU that has to go back to a state, and cannot."""
+    """Return the problem of an FMU that must restore its state, and cannot."""
     got = f"{facts.file}, which does not have canGetAndSetFMUState"
     return Problem(where, "an FMU whose state can be kept and restored", got, hint)
 
@@ -258,12 +258,12 @@ def _described(variable: VariableFacts) -> str:
     return f"the {constant}{variable.causality} {variable.name} ({variable.shape})"
 
 
-#: Keys of a contact of a body with a stop, of which one with another body has none.
+#: Keys of a contact with a stop that a contact between two bodies does not have.
 _STOP_CONTACT_KEYS = frozenset(StopContactTable.model_fields) - frozenset(PairTable.model_fields)
 
 
 class GeneralDraft(DraftTables):
-    """A general scene on its way."""
+    """A general scene during the checks."""
 
     def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
         super().__init__(document)
@@ -275,7 +275,7 @@ class GeneralDraft(DraftTables):
         self.execution = self.table(Execution, "execution", {})
 
     def _contact(self, raw: object, path: KeyPath) -> StopContactTable | BodyPair | None:
-        """Read a contact of either form; of a mixture of both nothing else is said."""
+        """Read a contact of either form; a mixture of both is a single problem."""
         keys = set(raw) if isinstance(raw, dict) else {"stop"}
         one, other = "between" in keys, keys & _STOP_CONTACT_KEYS
         if one == bool(other):
@@ -291,21 +291,21 @@ class GeneralDraft(DraftTables):
 
     @property
     def is_nondimensional(self) -> bool:
-        """Whether all numbers of the scene are without units, whatever its FMUs declare."""
+        """Whether all numbers of the scene are without units, regardless of its FMUs."""
         return self.header is not None and self.header.units == "nondimensional"
 
     def facts(self, reference: str) -> ComponentFacts | None:
-        """Return the facts of the component that a reference names; None when they are not known."""
+        """Return the facts of the component in a reference; None where they are not known."""
         component = self.components.get(component_variable(reference)[0])
         return component.facts if component else None
 
     def variable(self, reference: str) -> VariableFacts | None:
-        """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
+        """Return the variable of `COMPONENT.VARIABLE`; None where it is not known."""
         facts = self.facts(reference)
         return facts.variables.get(component_variable(reference)[1]) if facts else None
 
     def unit(self, key: str) -> str:
-        """Return the unit of a variable, gain or contact's number as it is written where it is declared; else `1`."""
+        """Return the declared unit of a variable, a gain or a number of a contact, as written there; else `1`."""
         if self.names_step(key):
             return "s"
         named = contact_key(key)
@@ -316,11 +316,11 @@ class GeneralDraft(DraftTables):
         return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
 
     def names_step(self, key: str) -> bool:
-        """Whether a key is the step of the exchange, and no variable of a component of that name."""
+        """Return whether a key is the step of the exchange, not a variable of a component named `execution`."""
         return key == STEP_KEY and "execution" not in self.components
 
     def swept_steps(self) -> tuple[float, ...]:
-        """Return the numbers that a sweep gives the step of the exchange, as far as they are numbers."""
+        """Return the swept values of the step of the exchange that are numbers > 0."""
         entry = self.written("sweep").get(STEP_KEY) if self.names_step(STEP_KEY) else None
         given = entry if isinstance(entry, dict) else {}
         values = given.get("values", [given.get("start"), given.get("stop")])
@@ -328,7 +328,7 @@ class GeneralDraft(DraftTables):
         return tuple(v for v in numbers if isinstance(v, int | float) and v > 0.0)
 
     def _contact_unit(self, place: int, name: str) -> str:
-        """Unit of a number of a contact, with dots between its factors as the descriptions of FMUs write it."""
+        """Return the unit of a number of a contact, with dots between its factors, as in FMU descriptions."""
         table = self.contacts[place] if place < len(self.contacts) else None
         known = {} if table is None else type(table).model_fields
         return (rule_of(known[name]).unit if name in known else "").replace(" ", ".") or "1"

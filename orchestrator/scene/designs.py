@@ -1,6 +1,6 @@
 """Points drawn from distributions: random, Sobol and Saltelli designs, the same for a seed on every machine.
 
-More points keep the old ones: a design of 2 n points begins with that of n.
+More points keep the old ones: a design of 2 n points begins with the design of n points.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 DesignName = Literal["random", "sobol", "saltelli"]
 BALANCED: tuple[DesignName, ...] = ("sobol", "saltelli")
-"""Designs that are balanced for a power of 2 of points only."""
+"""Designs that are balanced only if the number of points is a power of 2."""
 
 _DIGITS = 12
-"""Digits of a value: what another machine's logarithm may do to the last of 16 changes none of them."""
+"""Digits of a drawn value, few enough that another machine's logarithm (last of 16 digits) does not change them."""
 _OUTERMOST = 2.0**-33
-"""Probability of the outermost value: a Sobol sequence has the end 0 itself, which a normal distribution has not."""
+"""Least probability of a drawn value: a Sobol sequence may have 0, for which a normal distribution has no value."""
 
 Quantile = Callable[[float], float]
-"""The value below which a distribution has a share of its probability."""
+"""Quantile function: the value below which a distribution has a given share of its probability."""
 
 
 def unit_design(design: DesignName, points: int, keys: int, seed: int) -> NDArray[np.float64]:
@@ -32,7 +32,7 @@ def unit_design(design: DesignName, points: int, keys: int, seed: int) -> NDArra
     Parameters
     ----------
     design : {"random", "sobol", "saltelli"}
-        Of `saltelli` each base point brings keys + 2 rows: one of A, one of B, and that of A with each column of B.
+        Each base point of `saltelli` gives keys + 2 rows: one of A, one of B, and A with each column from B.
     points, keys, seed : int
 
     Returns
@@ -49,7 +49,7 @@ def unit_design(design: DesignName, points: int, keys: int, seed: int) -> NDArra
     source = np.random.default_rng(seed)
     if design == "random":
         return source.random((points, keys))
-    # it takes a third of a second to load, and other scenes do without
+    # the import takes a third of a second, and other scenes do not need it
     from scipy.stats import qmc
 
     columns = 2 * keys if design == "saltelli" else keys
@@ -67,17 +67,17 @@ def _saltelli_rows(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np
 
 
 def uniform(low: float, high: float) -> Quantile:
-    """Return the quantiles of a uniform distribution."""
+    """Return the quantile function of a uniform distribution."""
     return lambda share: low + share * (high - low)
 
 
 def log_uniform(low: float, high: float) -> Quantile:
-    """Return the quantiles of a distribution whose logarithm is uniform; both ends are > 0."""
+    """Return the quantile function of a distribution with a uniform logarithm; both ends are > 0."""
     return lambda share: low * (high / low) ** share
 
 
 def normal(mean: float, deviation: float, low: float | None = None, high: float | None = None) -> Quantile:
-    """Return the quantiles of a normal distribution, cut off below `low` and above `high` where these are given.
+    """Return the quantile function of a normal distribution, cut off below `low` and above `high` if given.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def normal(mean: float, deviation: float, low: float | None = None, high: float 
 
 
 def drawn(shares: NDArray[np.float64], quantile: Quantile, low: float, high: float) -> tuple[float, ...]:
-    """Return the values of one key, rounded, none of them outside `low` to `high`.
+    """Return the drawn values of one key, rounded, within `low` to `high`.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def drawn(shares: NDArray[np.float64], quantile: Quantile, low: float, high: flo
 
 
 def has_probability(mean: float, deviation: float, low: float, high: float) -> bool:
-    """Return whether a normal distribution that is cut off at two values leaves enough between them to draw from."""
+    """Return whether a normal distribution has more than a probability of 1e-6 between two values."""
     whole = NormalDist(mean, deviation)
     inside = [whole.cdf(end) if math.isfinite(end) else float(end > 0.0) for end in (low, high)]
     return inside[1] - inside[0] > 1e-6

@@ -1,4 +1,4 @@
-"""A scene on its way to being valid: its document, those of its tables that are, and what is wrong with the others."""
+"""A scene during the checks: its document, its valid tables, and the problems of the others."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
 
 
 class DraftTables:
-    """The tables of a document, read one by one: a table that is not valid is None, and its problems are kept."""
+    """The tables of a document, read one by one: an invalid table is None, and its problems are kept."""
 
     def __init__(self, document: Mapping[str, Any]) -> None:
         self.document = document
@@ -45,21 +45,21 @@ class DraftTables:
         self.header = self.table(SceneHeader, "scene", {})
 
     def written(self, table: str) -> Mapping[str, Any]:
-        """Return a table as written, or an empty one."""
+        """Return a table as written, or an empty table."""
         raw = self.document.get(table)
         return raw if isinstance(raw, dict) else {}
 
     def table(self, model: type[Table], name: str, absent: object = None) -> Table | None:
-        """Return a table as its model; `absent` stands for one that is not written."""
+        """Return a table as its model; `absent` stands for a missing table."""
         raw = self.document.get(name, absent)
         return None if raw is None else self.read(model, raw, (name,))
 
     def read(self, model: type[Table], raw: object, path: KeyPath) -> Table | None:
-        """Return what the document has at a path as a model."""
+        """Return the table at a path of the document as a model; None if it is invalid."""
         return read_table(model, raw, path, self.problems)
 
     def entries(self, name: str) -> list[tuple[object, KeyPath]]:
-        """Return what an array `[[name]]` holds, and where."""
+        """Return the tables of an array `[[name]]`, each with its path."""
         raw = self.document.get(name, [])
         if not isinstance(raw, list):
             hint = f"Write [[{name}]], with two brackets, for each {name}."
@@ -70,7 +70,7 @@ class DraftTables:
     def variant(
         self, models: Mapping[str, type[Table]], tag: str, default: str, raw: object, path: KeyPath
     ) -> Table | None:
-        """Read a table whose kind decides its keys; of an unknown kind nothing else is judged."""
+        """Read a table whose kind decides its keys; an unknown kind is a single problem."""
         kind = raw.get(tag, default) if isinstance(raw, dict) else default
         if isinstance(kind, str) and kind in models:
             there = len(self.problems)
@@ -88,7 +88,7 @@ class DraftTables:
 
 
 class Reading(NamedTuple):
-    """What is read of a document in one of its forms: its draft, what is wrong between its tables, its parts else."""
+    """The result of reading a document: its draft, the problems between its tables, and its parts if there are none."""
 
     draft: DraftTables
     problems: list[Problem]
@@ -96,7 +96,7 @@ class Reading(NamedTuple):
 
 
 class Draft(DraftTables):
-    """A scene of one body on its way; a key that its axes sweep need not be written."""
+    """A scene of one body during the checks; swept keys need not be written."""
 
     def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
         super().__init__(with_swept_keys(document, axes))
@@ -124,21 +124,21 @@ class Draft(DraftTables):
 
     @property
     def sweeps_modes(self) -> bool:
-        """Whether the number of modes differs between points, or is yet to be found."""
+        """Whether the number of modes differs between points, or is not yet known."""
         return any(axis.key == MODES for axis in self.axes) or self.finds_modes
 
     @property
     def finds_modes(self) -> bool:
-        """Whether the number of modes is to be found."""
+        """Whether the number of modes must still be found (`modes = "auto"`)."""
         return self.body is not None and self.body.finds_modes
 
     def worst(self, *tables: str) -> str:
-        """Return a note for a number that may be the worst of a sweep over keys of these tables."""
+        """Return a note for a message, if a number may be the worst value of a sweep over keys of these tables."""
         swept = any(axis.key.startswith(tables) for axis in self.axes)
         return " (the worst of the swept values)" if swept else ""
 
     def span(self, text: str) -> tuple[float, float] | None:
-        """Return the lowest and highest value of a key over all points; None where its table is not valid."""
+        """Return the lowest and highest value of a key over all points; None if its table is invalid."""
         for axis in self.axes:
             if axis.key == text:
                 return min(axis.values), max(axis.values)
@@ -149,24 +149,24 @@ class Draft(DraftTables):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The channels of the measuring chain that the time series names."""
+        """Channels of the measuring chain in the time series."""
         series = self.record.time_series if self.record else None
         return () if series is None else channels_in(series.variables)
 
     @property
     def samples_channels(self) -> bool:
-        """Whether the clock of `[daq]` is that of the time series."""
+        """Whether the clock of `[daq]` samples the time series."""
         return "daq" in self.document and bool(self.channels)
 
     def sampling_span(self) -> tuple[float, float] | None:
-        """Return the lowest and highest rate of the time series, 1/s; None without one, or where it is not valid."""
+        """Return the lowest and highest rate of the time series, 1/s; None without a valid rate."""
         series = self.record.time_series if self.record else None
         if self.samples_channels:
             return self.span("daq.rate")
         return None if series is None or series.rate is None else (series.rate, series.rate)
 
     def angular_frequency_span(self) -> tuple[float, float] | None:
-        """Return the lowest and highest angular frequency: 0 unforced, None where it is not valid."""
+        """Return the lowest and highest angular frequency, rad/s: 0 without forcing, None if it is invalid."""
         if "forcing" not in self.document:
             return 0.0, 0.0
         if self.forcing is None or not FREQUENCY_KEYS & self.written("forcing").keys():
@@ -178,9 +178,9 @@ class Draft(DraftTables):
 
 
 def with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
-    """Return the document with the first swept value wherever the swept key itself is not written.
+    """Return the document with the first swept value for each swept key that is not written.
 
-    Of modes it has the least number, written or not: what names modes is to suit each of the swept numbers.
+    `modes` gets the least swept number, written or not, as keys with modes must suit all swept numbers.
     """
     filled = dict(document)
     for axis in axes:
@@ -197,7 +197,7 @@ def with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) ->
 def _keys_of_other_kinds(
     raw: object, models: Mapping[str, type[Table]], tag: str, kind: str, path: KeyPath
 ) -> dict[str, str]:
-    """Return advice for each key, by its path, that a table of another kind has and one of this kind has not."""
+    """Return advice, by path, for each key that belongs to a table of another kind only."""
     advice = {}
     for name in raw if isinstance(raw, dict) else ():
         owners = [quoted(other) for other, model in models.items() if name in known_keys(model)]

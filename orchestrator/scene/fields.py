@@ -1,7 +1,7 @@
-"""What a field of a scene says of itself: what it accepts, its unit, its FMU variable, its line in docs/scene.md.
+"""The rule of a field of a scene: accepted values, unit, FMU variable, and its line in docs/scene.md.
 
-A field is an annotation with constraints and a `Rule`. Messages, the keys that a sweep may vary, units in datasets,
-parameters of FMUs, bounds of a fit and the tables of docs/scene.md are read off it.
+A field is an annotation with constraints and a `Rule`. It is the source of messages, sweepable keys, units in datasets,
+parameters of FMUs, bounds of a fit, and the tables of docs/scene.md.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from pydantic.fields import FieldInfo
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What a field of a scene model says beside its constraints.
+    """The rule of a field of a scene model, besides its constraints.
 
     Attributes
     ----------
     expected : str
-        Completes "expected ..."; without it the constraints say it: "a number > 0".
+        Completes "expected ..." in messages; by default the constraints in words: "a number > 0".
     unit : str
-        The unit of the field in an SI scene; empty where it has none.
+        Unit of the field in an SI scene; empty without a unit.
     hint : str
-        What to do about a value outside the rule.
+        Advice for a value outside the rule.
     unavailable : tuple of str
         Words of the scene format that this version does not run.
     item : str
-        Completes "expected ..." for one item of an array; without it the constraints say it.
+        Completes "expected ..." for one item of an array; by default the constraints in words.
     sweepable : bool or None
-        Whether a sweep may vary it, if it is in a table with swept keys; None: a number it may, a whole number not.
+        Whether a sweep may vary the field, in a table with swept keys; None: real numbers yes, whole numbers no.
     fmu : str
-        Real variable of the body's FMU that it is: `mass`; `mass[i]` with one element for each mass or mode;
-        `contact[k].stiffness` at the port of its stop. Empty where it is none as it stands.
+        Real variable of the body's FMU with the same value: `mass`; `mass[i]` with one element for each mass or
+        mode. At the port of a stop: `contact[k].stiffness`. Empty without such a variable.
     told_if_given : bool
-        Whether the FMU is told of it only where the scene gives it.
+        Whether the FMU gets the value only if the scene gives it.
     effect : str
-        What a scene with a value > 0 calls for, in the words of `vibroimpact check`.
+        Effect that a value > 0 asks for, in the words of `vibroimpact check`.
     doc : str
-        What docs/scene.md says of it after its bounds; without it the hint.
+        Text in docs/scene.md after the bounds; by default the hint.
     default : str
-        What docs/scene.md says of its default, where the value alone does not tell.
+        Text in docs/scene.md on the default, if the value alone is not clear.
     """
 
     expected: str = ""
@@ -62,7 +62,7 @@ class Rule:
 
 
 class Bounds(NamedTuple):
-    """Lowest and highest number of a field, and whether the lowest itself is left out."""
+    """Lowest and highest number of a field, and whether the lowest itself is excluded."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -70,7 +70,7 @@ class Bounds(NamedTuple):
 
 
 def rule_of(field: FieldInfo) -> Rule:
-    """Return the rule of a model field, complete; each field of a scene model has one."""
+    """Return the complete rule of a model field, with the texts from its constraints."""
     rule = _written_rule(field)
     item = rule.item or (_number(bounds_of(field)) if _array_of(field) is float else "")
     return replace(rule, expected=rule.expected or _expected(field), item=item)
@@ -81,7 +81,7 @@ def _written_rule(field: FieldInfo) -> Rule:
 
 
 def bounds_of(field: FieldInfo) -> Bounds:
-    """Return between which numbers a field, or each item of it, lies."""
+    """Return the bounds of a field, or of each of its items."""
     low, high, is_open = Bounds()
     for mark in (*field.metadata, *_marks(field.annotation)):
         low = getattr(mark, "gt", getattr(mark, "ge", low))
@@ -99,7 +99,7 @@ def _marks(annotation: Any) -> Iterator[Any]:
 
 
 def forms_of(annotation: Any) -> list[Any]:
-    """Return what a value may be, without constraints and None.
+    """Return the types of a value, without constraints and None.
 
     Examples
     --------
@@ -114,25 +114,25 @@ def forms_of(annotation: Any) -> list[Any]:
 
 
 def choices_of(annotation: Any) -> list[Any]:
-    """Return the values between which a field, or an item of it, is a choice; none of any other."""
+    """Return the choices of a field, or of its items; empty if it is not a choice."""
     if get_origin(annotation) is Literal:
         return list(get_args(annotation))
     return [choice for part in get_args(annotation) for choice in choices_of(part)]
 
 
 def _array_of(field: FieldInfo) -> Any:
-    """Return the type of the items of an array; None where a field takes none."""
+    """Return the type of the items of an array; None where a field takes no array."""
     arrays = [form for form in forms_of(field.annotation) if get_origin(form) is tuple]
     return forms_of(get_args(arrays[0])[0])[0] if arrays else None
 
 
 def is_array_only(field: FieldInfo) -> bool:
-    """Whether a field takes an array and nothing else."""
+    """Return whether a field takes only an array."""
     return all(get_origin(form) is tuple for form in forms_of(field.annotation))
 
 
 def _expected(field: FieldInfo) -> str:
-    """Return what the constraints of a field say."""
+    """Return the constraints of a field in words."""
     forms, choices, bounds = forms_of(field.annotation), choices_of(field.annotation), bounds_of(field)
     if choices:
         return listed([f'"{choice}"' for choice in choices], "or")
@@ -154,7 +154,7 @@ def _number(bounds: Bounds, noun: str = "number") -> str:
 
 
 def listed(words: Sequence[str], last: str) -> str:
-    """Return words with commas between them and one word before the last.
+    """Return words joined by commas, with `last` before the last word.
 
     >>> listed(["a", "b", "c"], "or"), listed(["a"], "or"), listed([], "or")
     ('a, b or c', 'a', '')
@@ -164,7 +164,7 @@ def listed(words: Sequence[str], last: str) -> str:
 
 @lru_cache(maxsize=256)
 def field_name(model: type[BaseModel], key: str) -> str:
-    """Return the attribute that stores a key of the scene file in its model."""
+    """Return the attribute of a model that stores a key of the scene file."""
     return next(name for name, field in model.model_fields.items() if key in (field.alias, name))
 
 
@@ -174,7 +174,7 @@ def field_of(model: type[BaseModel], key: str) -> FieldInfo:
 
 
 def known_keys(model: type[BaseModel]) -> list[str]:
-    """Return the keys of a table as a scene file spells them."""
+    """Return the keys of a table in the spelling of a scene file."""
     return [field.alias or name for name, field in model.model_fields.items()]
 
 
@@ -188,13 +188,13 @@ def numeric_keys(model: type[BaseModel]) -> Iterator[str]:
 
 
 def is_whole(field: FieldInfo) -> bool:
-    """Whether a field takes whole numbers, and no others."""
+    """Return whether a field takes only whole numbers."""
     forms = forms_of(field.annotation)
     return int in forms and float not in forms
 
 
 class FmuVariable(NamedTuple):
-    """The real variable of an FMU that a key of a scene is; of an array `name` is without `[i]`. See `Rule`."""
+    """The real variable of an FMU that gets the value of a key; the `name` of an array has no `[i]`. See `Rule`."""
 
     key: str
     attribute: str
@@ -205,7 +205,7 @@ class FmuVariable(NamedTuple):
 
 @lru_cache(maxsize=32)
 def fmu_variables_of(model: type[BaseModel]) -> tuple[FmuVariable, ...]:
-    """Return the variables of the FMU that the keys of a table are."""
+    """Return the variables of the FMU that get the values of a table's keys."""
     return tuple(
         FmuVariable(
             field.alias or name,

@@ -1,4 +1,4 @@
-"""From a path, or from tables of Python, to a TOML document; everything that can be wrong with it is a `SceneError`."""
+"""From a path, or from tables in Python, to a TOML document; each problem with it is a `SceneError`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.file_names import is_text, refuse_no_text
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted, syntax_problem
 
-LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most likely another kind of file
+LARGEST_FILE = 2**20  # bytes; a scene has some hundred lines, and a larger file is most likely no scene
 
 _ARCHIVE = b"PK\x03\x04"
 OTHER_KINDS = (
@@ -30,7 +30,7 @@ OTHER_KINDS = (
     (b"\x89HDF", "a NetCDF or HDF5 file", "`vibroimpact describe` says what it holds."),
     (b"CDF", "a NetCDF file", "`vibroimpact describe` says what it holds."),
 )
-"""What files that are no text begin with, what they are, and where such a file is taken."""
+"""First bytes of other kinds of files, with the kind and a hint to the right command."""
 
 _VALUE = "a value that TOML has: a number, True, False, text, a sequence or a mapping"
 
@@ -52,7 +52,7 @@ def parse_scene_toml(text: str, source: str) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        When the text is not TOML, with the line.
+        The text is not TOML; the message has the line.
     """
     try:
         return safe_toml.parse_toml(text)
@@ -66,14 +66,14 @@ def text_of_tables(tables: Mapping[str, Any], source: str) -> str:
     Parameters
     ----------
     tables : mapping
-        As TOML has them; numbers and arrays of NumPy or xarray, tuples and paths too.
+        Tables with values of TOML; numbers and arrays of NumPy or xarray, tuples and paths are allowed, too.
     source : str
-        What messages begin with.
+        Name of the scene in messages.
 
     Raises
     ------
     SceneError
-        With all values that TOML does not have.
+        Some values are not possible in TOML; the message has all of them.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def text_of_tables(tables: Mapping[str, Any], source: str) -> str:
 
 
 def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> Any:
-    """Return a value as TOML has it; what it does not have becomes a problem."""
+    """Return a value in a type of TOML; add a problem for any other value."""
     if hasattr(value, "__array__"):
         value = np.asarray(value).tolist()
     if len(path) > safe_toml.MOST_PARTS:
@@ -124,7 +124,7 @@ def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> 
 
 
 def refuse_no_mapping(given: object, what: str, source: str) -> None:
-    """Refuse what has no keys where keys with values are asked for."""
+    """Raise SceneError unless `given` is a mapping."""
     if not isinstance(given, Mapping):
         raise _file_error(source, f"a mapping of {what}", quoted(given), "Write a dictionary.")
 
@@ -159,7 +159,7 @@ def _read_bytes(path: Path, source: str) -> bytes:
 
 
 def _file_hint(path: Path) -> str:
-    """Return the nearest scene file in the same folder."""
+    """Return a hint with the nearest scene file in the same folder."""
     folder = path.parent
     names = sorted(entry.name for entry in folder.glob("*.toml")) if folder.is_dir() else []
     near = get_close_matches(path.name, names, n=1)

@@ -1,4 +1,4 @@
-"""Keys such as `forcing.amplitude` or `stop[1].position`: what they name and whether a sweep may vary it."""
+"""Keys such as `forcing.amplitude` or `stop[1].position`: their numbers, and whether a sweep may vary them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "execution": (Execution,),
 }
 CHAIN_TABLES = ("load_cell", "exciter", "noise", "daq")
-"""Tables of a measuring chain; `sensor` is in scenes without one too."""
+"""Tables of a measuring chain, except `sensor`, which other scenes have, too."""
 SINGLE_TABLES = ("body", "forcing", "sensor", *CHAIN_TABLES)
-"""Tables with numbers that a scene has once or not at all."""
+"""Tables with numbers that a scene has at most once."""
 SWEEPABLE: dict[str, tuple[str, ...]] = {
     table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
     for table, models in _MODELS.items()
@@ -38,16 +38,16 @@ SWEEPABLE: dict[str, tuple[str, ...]] = {
 MODES = "body.modes"
 START_STATE = ("body.displacement_start", "body.velocity_start")
 
-# The second of each pair has the last word in its model, so that giving the first must clear it.
+# The second key of each pair overrides the first in its model, so setting the first must clear the second.
 OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
 ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
-"""Keys of one table that say the same thing, of which a scene gives one."""
+"""Alternative keys of one table for the same quantity; a scene gives one of each pair."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
 _KEY = re.compile(rf"(?:({'|'.join(SINGLE_TABLES)}|execution)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
 
 
 class Key(NamedTuple):
-    """A key taken apart; `place` and `element` are 0-based, None where table or value are not an array."""
+    """The parts of a key; `place` and `element` are 0-based, None where table or value are not an array."""
 
     table: str
     place: int | None
@@ -56,22 +56,22 @@ class Key(NamedTuple):
 
     @property
     def owner(self) -> str:
-        """The table as keys name it: `body`, or `stop[1]`."""
+        """Name of the table in keys: `body`, or `stop[1]`."""
         return self.table if self.place is None else f"{self.table}[{self.place + 1}]"
 
     def owner_in(self, document: Mapping[str, Any]) -> Any:
-        """Return what a document has for its table."""
+        """Return the table of the key in a document."""
         return document[self.table] if self.place is None else document[self.table][self.place]
 
     def typed(self, value: float) -> float:
-        """Return a number as its table has it: whole where others have no meaning."""
+        """Return a number in the type of its field: int for whole numbers."""
         fields = [field_of(m, self.name) for m in _MODELS[self.table] if self.name in known_keys(m)]
         return int(value) if any(map(is_whole, fields)) else value
 
 
 @lru_cache(maxsize=256)
 def parse_key(text: str) -> Key | None:
-    """Take a key with 1-based indices apart; None when it is not of the form of one.
+    """Return the parts of a key with 1-based indices; None for a text of another form.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def parse_key(text: str) -> Key | None:
 
 
 def model_of(table: str) -> type[BaseModel]:
-    """Return the model of a table that has no kinds."""
+    """Return the model of a table without kinds."""
     return _MODELS[table][0]
 
 
@@ -102,7 +102,7 @@ def numeric_key(text: str) -> Key:
     Raises
     ------
     UsageError
-        When it names none.
+        The key names no number.
     """
     key = parse_key(text)
     if key is None or key.name not in SWEEPABLE[key.table]:
@@ -112,7 +112,7 @@ def numeric_key(text: str) -> Key:
 
 
 def number_of(owner: object, key: Key) -> float | None:
-    """Return the number that a key names in its table; None where there is none."""
+    """Return the number of a key in its table; None where there is none."""
     value = getattr(owner, key.name, None)
     if key.element is not None:
         array = isinstance(value, tuple) and key.element < len(value)
@@ -121,7 +121,7 @@ def number_of(owner: object, key: Key) -> float | None:
 
 
 def is_missing(document: Mapping[str, Any], text: str) -> bool:
-    """Return whether a document of the short form has no number at a numeric key, and none that says the same."""
+    """Return whether a document of the short form has neither a numeric key nor its alternative."""
     key = parse_key(text)
     if key is None:
         return False
@@ -133,7 +133,7 @@ def is_missing(document: Mapping[str, Any], text: str) -> bool:
 
 
 def with_alternatives(texts: Iterable[str]) -> set[str]:
-    """Return keys, and the keys of the same tables that say the same things.
+    """Return keys together with their alternatives.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def with_alternatives(texts: Iterable[str]) -> set[str]:
 
 
 def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
-    """Yield each number of a table that a sweep may vary, with its key; of two related keys the one that counts."""
+    """Yield each number of a table that a sweep may vary, with its key; of two alternatives the one in effect."""
     for word in SWEEPABLE[table.partition("[")[0]]:
         value = getattr(owner, word, None)
         if getattr(owner, OVERRIDDEN_BY.get(word, ""), None) is not None:
@@ -158,7 +158,7 @@ def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
 
 
 def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:
-    """Return the attributes to change so that a key has a value, whichever of two related keys was given."""
+    """Return the attributes to change so that a key has a value, also where its alternative was given."""
     model = type(owner)
     attribute = field_name(model, key.name)
     if key.element is not None:
@@ -174,8 +174,8 @@ def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:
 def coordinate_name(key: str, swept: Sequence[str]) -> str:
     """Return the name of a swept key as a coordinate of the dataset.
 
-    It is the last part of the key, or the whole key joined by `_` where two swept keys end alike; a name has
-    letters, digits and `_` only.
+    The name is the last part of the key. Where two swept keys have the same last part, it is the whole key joined by
+    `_`. A name has only letters, digits and `_`.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def coordinate_name(key: str, swept: Sequence[str]) -> str:
     'mass_2'
     """
     last = _last_part(key)
-    if key.startswith("noise."):  # its keys are named as the channels are
+    if key.startswith("noise."):  # keys of noise have the names of channels
         return dataset_name(key)
     if any(other != key and _last_part(other) == last for other in swept):
         return dataset_name(key)

@@ -1,4 +1,4 @@
-"""The contact laws that a `[[stop]]` can have, and what each is: nobody asks a stop for its class."""
+"""The contact laws of a `[[stop]]` with their properties, which replace questions about the class of a stop."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from vibroimpact.orchestrator.scene.models import Stop
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """What a contact law is."""
+    """The properties of a contact law."""
 
     is_rigid: bool = False
-    """Whether its stop answers with an impulse; else it yields, and answers with a force."""
+    """Whether the stop answers with an impulse; a compliant stop answers with a force."""
     is_integrated: bool = False
-    """Whether its contacts have no closed form: their error is `execution.contact_tolerance`."""
+    """Whether contacts are integrated, without a closed form; their error is `execution.contact_tolerance`."""
 
 
 LAWS = {
@@ -27,15 +27,15 @@ LAWS = {
 
 
 def all_rigid(stops: Iterable[Stop]) -> bool:
-    """Return whether no stop yields."""
+    """Return whether all stops are rigid."""
     return all(LAWS[stop.law].is_rigid for stop in stops)
 
 
 def any_rigid(stops: Iterable[Stop]) -> bool:
-    """Return whether a stop is rigid."""
+    """Return whether any stop is rigid."""
     return any(LAWS[stop.law].is_rigid for stop in stops)
 
 
 def integrates_contacts(stops: Iterable[Stop]) -> bool:
-    """Return whether a stop has contacts without a closed form."""
+    """Return whether any stop has contacts without a closed form."""
     return any(LAWS[stop.law].is_integrated for stop in stops)

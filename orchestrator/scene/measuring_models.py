@@ -1,4 +1,4 @@
-"""The tables of the measuring chain: what turns a motion into voltages, and the voltage that drives into a force."""
+"""The tables of the measuring chain, which turns a motion into voltages, and a drive voltage into a force."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ MOST_PPM = 1e5
 MOST_SEED = 10**9
 
 RING_INSTANTS = 12
-"""Instants in a period of a load cell's ring, at least: between them the force on it is taken to be linear."""
+"""Least number of instants in a period of a load cell's ring, with a linear force on the cell between them."""
 MOST_INSTANTS = 1000
-"""Instants at which a sample follows a force, at most."""
+"""Largest number of instants in a sample at which a force is followed."""
 
 MEASURED_SENSOR = {f"sensor.{name}": name for name in ("displacement", "velocity", "acceleration")}
-"""Channels of the sensor, and what of the observed point each reads."""
+"""Channels of the sensor, each with the quantity of the observed point that it reads."""
 LOAD_CELL, DRIVE = "load_cell", "drive"
 CHANNELS = (*MEASURED_SENSOR, LOAD_CELL, DRIVE)
-"""All channels of a measuring chain, in V; also the tables that have their noise: see `Noise.of`."""
+"""All channels of a measuring chain, in V; the first part of a name is the key of its noise: see `Noise.of`."""
 
 
 def channel_number(channel: str) -> int:
-    """Return the number of a channel, which tells its noise from that of others under one seed."""
+    """Return the number of a channel, which gives each channel its own noise under one seed."""
     return CHANNELS.index(channel)
 
 
 FALLING_FORCE = "force that falls with distance"
-"""Effect that an exciter with a distance calls for."""
+"""Effect that an exciter with a distance asks for."""
 
 
 class Sensor(SceneTable):
-    """`[sensor]`: the observed point of a beam, and what a reading there is: gain * value + offset, up to its range."""
+    """`[sensor]`: the observed point of a beam, and its reading: gain * value + offset, up to the range."""
 
     location: Annotated[
         Fraction | None,
@@ -79,7 +79,7 @@ class Sensor(SceneTable):
 
 
 class LoadCell(SceneTable):
-    """`[load_cell]`: the voltage of a cell behind a stop: a second-order system that the contact force drives."""
+    """`[load_cell]`: the voltage of a cell behind a stop, a second-order system driven by the contact force."""
 
     stop: Annotated[
         int,
@@ -143,7 +143,7 @@ def _noise(of: str) -> Rule:
 
 
 class Noise(SceneTable):
-    """`[noise]`: what is added to each sample of a channel, before its conversion; white and Gaussian."""
+    """`[noise]`: white Gaussian noise that is added to each sample of a channel before its conversion."""
 
     seed: Annotated[
         int,
@@ -167,7 +167,7 @@ class Noise(SceneTable):
 
 
 class Daq(SceneTable):
-    """`[daq]`: the clock that samples the channels, and how they become numbers."""
+    """`[daq]`: the clock that samples the channels, and their conversion to numbers."""
 
     rate: Annotated[
         Positive, Rule(unit="Hz", doc="nominal samples per second, in place of `record.time_series.rate`")
@@ -198,5 +198,5 @@ class Daq(SceneTable):
 
     @property
     def true_rate(self) -> float:
-        """Samples in a second, of which the clock says that they are `rate`."""
+        """True number of samples in a second, where the clock shows `rate`."""
         return self.rate * (1.0 + 1e-6 * self.clock_error)

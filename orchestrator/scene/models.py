@@ -1,10 +1,9 @@
 """The tables of a scene file as frozen pydantic models.
 
-A field says everything about itself in one place: its constraints, its default, and its `Rule`, from which messages,
-keys of sweeps, units of datasets, parameters of FMUs and the tables of docs/scene.md come (`fields`). Rules between
-fields or tables are in `rules`. Another contact law becomes one more model here, in `Stop`; another kind of body one in
-`body_models`. The tables of a measuring chain are in `measuring_models`, those of a
-replay in `replay_models`, those of a sweep in `sweep_models`.
+A field is defined in one place: its constraints, its default, and its `Rule`. Messages, keys of sweeps, units of
+datasets, parameters of FMUs and the tables of docs/scene.md come from there (`fields`). Rules between fields or tables
+are in `rules`. A new contact law is one more model here, in `Stop`; a new kind of body is one more in `body_models`.
+The tables of a measuring chain, a replay and a sweep are in `measuring_models`, `replay_models` and `sweep_models`.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ MOST_PERIODS = 10**9
 MOST_IMPACTS_PER_POINT = 10**12
 DEFAULT_IMPACT_LIMIT = 10_000_000
 MOST_MODES = 64
-"""Masses of a chain, and modes of a beam: what the FMUs are compiled for."""
+"""Largest number of masses of a chain and of modes of a beam, for which the FMUs are compiled."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Finite, Field(gt=0)]
@@ -60,13 +59,13 @@ ModeCount = Annotated[
 
 
 class SceneTable(BaseModel):
-    """Base of all tables: nothing is converted, unknown keys are errors, nothing changes afterwards."""
+    """Base of all tables: values are not converted, unknown keys are errors, and instances are frozen."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class SceneHeader(SceneTable):
-    """`[scene]`: what the scene is called and what its numbers mean."""
+    """`[scene]`: the title of the scene and the units of its numbers."""
 
     title: Annotated[
         str,
@@ -82,7 +81,7 @@ class SceneHeader(SceneTable):
 DAMPING = "damping"
 FALLING_RESTITUTION = "restitution that falls with speed"
 AMPLITUDE = "motion that depends on its amplitude"
-"""Effects that a number > 0 calls for."""
+"""Effects that a number > 0 asks for."""
 
 FEEDS_ENERGY = "Negative damping feeds energy into the body."
 
@@ -155,21 +154,21 @@ class Forcing(SceneTable):
 
     @property
     def scalar_amplitude(self) -> float:
-        """Amplitude of a load that has one; forces on the masses of a chain have an array of them."""
+        """Amplitude of a load with a single amplitude; forces on the masses of a chain have an array."""
         assert not isinstance(self.amplitude, tuple)
         return self.amplitude
 
     @property
     def angular_frequency(self) -> float:
-        """Angular frequency, rad/s: as given, or 2 pi frequency; 0 means a constant force."""
+        """Angular frequency, rad/s: as given, or 2 pi frequency; 0 for a constant force."""
         if self.frequency is not None:
             return 2.0 * math.pi * self.frequency
         given = self.angular_frequency_given
-        return 0.0 if given is None else given + 0.0  # of -0 too: 0
+        return 0.0 if given is None else given + 0.0  # -0 becomes 0
 
 
 class StopTable(SceneTable):
-    """Base of `[[stop]]`: where a stop is."""
+    """Base of `[[stop]]`: the place of a stop."""
 
     position: Annotated[Finite, Rule(unit="m", fmu="contact[k].position")]
     side: Annotated[
@@ -215,7 +214,7 @@ class RestitutionStop(StopTable):
 
 
 class KelvinVoigtStop(StopTable):
-    """`[[stop]]`: a spring beside a dashpot; it never pulls."""
+    """`[[stop]]`: a spring and a dashpot in parallel, which never pull."""
 
     law: Annotated[Literal["kelvin_voigt"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m", fmu="contact[k].stiffness")]
@@ -248,7 +247,7 @@ class HuntCrossleyStop(StopTable):
 
 
 class TimeSeries(SceneTable):
-    """`record.time_series`: variables sampled at a constant rate; `sampled_names` knows which there are."""
+    """`record.time_series`: variables sampled at a constant rate; `sampled_names` lists the possible names."""
 
     rate: Annotated[
         Positive | None,
@@ -274,9 +273,9 @@ _NOT_RECORDED = "not recorded"
 
 
 class Record(SceneTable):
-    """`[record]`: how long to wait, how long to record, and what.
+    """`[record]`: the transient, the recording, and the recorded quantities.
 
-    A forced scene counts periods and its times are 0; any other scene has times and its periods are 0.
+    A forced scene counts periods, and its times are 0; any other scene has times, and its periods are 0.
     """
 
     transient_periods: Annotated[int, Field(ge=0, le=MOST_PERIODS), Rule(doc=_NOT_RECORDED)] = 0
@@ -315,7 +314,7 @@ class Record(SceneTable):
 
 
 class Execution(SceneTable):
-    """`[execution]`: how points run and when to give one up.
+    """`[execution]`: the way to run points, and the limits of a point.
 
     `macro_step`, `exchange` and `guard` are for coupled runs.
     """
@@ -396,4 +395,4 @@ STOP_MODELS: dict[str, type[Stop]] = {
 LAWS_THAT_YIELD = listed(
     [f'"{law}"' for law, model in STOP_MODELS.items() if model is not RestitutionStop], "or"
 )
-"""In words."""
+"""Compliant contact laws in words, for messages."""

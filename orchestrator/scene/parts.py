@@ -1,7 +1,7 @@
-"""The parts of a scene, whichever form its file has: bodies, what they meet, what drives them, what is recorded.
+"""The parts of a scene in either form of its file: bodies, contacts, forcing, record.
 
-A file with `[body]` has one body of the package, which meets its own stops; one with `[component.NAME]` has a body for
-each FMU, connections between them and contacts of any two.
+A file with `[body]` has one body of the package, which meets its own stops. A file with `[component.NAME]` has a body
+for each FMU, connections between them, and contacts of any two.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
 _NAMED_BY_FORM = ("bodies", "contacts", "connections", "events", "declared_units", "doubts", "remarks")
-"""Parts that documents of the two forms name differently, or not at all."""
+"""Parts with different names, or no name, in the documents of the two forms."""
 
 
 class Parts(SceneTable):
-    """What a scene consists of, and the questions about it."""
+    """The parts of a scene, and the questions about them."""
 
     source: str
     title: str
@@ -77,7 +77,7 @@ class Parts(SceneTable):
 
     @model_serializer(mode="wrap")
     def _by_form(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the document by which campaigns know a scene: the parts under the names that each form had first."""
+        """Return the document by which campaigns identify a scene, with the original part names of each form."""
         document: dict[str, Any] = serialized(self)
         parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
         if self.is_one_body:
@@ -86,7 +86,7 @@ class Parts(SceneTable):
         return document | {"body": None, "stops": [], "general": self._components_document()}
 
     def _components_document(self) -> dict[str, Any]:
-        """Return what a campaign knows of components: folders of FMU files are left out, wherever a scene lies."""
+        """Return the components in the form for campaigns: FMU files without their folders, so scenes can move."""
         series = self.record.time_series
         components = [asdict(component) for component in self.components]
         for component in components:
@@ -105,7 +105,7 @@ class Parts(SceneTable):
             "doubts": self.doubts,
             "remarks": dict(self.remarks),
         }
-        if self.contacts:  # campaigns from before there were any go on
+        if self.contacts:  # so that campaigns of versions without contacts go on
             document["contacts"] = [asdict(contact) for contact in self.meetings]
         return document
 
@@ -113,22 +113,22 @@ class Parts(SceneTable):
 
     @property
     def is_one_body(self) -> bool:
-        """Whether what moves is one body of the package with its own stops; else it is components, of any FMUs."""
+        """Whether the scene has one body of the package with its own stops, not components of any FMUs."""
         return not isinstance(self.bodies[0], ComponentSpec)
 
     @property
     def is_lone_body(self) -> bool:
-        """Whether what moves is one body and no recording has a part in it: its start, force and time are its own."""
+        """Whether the scene has one body and no recording: its start, force and time are its own."""
         return self.replay is None and self.is_one_body
 
     @property
     def body(self) -> Body:
-        """The body of a scene of one.
+        """The body of a scene of one body.
 
         Raises
         ------
         UsageError
-            For a scene of components.
+            The scene has components.
         """
         if not self.is_one_body:
             raise UsageError(f"{self.source}: body: expected a scene with [body], got a general scene.")
@@ -146,36 +146,36 @@ class Parts(SceneTable):
 
     @property
     def meetings(self) -> tuple[StopContactSpec | PairSpec, ...]:
-        """Which components meet; none in a scene of one body."""
+        """Contacts between components; none in a scene of one body."""
         return () if self.is_one_body else cast(tuple[StopContactSpec | PairSpec, ...], self.contacts)
 
     @property
     def stop_contacts(self) -> tuple[StopContactSpec, ...]:
-        """Components that meet stops which are components too."""
+        """Contacts of components with stops that are components, too."""
         return tuple(contact for contact in self.contacts if isinstance(contact, StopContactSpec))
 
     @property
     def pairs(self) -> tuple[PairSpec, ...]:
-        """Components that hit each other."""
+        """Contacts between two bodies that are components."""
         return tuple(contact for contact in self.contacts if isinstance(contact, PairSpec))
 
     @property
     def period(self) -> float | None:
-        """Forcing period 2 pi / angular_frequency; None unforced and under a constant force."""
+        """Forcing period 2 pi / angular_frequency, s; None without forcing and under a constant force."""
         if self.forcing is None or self.forcing.angular_frequency == 0.0:
             return None
         return 2.0 * math.pi / self.forcing.angular_frequency
 
     @property
     def macro_step(self) -> float:
-        """Time between two exchanges of components, s: as given, the first that is swept, or the whole run."""
+        """Time between two exchanges of components, s: as given, the first swept value, or the whole run."""
         swept = next((axis.values[0] for axis in self.sweep if is_step(self.components, axis.key)), None)
         whole = self.record.transient_time + self.record.recorded_time
         return self.execution.macro_step or swept or whole
 
     @property
     def sampling_rate(self) -> float:
-        """Nominal rate of the time series, 1/s: that of `[daq]` where it samples channels; 0 without a time series."""
+        """Nominal rate of the time series, 1/s: the rate of `[daq]` for channels; 0 without a time series."""
         series = self.record.time_series
         if series is None:
             return 0.0
@@ -183,7 +183,7 @@ class Parts(SceneTable):
 
     @property
     def sampled(self) -> tuple[str, ...]:
-        """The variables of the time series, in its order; none without one."""
+        """The variables of the time series, in its order; none without a time series."""
         return () if self.record.time_series is None else self.record.time_series.variables
 
     @property
@@ -193,7 +193,7 @@ class Parts(SceneTable):
 
     @property
     def falling_force(self) -> bool:
-        """Whether the force of the exciter falls with the distance: at one point of the sweep, then held at all."""
+        """Whether the force of the exciter falls with the distance at any point; it is then held at all points."""
         if self.exciter is None:
             return False
         swept = [axis.values for axis in self.sweep if axis.key == "exciter.distance"]
@@ -201,30 +201,30 @@ class Parts(SceneTable):
 
     @property
     def is_measured(self) -> bool:
-        """Whether its runs go by blocks of samples; no other run pays for a measuring chain."""
+        """Whether runs go by blocks of samples; other runs have no cost of a measuring chain."""
         return bool(self.channels) or self.falling_force
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files beside its own that a run of it reads: recordings that drive it, FMUs."""
+        """Further files that a run reads: recordings and FMUs."""
         folder = Path(self.source).parent
         recordings = self.replay.recordings if self.replay is not None else ()
         return (*(folder / name for name in recordings), *(component.fmu for component in self.components))
 
     @property
     def runs(self) -> int:
-        """How many runs the sweep has; 1 without one."""
+        """Number of runs of the sweep; 1 without a sweep."""
         return run_count(self.sweep)
 
     # ---- numbers by their keys ----
 
     def value(self, key: str) -> float:
-        """Return the number that a key such as `stop[1].position` or `ball.e` has in this scene.
+        """Return the number of a key such as `stop[1].position` or `ball.e` in this scene.
 
         Raises
         ------
         UsageError
-            When the scene has no such number.
+            The scene has no such number.
         """
         if not self.is_one_body:
             return self._component_numbers().value(key)
@@ -232,12 +232,12 @@ class Parts(SceneTable):
         return self._number(key, parts, self._numbered_tables().get(parts.owner))
 
     def field(self, key: str) -> FieldInfo:
-        """Return the field of the model that a numeric key of the short form names; `fields` reads it.
+        """Return the model field of a numeric key of the short form, for the functions of `fields`.
 
         Raises
         ------
         UsageError
-            When the scene has no such key.
+            The scene has no such key.
         """
         parts = numeric_key(key)
         owner = self._numbered_tables().get(parts.owner)
@@ -252,14 +252,14 @@ class Parts(SceneTable):
         return number
 
     def at(self, values: Mapping[str, float]) -> Self:
-        """Return this scene at a point of its sweep: with other numbers, not validated again, and the text it has.
+        """Return this scene at a point of its sweep: with other numbers, without validation, and the same text.
 
         Parameters
         ----------
         values : mapping of str to float
-            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are for
-            `with_values`. An angular_frequency replaces a frequency that the scene gives, and a damping its
-            damping_ratio; and the other way round.
+            New values of sweepable keys. Values of the scene's own sweep are known to be valid; for other values use
+            `with_values`. A new angular_frequency replaces a given frequency, and a new damping a given damping_ratio,
+            and vice versa.
 
         Examples
         --------
@@ -272,7 +272,7 @@ class Parts(SceneTable):
             return self._of_components_at(values)
         tables = self._numbered_tables()
         for key, value in values.items():
-            if key == RECORDING_KEY:  # which recording is replayed: no number of any table
+            if key == RECORDING_KEY:  # the number of the recording is in no table
                 continue
             parts = numeric_key(key)
             owner = tables.get(parts.owner)
@@ -297,7 +297,7 @@ class Parts(SceneTable):
         return self.model_copy(update=parts)
 
     def constants(self) -> dict[str, float]:
-        """Return the numbers of what moves that a sweep could vary and this one does not, by key, defaults too."""
+        """Return the sweepable numbers of the bodies that this sweep does not vary, by key, including defaults."""
         swept = {axis.key for axis in self.sweep}
         return {key: value for key, value in self.numbers() if key not in swept}
 
@@ -305,14 +305,14 @@ class Parts(SceneTable):
         return ComponentNumbers(self.components, self.connections, self.meetings, self.macro_step)
 
     def numbers(self) -> Iterator[tuple[str, float]]:
-        """Yield each number of what moves that a sweep could vary, with its key."""
+        """Yield each sweepable number of the bodies and their tables, with its key."""
         if not self.is_one_body:
             return self._component_numbers().numbers()
         tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
         return chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
 
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
-        """Return the tables that hold numbers, as keys name them."""
+        """Return the tables with numbers, by their name in keys."""
         stops: dict[str, BaseModel | None] = {
             f"stop[{n}]": stop for n, stop in enumerate(self.stops, start=1)
         }

@@ -1,7 +1,7 @@
-"""How problems of a scene file are told: `file: key: expected ..., got .... hint`.
+"""Problems of a scene file as messages: `file: key: expected ..., got .... hint`.
 
-A problem is a value, not an exception: the parts of the scene reader hand on lists of them, and one
-`SceneError` at the end carries them all.
+A problem is a value, not an exception. The parts of the scene reader return lists of problems, and one `SceneError` at
+the end has all of them.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ Table = TypeVar("Table", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
 
 NUMBER_TAG, ARRAY_TAG, WORD_TAG = "number alone", "array of numbers", "word alone"
-"""Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
+"""Tags of the forms of a field "a number, or an array of them"; part of pydantic's location, not of the key."""
 
 LONGEST_QUOTE = 60
 MOST_PROBLEMS = 50
-"""Problems that are told of one file; more of them help nobody, and only their number is said."""
+"""Largest number of problems of one file that are listed; of further problems only the number is given."""
 MOST_WORDS_LISTED = 12
 CHANGES = "--set"
 """The option that changes keys of a scene."""
@@ -59,9 +59,9 @@ _SYNTAX_HINTS = {
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong with a scene: where, what is expected, what is there, and what to do.
+    """A problem in a scene: key, expected value, found value, and a hint to fix it.
 
-    A hint that takes time to find, such as the nearest spelling, may be a function: it is called when it is told.
+    A hint that takes time to find, such as the nearest spelling, may be a function: it is called for the message.
     """
 
     key: str
@@ -70,14 +70,14 @@ class Problem:
     hint: str | Callable[[], str] = ""
 
     def line(self, source: str) -> str:
-        """Return the problem as the line that a user reads."""
+        """Return the problem as one line of a message."""
         hint = self.hint if isinstance(self.hint, str) else self.hint()
         said = f"expected {self.expected}, got {self.got}.{f' {hint}' if hint else ''}"
         return reworded(self.key, lambda key: f"{source}: {key}: {said}" if key else f"{source}: {said}")
 
 
 def lines_of(problems: Sequence[Problem], source: str, changed: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the lines that a user reads of all problems of a file, each once; of very many, how many more.
+    """Return the lines of a message with all problems of a file, each once, up to `MOST_PROBLEMS`.
 
     Problems of keys that the command line has changed name its option in place of the file.
     """
@@ -93,7 +93,7 @@ def lines_of(problems: Sequence[Problem], source: str, changed: Collection[str] 
 
 
 def _concerns(key: str, changed: Collection[str]) -> bool:
-    """Whether a key is one of those that were changed, within one of them, or a table of one."""
+    """Return whether a key is a changed key, within a changed key, or a table of a changed key."""
 
     def within(inner: str, outer: str) -> bool:
         return inner == outer or inner.startswith((f"{outer}.", f"{outer}["))
@@ -102,7 +102,7 @@ def _concerns(key: str, changed: Collection[str]) -> bool:
 
 
 def quoted(value: object) -> str:
-    """Write a value of a TOML document as a person would recognize it, on one short line.
+    """Return a value of a TOML document as one short line for a message.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def _shortened(text: str) -> str:
 
 
 def key_path(parts: Iterable[str | int]) -> str:
-    """Join the parts of a key, with 1-based indices.
+    """Return the key of its parts, with 1-based indices.
 
     Examples
     --------
@@ -149,14 +149,14 @@ def key_path(parts: Iterable[str | int]) -> str:
 
 
 def nearest(word: object, known: Iterable[str], prefix: str = "") -> str:
-    """Return a hint that names the nearest spelling of a word, or the known words where none is near.
+    """Return a hint with the nearest spelling of a word, or with the known words if none is near.
 
     Examples
     --------
     >>> nearest("heigth", ["height", "velocity"], "ball.")
     'Did you mean ball.height?'
     """
-    options = [option for option in known if option.isprintable()]  # a problem is one line
+    options = [option for option in known if option.isprintable()]  # a message is one line
     near = _nearest_word(word, options)
     if near:
         return f"Did you mean {prefix}{near}?"
@@ -176,7 +176,7 @@ def _nearest_word(word: object, options: Sequence[str]) -> str | None:
 
 
 def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
-    """Return the problem of a key that its table does not have."""
+    """Return the problem of an unknown key of a table."""
     return Problem(
         key_path(path),
         "a known key",
@@ -186,21 +186,21 @@ def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
 
 
 def read_table(model: type[Table], raw: object, path: KeyPath, problems: list[Problem]) -> Table | None:
-    """Return a table as its model; None, and its problems added to the list, when it is not valid.
+    """Return a table as its model; None for an invalid table, whose problems are added to the list.
 
     Parameters
     ----------
     model : type of BaseModel
-        The model of the table; its fields carry a `Rule`.
+        The model of the table; its fields have a `Rule`.
     raw : object
-        What the document has there.
+        Value in the document.
     path : tuple
-        Where the table is, for example ("stop", 0).
+        Path of the table, for example ("stop", 0).
     problems : list of Problem
-        Grows.
+        List to which problems are added.
     """
     if not isinstance(raw, dict):
-        # of an array the whole is what to look at, because its brackets are what is wrong
+        # the problem of an array is its brackets, so the message names the whole array
         where = key_path(path) if path[0] == "component" else str(path[0])
         problems.append(Problem(where, "a table", quoted(raw), f"Write {_brackets(path)}."))
         return None
@@ -220,7 +220,7 @@ def _brackets(path: KeyPath) -> str:
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], table: KeyPath) -> list[Problem]:
-    """Return what pydantic found in the table at a path, as problems."""
+    """Return the errors of pydantic in the table at a path, as problems."""
     entries = [
         {**entry, "loc": _as_written(entry["loc"])}
         for entry in error.errors(include_url=False, include_context=False)
@@ -229,12 +229,12 @@ def problems_of(error: ValidationError, model: type[BaseModel], table: KeyPath) 
 
 
 def _as_written(location: Sequence[str | int]) -> KeyPath:
-    """Return a location without what only pydantic knows of."""
+    """Return a location without pydantic's own tags."""
     return (*location[:1], *(part for part in location[1:] if part not in (NUMBER_TAG, ARRAY_TAG, WORD_TAG)))
 
 
 def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> bool:
-    """Whether an error only follows from another one of the same table."""
+    """Return whether an error only follows from another error of the same table."""
     location = entry["loc"]
     if entry["type"] == "too_short":  # bad items do not count as items
         return any(other["loc"][:-1] == location for other in entries)
@@ -262,12 +262,12 @@ def _problem_of(entry: Any, model: type[BaseModel], table: KeyPath) -> Problem:
 
 
 def _owner(model: type[BaseModel], location: Sequence[str | int]) -> tuple[type[BaseModel], str]:
-    """Return the innermost table that a location passes through, and the key in it."""
+    """Return the model of the innermost table on a location, and the key in it."""
     name = str(location[0])
     if len(location) == 1 or isinstance(location[1], int):
         return model, name
     annotation = field_of(model, name).annotation
-    if get_origin(annotation) is dict:  # of tables by name
+    if get_origin(annotation) is dict:  # tables by name
         return _owner(get_args(annotation)[1], location[2:]) if len(location) > 2 else (model, name)
     return _owner(forms_of(annotation)[0], location[1:])
 
@@ -283,7 +283,7 @@ def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) ->
 def choice_problem(
     path: Sequence[str | int], field: FieldInfo, value: object, choices: Collection[str]
 ) -> Problem:
-    """Return the problem of a word that chooses a kind of table, and is none of these."""
+    """Return the problem of a word that should choose a kind of table, and is none of the choices."""
     rule = rule_of(field)
     expected = listed([quoted(choice) for choice in choices], "or")
     return Problem(key_path(path), expected, quoted(value), _value_hint(rule, value, choices))
@@ -309,7 +309,7 @@ def _header(table: KeyPath) -> str:
 
 
 def syntax_problem(error: ValueError, text: str) -> Problem:
-    """Return the problem of a text that is not TOML, with its place and the line itself."""
+    """Return the problem of a text that is not TOML, with the place and the text of the line."""
     if isinstance(error, TooDeepError):
         where = "" if error.line is None else f"line {error.line}"
         hint = "A scene has tables and short arrays only."

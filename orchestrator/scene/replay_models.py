@@ -1,4 +1,4 @@
-"""The table `[replay]` of a scene: recorded channels that drive its body, or that its motion is compared with."""
+"""The table `[replay]` of a scene: recorded channels that drive its body, or that are compared with its motion."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MOST_RECORDINGS = 10_000
 RECORDING_KEY = "replay.recording"
-"""The swept key of a scene with several recordings: which of them, from 1."""
+"""The swept key of a scene with several recordings: the number of the recording, from 1."""
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
 _CHANNEL = Rule('a channel of the recording, such as "base"', hint="`vibroimpact import` lists them.")
 
 
 class Compared(SceneTable):
-    """One entry of `replay.compare`: what the scene simulates, and the channel that measured it."""
+    """One entry of `replay.compare`: a simulated variable, and the channel that measured it."""
 
     simulated: Annotated[
         _Name,
@@ -29,9 +29,9 @@ class Compared(SceneTable):
 
 
 class Replay(SceneTable):
-    """`[replay]`: which channels drive, which are compared, and how their clocks meet.
+    """`[replay]`: the driving channel, the compared channels, and the alignment of their clocks.
 
-    Times are on the clock of the channel that drives; without one, on that of the first channel compared.
+    Times are on the clock of the driving channel; without one, on the clock of the first compared channel.
     """
 
     drive: Annotated[
@@ -145,7 +145,7 @@ class Replay(SceneTable):
 
     @property
     def axes(self) -> tuple[SweepAxis, ...]:
-        """The axis that goes through the recordings; none where there is one, or they are not named."""
+        """The sweep axis over the recordings; none unless the scene names two or more."""
         if len(self.recordings) < 2:
             return ()
         return (SweepAxis(RECORDING_KEY, tuple(float(n) for n in range(1, len(self.recordings) + 1))),)

@@ -1,4 +1,4 @@
-"""The variables that a time series can name."""
+"""The names of variables that a time series can have."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AT_CONTACT = {
 
 
 def channels_in(names: Iterable[str]) -> tuple[str, ...]:
-    """Return those of some variables that are channels of a measuring chain.
+    """Return the channels of a measuring chain among some variables.
 
     >>> channels_in(["velocity", "drive", "sensor.velocity"])
     ('drive', 'sensor.velocity')
@@ -42,14 +42,14 @@ def channel_names(tables: Container[str]) -> tuple[str, ...]:
 
 
 def table_of(channel: str) -> str:
-    """Return the table that a channel of the measuring chain needs."""
+    """Return the name of the table that a channel of the measuring chain needs."""
     return "exciter" if channel == DRIVE else channel.partition(".")[0]
 
 
 def sampled_names(body: BodyTable, stops: int, forcing: Forcing | None) -> tuple[str, ...]:
-    """Return the names that a time series of a scene with so many stops can have, beside `channel_names`.
+    """Return the possible names in the time series of a scene with a number of stops, besides `channel_names`.
 
-    An array of amplitudes makes one forcing for each mass.
+    An array of amplitudes gives one forcing for each mass.
     """
     forces = len(forcing.amplitude) if forcing and isinstance(forcing.amplitude, tuple) else 0
     names = [*_PLAIN, *(each_of("forcing", forces) if forces else ["forcing"])]
@@ -64,6 +64,6 @@ def each_of(name: str, count: int) -> list[str]:
 
 
 def variable_hint(name: str, known: Sequence[str]) -> str:
-    """Return a hint that names the nearest variable, or those that there are."""
+    """Return a hint with the nearest variable, or with the known variables."""
     near = get_close_matches(name, known, n=1)
     return f'Did you mean "{near[0]}"?' if near else nearest(name, known)

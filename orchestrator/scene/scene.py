@@ -1,7 +1,7 @@
-"""Scene files: what is simulated, what is recorded and what is swept.
+"""Scene files: the simulated system, its record and its sweep.
 
-`load_scene` reads a TOML file into a frozen `Scene` or raises one `SceneError` with everything that is wrong.
-The keys are described in `docs/scene.md`.
+`load_scene` reads a TOML file into a frozen `Scene`, or raises one `SceneError` with all problems of the file.
+`docs/scene.md` describes the keys.
 """
 
 from __future__ import annotations
@@ -36,50 +36,49 @@ __all__ = ["Scene", "load_scene", "parse_scene"]
 
 
 class Scene(ViewedScene, Parts):
-    """A validated scene; it never changes, `with_values` and `with_sweep` make another.
+    """A validated scene, which never changes; `with_values` and `with_sweep` return new scenes.
 
     Attributes
     ----------
     source : str
-        Where the scene came from, for messages.
+        Origin of the scene, for messages.
     text : str
         The TOML text, for provenance.
     title : str
-        What the scene is called; may be empty.
+        Title of the scene; may be empty.
     units : {"SI", "nondimensional"}
-        The meaning of all numbers.
+        System of units of all numbers.
     bodies : tuple of OscillatorBody, ChainBody or BeamBody, or of ComponentSpec
         One body of the package; or the components, of any FMUs, in the order of the file.
     contacts : tuple of stops, or of StopContactSpec and PairSpec
-        The stops of the body; or which components meet. In the order of the file.
+        The stops of the body; or the contacts between components. In the order of the file.
     connections : tuple of ConnectionSpec
-        Inputs of components that outputs of others feed.
+        Connections from outputs to inputs of components.
     events : tuple of EventSpec
-        Crossings in components, to be found by step revision.
+        Crossings in components, located by step revision.
     forcing : Forcing or None
-        What drives the body; None without a `[forcing]` table.
+        Forcing of the body; None without a `[forcing]` table.
     sensor : Sensor or None
-        Where a beam is observed, and what a sensor there reads; None without a `[sensor]` table.
+        Observed point of a beam, and the reading of a sensor there; None without a `[sensor]` table.
     load_cell, exciter, noise, daq : LoadCell, Exciter, Noise, Daq, or None
-        The measuring chain beside `[sensor]`; None without their tables.
+        The measuring chain besides `[sensor]`; None without their tables.
     replay : Replay or None
-        Recorded channels that drive the body and that its motion is compared with; None without `[replay]`.
+        Recorded channels that drive the body or are compared with its motion; None without `[replay]`.
     record : Record
-        What is recorded; periods in a forced scene, times in any other. Of components `impacts` says whether located
-        events are recorded.
+        Recorded quantities; periods in a forced scene, times in any other scene. In a scene of components, `impacts`
+        is whether located events are recorded.
     sweep : tuple of SweepAxis
         The swept keys in the order of the file; see `vibroimpact.orchestrator.scene.sweep.expand`.
     execution : Execution
-        How the points run.
+        Way to run the points, and their limits.
     declared_units : mapping of str to str
-        Unit of each number, recorded variable and swept key of components as it is declared; `1` where it has none.
+        Declared unit of each number, recorded variable and swept key of components; `1` without a unit.
     doubts : tuple of str
-        What the descriptions of FMUs leave open, and what is assumed: `FILE: ...`.
+        Open points in the descriptions of FMUs, each with the assumption: `FILE: ...`.
     remarks : mapping of str to int
-        By the file of an FMU, how much else is odd in its description and changes no number.
+        Number of other oddities in the description of an FMU, which change no number, by file.
     found : mapping
-        What was found out about the scene before it runs, by attribute of its datasets; `study.preparation`
-        does.
+        Results of the preparation before a run, by attribute of its datasets; see `study.preparation`.
     """
 
     text: str = Field(repr=False)
@@ -90,12 +89,12 @@ class Scene(ViewedScene, Parts):
 
     @classmethod
     def from_file(cls, path: str | PathLike[str]) -> Scene:
-        """Read a scene file (TOML, UTF-8, at most 1 MiB).
+        """Return the scene of a file (TOML, UTF-8, at most 1 MiB).
 
         Raises
         ------
         SceneError
-            With all problems of the file, each on one line.
+            The file is invalid; the message has all its problems, each on one line.
         """
         if not isinstance(path, str | PathLike):
             raise UsageError(f"scene: expected the path of a file, got {type(path).__name__}.")
@@ -103,18 +102,18 @@ class Scene(ViewedScene, Parts):
 
     @classmethod
     def from_text(cls, text: str, source: str = "scene") -> Scene:
-        """Read a scene from TOML text.
+        """Return the scene of a TOML text.
 
         Parameters
         ----------
         text : str
         source : str
-            The name of the text in messages; files that the scene names count from its folder.
+            The name of the text in messages; paths in the scene are relative to its folder.
 
         Raises
         ------
         SceneError
-            With all problems of the text, each on one line.
+            The text is invalid; the message has all its problems, each on one line.
 
         Examples
         --------
@@ -129,18 +128,18 @@ class Scene(ViewedScene, Parts):
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "scene") -> Scene:
-        """Read a scene from the tables of its file; numbers and arrays of NumPy or xarray, tuples and paths will do.
+        """Return the scene of tables; numbers and arrays of NumPy or xarray, tuples and paths are allowed.
 
         Parameters
         ----------
         tables : mapping
         source : str
-            The name of the scene in messages; files that it names count from its folder.
+            The name of the scene in messages; paths in the scene are relative to its folder.
 
         Raises
         ------
         SceneError
-            With all problems of the tables, each on one line.
+            The tables are invalid; the message has all their problems, each on one line.
 
         Examples
         --------
@@ -152,18 +151,18 @@ class Scene(ViewedScene, Parts):
         return parse_scene(text_of_tables(tables, source), source)
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
-        """Return this scene with other values of some keys, checked as if its file said so.
+        """Return this scene with other values of some keys, checked like a file with these values.
 
         Parameters
         ----------
         values : mapping
-            By key, as messages write it: `stop[1].restitution`, `record.time_series`, `title`. Of two keys for one
-            thing, such as `damping` and `damping_ratio`, the new one takes the place of the other.
+            New values by key, in the notation of messages: `stop[1].restitution`, `record.time_series`, `title`. A new
+            key replaces its alternative, such as `damping_ratio` for `damping`.
 
         Raises
         ------
         SceneError
-            With all problems, each on one line: also for a key that the scene sweeps.
+            The changed scene is invalid, or sweeps a changed key; the message has all problems, each on one line.
 
         Examples
         --------
@@ -181,13 +180,13 @@ class Scene(ViewedScene, Parts):
         Parameters
         ----------
         axes : mapping
-            For each swept key its values, or the table that a file would have: `start`, `stop`, `points`, `path`.
-            No key: no sweep.
+            Values of each swept key, or its table as in a file: `start`, `stop`, `points`, `path`. An empty mapping
+            removes the sweep.
 
         Raises
         ------
         SceneError
-            With all problems, each on one line.
+            The sweep is invalid; the message has all problems, each on one line.
 
         Examples
         --------
@@ -207,7 +206,7 @@ class Scene(ViewedScene, Parts):
         Parameters
         ----------
         varied : iterable of str
-            Keys that the caller varies. Where the file leaves one of them to the sweep, it has the first swept value.
+            Keys that the caller varies; if only the sweep gives one of them, it has its first swept value.
 
         Raises
         ------
@@ -247,37 +246,37 @@ class Scene(ViewedScene, Parts):
         )
 
     def to_toml(self) -> str:
-        """Return the text of a scene file that says the same; that of `from_file`, comments and all."""
+        """Return the text of an equal scene file; for a scene of `from_file` the same text with its comments."""
         return self.text
 
     def sweep_coordinate_name(self, key: str) -> str:
-        """Return the name that a swept key has as a coordinate of the dataset."""
+        """Return the name of a swept key as a coordinate of the dataset."""
         return coordinate_name(key, [axis.key for axis in self.sweep])
 
 
 def load_scene(path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False) -> Scene:
-    """Read a scene file.
+    """Return the scene of a file.
 
     Parameters
     ----------
     path : path-like
         A TOML file, UTF-8, at most 1 MiB.
     changes : sequence of str
-        `KEY=VALUE`, made before anything is checked: see `changes.changed_document`.
+        Changes `KEY=VALUE`, made before the checks: see `changes.changed_document`.
     for_orbits : bool
-        Whether a start that is not written may be on a stop: see `parse_scene`.
+        Whether a missing start may be on a stop: see `parse_scene`.
 
     Raises
     ------
     SceneError
-        With all problems of the file, each on one line.
+        The file is invalid; the message has all its problems, each on one line.
     """
     source = str(path)
     return parse_scene(read_scene_text(Path(path), source), source, changes, for_orbits=for_orbits)
 
 
 def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbits: bool = False) -> Scene:
-    """Read a scene from TOML text.
+    """Return the scene of a TOML text.
 
     Parameters
     ----------
@@ -286,15 +285,15 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     source : str
         The name of the text in messages, usually its file.
     changes : sequence of str
-        `KEY=VALUE`; the text of the scene is then one that says the same as the changed tables.
+        Changes `KEY=VALUE`; the scene then has a new text with the changed tables.
     for_orbits : bool
-        Whether the scene is read to look for periodic orbits, which need no start: a start that is not written is then
-        on the stop where a stop excludes 0.
+        Whether the scene is for a search of periodic orbits, which need no start. A missing start is then on the
+        stop, if a stop excludes 0.
 
     Raises
     ------
     SceneError
-        With all problems of the text, each on one line.
+        The text is invalid; the message has all its problems, each on one line.
     """
     written = parse_scene_toml(text, source)
     changed: tuple[str, ...] = ()

@@ -2,11 +2,11 @@
 
 Run order (the `run` dimension of the dataset) is fixed by the scene alone:
 
-- axes count in the order in which the scene file lists them, the last one fastest; axes that move together
-  count once, where the first of them stands;
+- axes have the order of the scene file, the last one fastest;
+- axes that move together count once, at the place of the first of them;
 - a continuation axis (`up`, `down`, `up-down`) is always the fastest, whatever its place in the file;
-- each combination of the other axes is one branch (two for `up-down`: first up, then down), and a branch
-  occupies a contiguous range of runs in the order in which it is travelled: a down branch starts at the top;
+- each combination of the other axes is one branch (two for `up-down`: first up, then down);
+- a branch is a contiguous range of runs in the order of travel: a down branch starts at the top;
 - without a continuation axis all points form one flat branch of independent points.
 """
 
@@ -36,16 +36,16 @@ DIRECTIONS: dict[SweepPath, tuple[SweepDirection, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Adaptive:
-    """How an axis is refined where the motion jumps.
+    """The refinement of an axis where the motion jumps.
 
     Attributes
     ----------
     tolerance : float
-        Distance, in the unit of the key, down to which jumps are bracketed.
+        Width of an interval with a jump, in the unit of the key, down to which it is halved.
     at_most : int
-        Points of the whole sweep.
+        Largest number of points of the whole sweep.
     jump : float
-        Change of the recorded range between neighbours, over the largest range, that counts as a jump.
+        Change of the recorded range between neighbours, over the largest range, above which the motion jumps.
     """
 
     tolerance: float
@@ -62,15 +62,15 @@ class SweepAxis:
     key : str
         The swept key with 1-based indices, for example `stop[1].position`.
     values : tuple of float
-        Its values in the unit of the key; ascending on a continuation axis, else in the order of the scene.
+        Values in the unit of the key; ascending on a continuation axis, else in the order of the scene.
     path : {"independent", "up", "down", "up-down"}
         Whether each point starts from the scene's start state, or from its predecessor's final state.
     span : tuple or None
-        Start, stop and number of the values of a range: all of it that is sent to workers.
+        Start, stop and number of values of a range, which are sent to workers in place of the values.
     together : str
-        Name of the dimension that it shares with the axes that move with it; empty where it moves alone.
+        Name of the dimension that the axis shares with others; empty for an axis that moves alone.
     adaptive : Adaptive or None
-        How points are put between these values.
+        Refinement between these values; None without refinement.
     """
 
     key: str
@@ -101,23 +101,23 @@ def axis_of_range(key: str, start: float, stop: float, points: int, path: SweepP
 
 
 def log_axis(key: str, start: float, stop: float, points: int, path: SweepPath) -> SweepAxis:
-    """Return an axis of values of which each over the one before is the same, both ends included.
+    """Return an axis of values with a constant ratio between neighbours, both ends included.
 
-    Its values go to workers one by one, and not as a span: another machine's logarithm may end in another bit.
+    Workers get the values themselves, not a span, since another machine's logarithm may differ in its last bit.
 
     Examples
     --------
     >>> log_axis("body.stiffness", 1e2, 1e8, 4, "independent").values
     (100.0, 10000.0, 1000000.0, 100000000.0)
     """
-    # 15 digits: what rounding has left of a ratio is no part of a value
+    # 15 digits, without the rounding of the ratio
     inner = (float(f"{value:.15g}") for value in np.geomspace(start, stop, points)[1:-1])
     values = (start, *inner, stop) if points > 1 else (start,)
     return SweepAxis(key, values if path == "independent" else tuple(sorted(values)), path)
 
 
 Dimension = tuple[SweepAxis, ...]
-"""The axes that move together: one alone, or several of as many values."""
+"""The axes that move together: a single axis, or several axes with the same number of values."""
 
 
 def dimensions(axes: Sequence[SweepAxis]) -> tuple[Dimension, ...]:
@@ -131,18 +131,18 @@ def dimensions(axes: Sequence[SweepAxis]) -> tuple[Dimension, ...]:
     """
     found: dict[str, list[SweepAxis]] = {}
     for axis in axes:
-        # no name of a dimension has the dot that every key has
+        # every key has a dot, and no name of a dimension has one
         found.setdefault(axis.together or f".{axis.key}", []).append(axis)
     return tuple(tuple(members) for members in found.values())
 
 
 def most_points(axes: Sequence[SweepAxis]) -> int | None:
-    """Return how many points adaptive axes may come to; None where every point is known before."""
+    """Return the largest number of points of adaptive axes; None if all points are known in advance."""
     return max((axis.adaptive.at_most for axis in axes if axis.adaptive is not None), default=None)
 
 
 def shared_dimensions(axes: Sequence[SweepAxis]) -> dict[str, str]:
-    """Return the dimension of a dataset that each key shares with others, by key; a key that has its own is left out.
+    """Return the dimension of a dataset that each key shares with other keys, by key; other keys are left out.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def shared_dimensions(axes: Sequence[SweepAxis]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One point of a sweep: its place in the `run` dimension and the value of every swept key."""
+    """One point of a sweep: its place in the `run` dimension, and the value of every swept key."""
 
     index: int
     values: Mapping[str, float]
@@ -164,7 +164,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Points(Sequence[Point]):
-    """The points of a branch, computed when asked for: a sweep may have 10^8 of them."""
+    """The points of a branch, computed on access: a sweep may have 10^8 points."""
 
     first_index: int
     fixed: Mapping[str, float]
@@ -191,7 +191,7 @@ class Points(Sequence[Point]):
         swept: dict[str, NDArray[np.float64]] = {}
         for members in reversed(self.dimensions):
             rest, place = np.divmod(rest, len(members[0].values))
-            # an axis may have 10^6 values: those in between alone become an array
+            # an axis may have 10^6 values: only the values in use become an array
             low, high = (int(place.min()), int(place.max())) if place.size else (0, 0)
             swept |= {axis.key: np.array(axis.values[low : high + 1])[place - low] for axis in members}
         fixed = {key: np.full(stop - first, value) for key, value in self.fixed.items()}
@@ -214,14 +214,14 @@ class Branch:
     Attributes
     ----------
     direction : {"independent", "up", "down"}
-        Up and down branches carry the state from point to point and start their first point from the
-        scene's own start state; independent points all start there.
+        Up and down branches carry the state from point to point; their first point starts from `start`. All
+        independent points start from the scene's own start state.
     fixed : mapping of str to float
         Values of the spanning axes, the same for all points; empty for the independent branch.
     points : Points
         The points in the order of travel; `point.index` is their place in the `run` dimension.
     start : tuple of float or None
-        State that the first point starts from; None: the scene's own.
+        Start state of the first point; None: the scene's own start state.
     """
 
     direction: SweepDirection
@@ -239,12 +239,12 @@ class Swept(Protocol):
 
 
 def expand(scene: Swept) -> tuple[Branch, ...]:
-    """Expand the sweep of a scene into its branches, in run order.
+    """Return the branches of a scene's sweep, in run order.
 
     Parameters
     ----------
     scene : Swept
-        A scene; one without a sweep gives one branch with one point.
+        A scene; a scene without a sweep has one branch with one point.
 
     Returns
     -------
@@ -277,5 +277,5 @@ def _continuation_branches(carried: SweepAxis, spanning: Sequence[Dimension]) ->
 
 
 def run_count(axes: Sequence[SweepAxis]) -> int:
-    """Return the length of the `run` dimension that these axes span (1 without axes)."""
+    """Return the length of the `run` dimension of these axes; 1 without axes."""
     return prod(len(members[0].values) * len(DIRECTIONS[members[0].path]) for members in dimensions(axes))

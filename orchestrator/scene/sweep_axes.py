@@ -1,4 +1,4 @@
-"""From the entries of `[sweep]` to its axes: ranges, lists, keys that move together, drawn and adaptive ones."""
+"""From the entries of `[sweep]` to its axes: ranges, lists, keys that move together, drawn and adaptive axes."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ from vibroimpact.orchestrator.scene.sweep_models import MOST_POINTS_PER_AXIS, Ax
 
 FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 SAMPLE = "sample"
-"""The entry of `[sweep]` that is no key."""
+"""The entry of `[sweep]` that is not a swept key."""
 _SAMPLE_FORM = '{ design = "sobol", points = 256 }'
 _MOST_ADAPTIVE = 2
 _RANGE = ("start", "stop", "points")
 _ENDS = {"uniform": ("low", "high"), "log-uniform": ("low", "high"), "normal": ("mean", "deviation")}
-"""What each distribution has to say."""
+"""Required keys of each distribution."""
 
 
 def read_axis_table(key: str, entry: object, problems: list[Problem]) -> AxisTable | None:
-    """Return one entry of a sweep as its model; what is wrong with it by itself is added to `problems`."""
+    """Return one entry of a sweep as its model; None for an invalid entry, whose problems are added to `problems`."""
     path = ("sweep", key)
     if not isinstance(entry, dict):
         problems.append(Problem(key_path(path), "a table", quoted(entry), f"Write {FORMS}."))
@@ -60,7 +60,7 @@ def read_axis_table(key: str, entry: object, problems: list[Problem]) -> AxisTab
 
 
 def _form_problems(key: str, table: AxisTable) -> Iterator[Problem]:
-    """Yield what is wrong with the combination of the words of an entry."""
+    """Yield the problems of the combination of keys in an entry."""
     where = key_path(("sweep", key))
     forms = [name for name in ("values", "distribution") if getattr(table, name) is not None]
     given = [name for name in _RANGE if getattr(table, name) is not None]
@@ -90,7 +90,7 @@ def _form_problems(key: str, table: AxisTable) -> Iterator[Problem]:
 
 _MOMENTS = ("low", "high", "mean", "deviation")
 _WIDEST = 10.0
-"""Deviations from the mean beyond which nothing is drawn."""
+"""Number of deviations from the mean that must be a finite distance; no value is drawn farther away."""
 
 
 def _range_problems(key: str, table: AxisTable, given: Sequence[str]) -> Iterator[Problem]:
@@ -150,7 +150,7 @@ def _ends(table: AxisTable) -> tuple[float, float]:
 
 
 def _company_problems(key: str, table: AxisTable) -> Iterator[Problem]:
-    """Yield what is wrong with an axis that moves with others, is drawn or adaptive."""
+    """Yield the problems of an axis that moves with other axes, is drawn or is adaptive."""
     drawn_or_zipped = "zip" if table.zip is not None else "a distribution" if table.distribution else ""
     if table.zip is not None and table.distribution is not None:
         yield Problem(
@@ -176,7 +176,7 @@ def _company_problems(key: str, table: AxisTable) -> Iterator[Problem]:
 def axes_of(
     tables: Mapping[str, AxisTable], sample: object, *, expects_keys: bool = True
 ) -> tuple[list[SweepAxis], list[Problem]]:
-    """Return the axes of a sweep that have no problem, in the order of the scene, and what is wrong with the others."""
+    """Return the valid axes of a sweep, in the order of the scene, and the problems of all other axes."""
     problems: list[Problem] = []
     if isinstance(sample, dict) and expects_keys and not any(t.distribution for t in tables.values()):
         hint = 'Give a key a distribution: { distribution = "uniform", low = 0.5, high = 0.9 }.'
@@ -200,7 +200,7 @@ def _is_known(table: AxisTable, key: str, values: Mapping[str, object]) -> bool:
 def _drawn_values(
     tables: Mapping[str, AxisTable], sample: object, problems: list[Problem]
 ) -> dict[str, tuple[float, ...]]:
-    """Return the values of the keys that are drawn; none where the design is not valid."""
+    """Return the values of drawn keys; empty if the design is invalid."""
     keys = {key: table for key, table in tables.items() if table.distribution is not None}
     if sample is None:
         for key in keys:
@@ -230,7 +230,7 @@ def _drawn_values(
 
 
 def _design_problems(design: SampleTable, keys: Sequence[str]) -> Iterator[Problem]:
-    """Yield what is wrong with a design for these keys."""
+    """Yield the problems of a design for these keys."""
     place, points = key_path(("sweep", SAMPLE, "points")), design.points
     if design.design in BALANCED and points.bit_count() != 1:
         lower = 1 << (points.bit_length() - 1)
@@ -260,7 +260,7 @@ def _quantile(table: AxisTable) -> Quantile:
 
 
 def _axis(key: str, table: AxisTable, values: tuple[float, ...]) -> SweepAxis:
-    """Return the axis of a sound entry; `values` are those of a drawn one."""
+    """Return the axis of a valid entry; `values` are the values of a drawn key."""
     if table.distribution is not None:
         return SweepAxis(key, values, together=DRAW)
     if table.values is not None:
@@ -278,7 +278,7 @@ def _axis(key: str, table: AxisTable, values: tuple[float, ...]) -> SweepAxis:
 
 
 def _group_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
-    """Yield what is wrong between axes that move together, and with values that come twice."""
+    """Yield the problems between axes that move together, and the problems of repeated values."""
     for members in dimensions(axes):
         where, name = key_path(("sweep", members[0].key)), members[0].together
         lengths = [len(axis.values) for axis in members]
@@ -304,7 +304,7 @@ def _group_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
 
 
 def _adaptive_problems(adaptive: Sequence[SweepAxis], axes: Sequence[SweepAxis]) -> Iterator[Problem]:
-    """Yield what is wrong with the axes whose points are put where the motion jumps."""
+    """Yield the problems of adaptive axes, whose points are added where the motion jumps."""
     if len(adaptive) > _MOST_ADAPTIVE:
         where = key_path(("sweep", adaptive[-1].key, "adaptive"))
         keys = listed([axis.key for axis in adaptive], "and")

@@ -1,4 +1,4 @@
-"""The entries of `[sweep]` as frozen pydantic models; like those of `models`."""
+"""The entries of `[sweep]` as frozen pydantic models, as in `models`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_POINTS_PER_AXIS = 10**6
 
 
 class SampleTable(SceneTable):
-    """The entry `sample` of `[sweep]`: how the keys with a distribution are drawn."""
+    """The entry `sample` of `[sweep]`: the design by which keys with a distribution are drawn."""
 
     design: Annotated[
         DesignName,

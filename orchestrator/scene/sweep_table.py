@@ -1,4 +1,4 @@
-"""The `[sweep]` table of a scene file: which keys it varies, and over which values."""
+"""The `[sweep]` table of a scene file: its keys and their values."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def read_sweep(
     key_problems: Callable[[str, object], Iterable[Problem]],
     axis_problems: Callable[[SweepAxis], Iterable[Problem]],
 ) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Return the sound axes of any form of scene, in the order of the file, and what is wrong with the others."""
+    """Return the valid axes of a scene of any form, in the order of the file, and the problems of all other axes."""
     table = document.get("sweep", {})
     if not isinstance(table, dict):
         hint = f"Write [sweep] and below it KEY = {FORMS}."
@@ -50,7 +50,7 @@ def read_sweep(
             if not found and (read := read_axis_table(key, entry, found)):
                 tables[key] = read
             problems += found
-    # a design whose keys are wrong is not told that it has none
+    # a design whose keys are all invalid does not get the problem "none" in addition
     expects_keys = not any(isinstance(entry, dict) and "distribution" in entry for entry in table.values())
     axes, found = axes_of(tables, table.get(SAMPLE), expects_keys=expects_keys)
     sound = []
@@ -62,7 +62,7 @@ def read_sweep(
 
 
 def read_short_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Read the sweep of a scene of the short form."""
+    """Return the valid axes of a scene of the short form, and the problems of all other axes."""
     known = dict.fromkeys(_sweepable_keys(document))
     return read_sweep(
         document,
@@ -81,12 +81,12 @@ def _key_problems(
 
 
 def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
-    """Return the keys that a sweep of this scene may vary; a table that is absent has none, but for `execution`."""
+    """Return the keys that a sweep of this scene may vary; absent tables, except `execution`, have none."""
     return [key for name, table in _tables(document) for key in _keys_in(name, table)]
 
 
 def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the tables with numbers, an array `stop` as `stop[1]`, `stop[2]`, ..."""
+    """Yield the tables with numbers, by name; the array `stop` as `stop[1]`, `stop[2]`, ..."""
     for name in SINGLE_TABLES:
         if name in document:
             yield name, document[name]
@@ -108,7 +108,7 @@ def _keys_in(name: str, table: Any) -> Iterator[str]:
 
 
 def _model_of(name: str, table: Any) -> type[BaseModel] | None:
-    """Return the model of a table; None where the word that chooses it is not known."""
+    """Return the model of a table; None if its kind or law is unknown."""
     written = table if isinstance(table, dict) else {}
     if name == "body":
         return BODY_MODELS.get(str(written.get("kind", "oscillator")))
@@ -136,14 +136,14 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
 
 
 def _nearest_key(text: str, known: list[str]) -> str:
-    """Return advice for a key of a table that is there: the nearest of that table's, or all of them."""
+    """Return a hint for a key of a present table: the nearest key of the table, or all its keys."""
     where, _, name = text.rpartition(".")
     names = [key.rpartition(".")[2] for key in known if key.rpartition(".")[0] == where]
     return nearest(name, names, f"{where}.") if names else nearest(text, known)
 
 
 def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> str:
-    """Return the advice for a key whose table is there: of an array, an element is swept."""
+    """Return a hint for a key of a present table, if it is an array: a sweep varies elements of arrays."""
     where, _, name = text.rpartition(".")
     model = next((_model_of(own, table) for own, table in _tables(document) if own == where), None)
     word = name.partition("[")[0]
@@ -160,9 +160,9 @@ def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> s
 
 
 def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Problem]:
-    """Return the swept value that breaks the rule of its field.
+    """Return the problem of a swept value that breaks the rule of its field, if there is one.
 
-    All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
+    All rules of sweepable fields are intervals, so checks of the lowest and the highest value are enough.
     """
     key = numeric_key(axis.key)
     model = (

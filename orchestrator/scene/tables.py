@@ -1,4 +1,4 @@
-"""From a TOML document to the tables of a scene, with a list of everything that is wrong in it."""
+"""From a TOML document to the tables of a scene, or to the list of all its problems."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _COMMON_TABLES = ("record", "sweep", "execution")
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
-    """Return the parts of a scene, to be used only where there is no problem, and all that is wrong with its tables."""
+    """Return the parts of a scene, empty if there is a problem, and all problems of its tables."""
     general = [name for name in _GENERAL_TABLES if name in document]
     short = [name for name in _SHORT_TABLES if name in document]
     if general and short:
@@ -28,7 +28,7 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
     own = _GENERAL_TABLES if general else (*_SHORT_TABLES, *CHAIN_TABLES)
     unknown = list(_table_problems(document, ("scene", *own, *_COMMON_TABLES)))
     if general:
-        # What reads model descriptions takes time to load, and the short form does not need it.
+        # the import of model descriptions takes time, and the short form does not need it
         from vibroimpact.orchestrator.scene.component_tables import read_components
 
         reading = read_components(document, folder)

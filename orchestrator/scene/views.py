@@ -1,4 +1,4 @@
-"""What a scene looks like in a notebook: one line of text, a table of its keys."""
+"""The view of a scene in a notebook: one line of text, and a table of its keys."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.sweep import run_count
 
 
 class ViewedScene:
-    """A scene as notebooks show it."""
+    """A scene with its view in notebooks."""
 
     def __repr__(self) -> str:
         return _short_text(self)
@@ -26,7 +26,7 @@ class ViewedScene:
 
 
 def _short_text(scene: Any) -> str:
-    """Return a scene in one line: its name, what moves and hits, its points."""
+    """Return a scene in one line: its name, its bodies and contacts, its points."""
     said = f"{scene.title or Path(scene.source).stem}: {_parts(parse_toml(scene.text))}"
     if scene.sweep:
         said += f"; {run_count(scene.sweep)} points over {', '.join(axis.key for axis in scene.sweep)}"
@@ -34,7 +34,7 @@ def _short_text(scene: Any) -> str:
 
 
 def _parts(document: Mapping[str, Any]) -> str:
-    """Return what moves, and how many stops, contacts or connections there are.
+    """Return the bodies and the numbers of stops, contacts and connections, in words.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Systems that travel: scenes of components to SSP archives, and back."""
+"""Systems for exchange: scenes of components to SSP archives, and back."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
 if not TYPE_CHECKING:  # else every name would be one
 
     def __getattr__(name: str) -> object:
-        # what reads model descriptions takes time to load, and most scenes are no systems
+        # the reader of model descriptions takes time to load, and most scenes are no systems
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         import importlib

@@ -32,9 +32,9 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 
 
 class SspArchive:
-    """An archive whose members are safe to read.
+    """An archive with members that are safe to read.
 
-    A file that is missing, no zip, unsafe, or without `SystemStructure.ssd` raises ComponentFileError.
+    ComponentFileError: the file is missing, no zip, unsafe, or without `SystemStructure.ssd`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -57,14 +57,14 @@ class SspArchive:
     def xml(self, member: str) -> Element:
         """Return the root of an XML member.
 
-        A member that is too large, damaged, not well-formed, or declares entities raises ComponentFileError.
+        ComponentFileError: the member is too large, damaged, not well-formed, or declares entities.
         """
         info = self._members[member]
         refuse_large(info.file_size, f"{self.path}: {member}")
         return root_of(self._content(info), f"{self.path}: {member}", namespaces=True)
 
     def member(self, uri: str, where: str) -> str:
-        """Return the member that a `source` names; RefusalError where it leads out of the archive, or there is none."""
+        """Return the member that a `source` names; RefusalError if it is outside the archive, or missing."""
         try:
             parts = urlsplit(uri)
         except ValueError:  # brackets of no address
@@ -84,13 +84,13 @@ class SspArchive:
         return member
 
     def copy(self, member: str, target: Path) -> None:
-        """Write a member to a file; a damaged one raises ComponentFileError, one that cannot be written OSError."""
+        """Write a member to a file; a damaged member raises ComponentFileError, an unwritable file OSError."""
         with target.open("xb") as file:
             try:
                 with self._zip.open(self._members[member]) as source:
                     shutil.copyfileobj(source, file, _BLOCK)
             except OSError as error:
-                if error.errno is None:  # bz2 says so that its data are damaged
+                if error.errno is None:  # bz2 reports damaged data without an errno
                     raise damaged(self.path, error, "SSP") from error
                 raise
             except DAMAGE as error:

@@ -1,4 +1,4 @@
-"""From a general scene to an SSP archive: other tools run it, and it comes back as the scene that it was."""
+"""Export of a general scene to an SSP archive: other tools run it, and its import gives the same scene."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
 from vibroimpact.orchestrator.ssp.writing import description, parameter_set, swept_members
 
 ABOUT_A_RUN = ("scene", "record", "sweep", "execution")
-"""Tables of a scene that say how it is run, not what it is."""
+"""Tables of a scene about its run, not about its system."""
 GAINS = ("component", "transformation")
 
 
@@ -38,21 +38,21 @@ def export_system(
     Parameters
     ----------
     scene : Scene
-        With components. What it sweeps has in other tools the value of its tables, its first one where they have none.
+        With components. For other tools a swept key has the value in its tables, or its first value without one.
     output : path
         File to write.
     ssp : str
         Version of the description, `1.0` or `2.0`.
     fmi : str, optional
-        Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. By default 2.0, the version
-        that SSP 1.0 knows, and in SSP 2.0 that of the scene. Components of gains are of 2.0 always.
+        Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. The default is 2.0 in SSP 1.0,
+        which knows no other, and the scene's version in SSP 2.0. Gain components always are of 2.0.
     gains : str
-        How a connection has its gain: as a `component` with units of its own (a spring between bodies is one in N/m),
-        or as a `transformation` of its value, which OMSimulator leaves out and Ecos and libcosim take without a delay.
+        Form of a connection's gain. A `component` has units of its own (a spring between bodies is one in N/m). A
+        `transformation` changes the value; OMSimulator ignores it, Ecos and libcosim apply it without a delay.
     platform
-        As `vibroimpact.fmus.export` has it.
+        As in `vibroimpact.fmus.export`.
     note : callable
-        Told what is compiled for another machine, and what other tools leave out.
+        Called with notes on FMUs compiled for another machine, and on parts that other tools ignore.
 
     Returns
     -------
@@ -62,10 +62,10 @@ def export_system(
     Raises
     ------
     UsageError
-        The scene has one body and no components, a connection that this version of SSP has no word for, or the file
-        cannot be written.
+        The scene has one body and no components, a connection has no form in this version of SSP, or the file cannot
+        be written.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        There is no library for a platform, and no compiler for it.
     """
     if scene.is_one_body:
         raise UsageError(

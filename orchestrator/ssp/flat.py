@@ -1,4 +1,4 @@
-"""A nested system as components beside each other: who feeds whom by which gain, and which start values each has."""
+"""A nested system as components side by side: their connections with gains, and their start values."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A component's input that another's output feeds: gain times it, through components that are gains."""
+    """A component's input, fed by gain times another component's output, through components that are gains."""
 
     source: Node
     target: Node
@@ -46,9 +46,9 @@ class _Edge:
 
 
 class FlatSystem:
-    """A system without the systems in it, and without the gains, components that are gains of connections.
+    """A system without nested systems, and without the components that are gains of connections.
 
-    A connection that leads from or to nothing, or cannot be a gain, raises RefusalError.
+    RefusalError: a connection has no element at an end, or cannot be a gain.
     """
 
     def __init__(
@@ -56,11 +56,11 @@ class FlatSystem:
     ) -> None:
         self._all = dict(components_of(system))
         self.components = {path: one for path, one in self._all.items() if path not in gains}
-        """In the order of the file."""
+        """The components, in the order of the file."""
         self.ignored: list[str] = []
-        """Parameters that no variable takes, and names of mappings that no parameter has: SSP wants them left out."""
+        """Parameters without a variable, and mapping entries without a parameter: SSP wants both ignored."""
         self.overruled: list[str] = []
-        """Parameters that a connection gives another value than a set of their own: the connection's is taken."""
+        """Parameters with one value from a connection and another from a set: the connection's is taken."""
         self._facts = facts
         self._systems = dict(_systems(system, ()))
         self._edges: dict[Node, _Edge] = {}
@@ -72,12 +72,12 @@ class FlatSystem:
         self._values = self._start_values()
 
     def links(self, gains: Mapping[Path, float] | None = None) -> list[Link]:
-        """Return what feeds the components' inputs, in the order of the file; with other values of its gains."""
+        """Return the links into the components' inputs, in the order of the file; `gains` overrides gain values."""
         ends = (target for target in self._edges if target.element in self.components)
         return [link for link in (self._link(end, gains or {}) for end in ends) if link is not None]
 
     def start_values(self) -> dict[Path, dict[str, StartValue]]:
-        """Return the start values of each component: those of an outer system go before those of an inner one."""
+        """Return the start values of each component: an outer system's override an inner system's."""
         return {path: dict(self._values[path]) for path in self.components}
 
     def _start_values(self) -> dict[Path, dict[str, StartValue]]:
@@ -91,11 +91,11 @@ class FlatSystem:
         return values
 
     def connected(self) -> dict[Node, StartValue]:
-        """Return the start values that connections give, of a system's parameter to one of a component."""
+        """Return the start values that connections carry from a system's parameter to a component's."""
         return dict(self._connected)
 
     def named(self, parameter: Parameter) -> tuple[Parameter, ...]:
-        """Return a parameter of a set from outside by the names of the system, as its own mappings have them."""
+        """Return an outside set's parameter by the names of the system, after the system's own mappings."""
         mapped = [one for binding in self._systems[()].bindings for one in binding.renamed(parameter)]
         return tuple(mapped) or (parameter,)
 
@@ -106,10 +106,10 @@ class FlatSystem:
         values: dict[Path, dict[str, StartValue]],
         connected: dict[Node, StartValue],
     ) -> list[Node]:
-        """Give a parameter of an element to the variables that it names; return these.
+        """Give a parameter of an element to the variables that it names; returns these variables.
 
-        A variable that is connected takes the value of its connection, whatever it is given beside; `connected` has
-        those values, and grows.
+        A connected variable takes the value of its connection, even if a set gives it another. `connected` has the
+        values of connections, and grows.
         """
         taken = []
         for node, value, through in self._meant(path, parameter.name, parameter):
@@ -134,7 +134,7 @@ class FlatSystem:
         )
 
     def _given(self, node: Node, parameter: Parameter) -> StartValue | None:
-        """Return the start value that a variable is given; None where it takes none."""
+        """Return the start value for a variable; None if it takes none."""
         variable = self._facts[node.element].variables.get(node.name)
         if variable is None or not variable.settable or not variable.scalar:
             return None
@@ -177,7 +177,7 @@ class FlatSystem:
         self._leaving.setdefault(edge.source, []).append(edge)
 
     def _directed(self, path: Path, connection: Connection) -> _Edge:
-        """Return a connection from the end that gives to the one that takes."""
+        """Return a connection, from the end that gives the value to the end that takes it."""
         start, end = (self._end(path, place, connection) for place in (connection.start, connection.end))
         for source, target in ((start, end), (end, start)):
             if source[1] in _giving(source[0], path) and target[1] in _taking(target[0], path):
@@ -198,7 +198,7 @@ class FlatSystem:
         return Node(element, place[1]), owner.connectors[place[1]].kind
 
     def _unit(self, node: Node) -> Unit | None:
-        """Return the unit of a connector: an FMU knows its own best."""
+        """Return the unit of a connector; an FMU's own unit comes first."""
         if node.element in self._all:
             variable = self._facts[node.element].variables.get(node.name)
             if variable is not None and variable.unit is not None:
@@ -207,11 +207,11 @@ class FlatSystem:
         return self._systems[node.element].connectors[node.name].unit
 
     def _link(self, target: Node, gains: Mapping[Path, float]) -> Link | None:
-        """Return what feeds an input; None where that is a connector of the whole system, which nothing feeds."""
+        """Return the link into an input; None if it comes from a connector of the whole system."""
         edges = [self._edges[target]]
         while edges[-1].source.element not in self.components:
             source = edges[-1].source
-            # what comes out of a gain has gone into it
+            # the output of a gain has the source of its input
             before = self._edges.get(Node(source.element, "input") if source.element in self._all else source)
             if before is None:
                 return None
@@ -250,7 +250,7 @@ class FlatSystem:
 
 
 def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:
-    """Yield the components of a system and of those in it, with their paths."""
+    """Yield the components of a system and of its nested systems, with their paths."""
     for name, element in system.elements.items():
         if isinstance(element, Component):
             yield (*path, name), element
@@ -266,7 +266,7 @@ def _systems(system: System, path: Path) -> Iterator[tuple[Path, System]]:
 
 
 def _giving(node: Node, path: Path) -> frozenset[str]:
-    """Return the kinds of connectors that give a value within a system: of itself what it takes from outside."""
+    """Return the kinds of connectors that give a value inside a system; its own connectors give outside values."""
     return TAKING if node.element == path else GIVING
 
 
@@ -275,13 +275,13 @@ def _taking(node: Node, path: Path) -> frozenset[str]:
 
 
 def _conversion(before: Unit | None, after: Unit | None, connection: Connection) -> float:
-    """Return by what a number grows from one unit to the next."""
+    """Return the conversion factor from one unit to the next."""
     if before is None or after is None or agree(before, after):
         return 1.0
     got = f"{before.name or '1'} to {after.name or '1'}"
     if before.exponents != after.exponents:
         if connection.factor is not None:
-            return 1.0  # the factor is the gain, whatever its unit
+            return 1.0  # the factor is the gain, in any unit
         hint = "Give it a LinearTransformation, and suppressUnitConversion."
         raise RefusalError(connection.where, "units of one kind, or a gain", got, hint)
     if before.offset != after.offset:
@@ -296,7 +296,7 @@ def _in_unit(parameter: Parameter, unit: Unit | None, where: str) -> StartValue:
 
 
 def _along(parameter: Parameter, connection: Connection, unit: Unit | None) -> Parameter:
-    """Return a parameter behind a connection."""
+    """Return a parameter after a connection."""
     if isinstance(parameter.value, str | bool):
         return parameter
     if connection.factor is None and not connection.suppressed:

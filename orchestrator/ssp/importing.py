@@ -1,4 +1,4 @@
-"""From an SSP archive to a scene: its FMUs are laid beside it, and what is wrong with it is one line each."""
+"""Import of an SSP archive as a scene: its FMUs lie beside it, and each problem is one line."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 
 MOST_COMPONENTS = 1000
-#: Parameters of no variable that one note names, and parameters with two values that notes name.
+#: Most parameters without a variable that one note names, and most parameters with two values that notes name.
 MOST_NAMED = 5
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
-"""Folders of systems that run from their archives; they go at the end of the process."""
+"""Folders of systems that run from their archives; they are deleted at the end of the process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,9 @@ class Imported:
     """A system as a scene."""
 
     scene: Scene
-    """Its FMUs lie in a folder that goes at the end of the process."""
+    """Its FMUs lie in a folder that is deleted at the end of the process."""
     notes: tuple[str, ...]
-    """What was chosen where the system does not say it."""
+    """Choices for values that the system leaves open."""
 
 
 def load_system(
@@ -72,12 +72,12 @@ def load_system(
     parameters : sequence of Path
         Parameter sets (SSV), files or members of the archive: one is applied, several become a sweep.
     name : str, optional
-        What the scene's file is to be called, by default as the archive; its FMUs lie in `NAME_fmus` beside it.
+        Name of the scene's file, by default the archive's; its FMUs lie in `NAME_fmus` beside it.
 
     Raises
     ------
     SceneError
-        With what is wrong with the system, or with the scene that it makes.
+        With all problems of the system, or of its scene.
     ComponentFileError
         The archive, or an FMU in it, is unsafe or damaged.
     UsageError
@@ -88,9 +88,9 @@ def load_system(
     name = _PLAIN.sub("_", FilePath(path).stem)[:100] if name is None else name
     source = str(place / f"{name}.toml")
     try:
-        with _told_of(FilePath(path), source), SspArchive(FilePath(path)) as archive:
+        with _named_in_errors(FilePath(path), source), SspArchive(FilePath(path)) as archive:
             sets = [FilePath(one) for one in parameters]
-            tables, notes = _read(archive, place / f"{name}_fmus", sets, _asked_end(changes))
+            tables, notes = _read(archive, place / f"{name}_fmus", sets, _given_end(changes))
             scene = parse_scene(_text(tables), source, changes)
     except BaseException:
         folder.cleanup()
@@ -112,16 +112,16 @@ def import_system(
     Parameters
     ----------
     path, changes, parameters
-        As `load_system` has them.
+        As in `load_system`.
     output : Path
-        The scene file to write (TOML); the folder is called as it is, with `_fmus` in place of the ending.
+        The scene file to write (TOML); the folder has its name, with `_fmus` in place of the ending.
     force : bool
-        Whether files that are there and hold something else are overwritten.
+        Whether to overwrite existing files with other content.
 
     Raises
     ------
     SceneError, ComponentFileError, UsageError
-        As `load_system`; or a file is there, or cannot be written.
+        As in `load_system`; or a file exists, or cannot be written.
     """
     target = FilePath(output)
     imported = load_system(path, changes, parameters, target.stem)
@@ -142,7 +142,7 @@ def import_system(
 
 
 def _text(tables: Mapping[str, Any]) -> str:
-    """Return the text of a scene as a person would write it; where an odd name is in the way, another that says it."""
+    """Return the text of a scene in a readable form; in a plainer form if the readable one does not parse back."""
     plain = tomli_w.dumps(tables)
     if len(plain) > LARGEST_FILE:
         raise RefusalError(
@@ -170,8 +170,8 @@ def _refuse_another(file: FilePath, content: bytes, force: bool) -> None:
 
 
 @contextmanager
-def _told_of(path: FilePath, source: str) -> Iterator[None]:
-    """Let messages name the archive, not the place where it was unpacked."""
+def _named_in_errors(path: FilePath, source: str) -> Iterator[None]:
+    """Replace the unpacked path by the archive's in messages."""
     place = str(FilePath(source).parent)
     try:
         yield
@@ -187,15 +187,15 @@ def _told_of(path: FilePath, source: str) -> Iterator[None]:
         raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
 
 
-def _asked_end(changes: Sequence[str]) -> float | None:
-    """Return the end of the run that a system may leave to who runs it, where a change says it."""
+def _given_end(changes: Sequence[str]) -> float | None:
+    """Return the end of the run from the changes, if a system leaves it open."""
     key = "record.recorded_time"
     document, changed = changed_document({}, [one for one in changes if one.startswith(key)])
     if key not in changed:
         return None
-    asked = document["record"]["recorded_time"]
-    # what else it is, the scene's rules tell
-    return float(asked) if isinstance(asked, int | float) and abs(asked) < 1e300 else 0.0
+    given = document["record"]["recorded_time"]
+    # the scene's rules report other types
+    return float(given) if isinstance(given, int | float) and abs(given) < 1e300 else 0.0
 
 
 def _read(
@@ -219,7 +219,7 @@ def _read(
 
 
 def _left_out(ignored: Sequence[str]) -> Iterator[str]:
-    """Yield what is said of parameters that nothing has: of the system, and of sets from outside."""
+    """Yield the note on parameters without a variable, of the system and of outside sets."""
     names = list(dict.fromkeys(ignored))
     if names:
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
@@ -230,7 +230,7 @@ def _left_out(ignored: Sequence[str]) -> Iterator[str]:
 def _fmus(
     archive: SspArchive, each: Mapping[Path, Component], folder: FilePath
 ) -> tuple[dict[Path, tuple[str, str | None]], dict[Path, ComponentFacts], list[str]]:
-    """Lay the FMUs into a folder; return what a scene calls each but gains, and what their descriptions say."""
+    """Copy the FMUs into a folder; return the scene's `fmu` and `fmi` of each but gains, and their facts."""
     folder.mkdir()
     files: dict[str, FilePath] = {}
     fmus: dict[Path, tuple[str, str | None]] = {}
@@ -259,7 +259,7 @@ def _fmus(
 
 
 def _own(component: Component, file: FilePath, path: Path, notes: list[str]) -> FilePath | None:
-    """Return the shipped FMU of a component that was exported of it; None for any other, also one put in its place."""
+    """Return the shipped FMU from which a component was exported; None for any other FMU, also a replacement."""
     if not component.fmu:
         return None
     where = f"{SSD_FILE}: {'.'.join(path)[:60]}"
@@ -279,7 +279,7 @@ def _own(component: Component, file: FilePath, path: Path, notes: list[str]) -> 
 
 
 def _file_name(member: str, folder: FilePath) -> str:
-    """Return a name for a member that no other has, on any system."""
+    """Return a file name for a member that is unique on any system."""
     stem = _PLAIN.sub("_", PurePosixPath(member).stem)[:100].lstrip(".") or "fmu"
     there = {file.name.lower() for file in folder.iterdir()}
     name, count = f"{stem}.fmu", 1

@@ -1,4 +1,4 @@
-"""The FMUs that travel: this package's own as other tools take them, those of others as they are."""
+"""The FMUs in an archive: this package's own, as other tools take them, and foreign ones as they are."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from vibroimpact.orchestrator.scene.component_facts import (
 from vibroimpact.orchestrator.ssp.names import GAIN
 
 FMI_OF_GAINS = "2.0"
-"""Version of each Gain. OMSimulator reads no unknowns of initialization of FMI 3.0 and so takes a circle of connections
-for an algebraic loop at the start; with a component of FMI 2.0 in it, it solves it by differences."""
+"""Version of each Gain. OMSimulator reads no initial unknowns of FMI 3.0, so a circle of connections is an algebraic
+loop for it at the start. With a component of FMI 2.0 in the circle, it solves the loop by differences."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +34,18 @@ class Part:
     name: str
     """Its name in the scene."""
     member: str
-    """Its FMU's."""
+    """The archive member of its FMU."""
     content: bytes
     """The FMU."""
     facts: ComponentFacts
-    """What the FMU in the archive says of itself."""
+    """Facts from the description of the FMU in the archive."""
     values: Mapping[str, StartValue]
     """Start values."""
     fmu: str = ""
     fmi: str = ""
     """`fmu` and `fmi`: component of this package, and version that the scene runs; empty for any other."""
     gain_of: ConnectionSpec | None = None
-    """The connection whose gain it is."""
+    """The connection whose gain this component is."""
 
     @property
     def values_member(self) -> str:
@@ -55,14 +55,14 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """How components travel; platform and note are those of `vibroimpact.fmus.export`."""
+    """Settings of the FMUs in an archive; platform and note as in `vibroimpact.fmus.export`."""
 
     folder: Path
-    """Where FMUs may be written."""
+    """Folder for exported FMUs."""
     fmi: str | None
-    """Version of this package's own; None: as the scene has it."""
+    """Version of this package's own FMUs; None: as in the scene."""
     stop_time: float
-    """When a run of them ends, s."""
+    """End of a run, s."""
     gains: bool = False
     """Whether gains are components of their own."""
     platform: str | None = None
@@ -70,7 +70,7 @@ class Travel:
 
 
 def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
-    """Return the components of a scene as they travel, by name; gains come after the others."""
+    """Return the archived components of a scene, by name; gains come last."""
     described = {component.name: component for component in read_components()}
     taken: dict[str, str] = {}
     parts = {}
@@ -146,14 +146,14 @@ def _free_name(name: str, parts: Mapping[str, Part]) -> str:
 
 
 def _own(fmu: Path) -> tuple[str, str] | None:
-    """Return name and version of a component of the package; None for the file of another."""
+    """Return name and version of a component of the package; None for a foreign file."""
     versions = {folder: version for version, folder in FOLDERS.items()}
     own = fmu.is_relative_to(package_folder()) and fmu.parent.name in versions
     return (fmu.stem, versions[fmu.parent.name]) if own else None
 
 
 def _used(scene: Scene, spec: ComponentSpec) -> set[str]:
-    """Return the variables of a component that the system cannot do without."""
+    """Return the variables of a component that the system uses."""
     ends = (end for connection in scene.connections for end in (connection.source, connection.target))
     return {variable for component, variable in ends if component == spec.name} | set(spec.parameters)
 
@@ -165,9 +165,9 @@ def _exported(
     fmi: str,
     travel: Travel,
 ) -> Path:
-    """Export a component with what the system uses of it, and no more; it starts as the scene says."""
+    """Export a component with only the parts that the system uses; it starts as in the scene."""
     ports = set(_ports(component, spec, used))
-    # else an export that is given no motion would start with some of its own
+    # an export without motion would start with a default displacement
     still = {v.name: v.start for v in component.variables if v.name in component.start_of_export}
     starts = {name: value for name, value in still.items() if value is not None} | dict(spec.parameters)
     counts = {} if "importer" in ports else _counts(component, used)
@@ -199,7 +199,7 @@ def _ports(component: ComponentDescription, spec: ComponentSpec, used: set[str])
 
 
 def _counts(component: ComponentDescription, used: set[str]) -> dict[str, int]:
-    """Return how many contacts and sensors are used, but no fewer than a lean description has."""
+    """Return the numbers of contacts and sensors in use, at least those of a lean description."""
     counts = {
         block: min(count, component.repeats[block])
         for block, count in LEAN_COUNTS.items()
@@ -212,7 +212,7 @@ def _counts(component: ComponentDescription, used: set[str]) -> dict[str, int]:
 
 
 def _member(name: str, content: bytes, taken: dict[str, str]) -> str:
-    """Return the member for a file: the same for the same content, of its own, also where cases are one, for others."""
+    """Return the member for a file: one for equal contents, distinct ones otherwise, also without regard to case."""
     digest = hashlib.sha256(content).hexdigest()
     stem = "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in Path(name).stem)[:100]
     stem = stem.lstrip(".") or "fmu"

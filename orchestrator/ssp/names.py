@@ -6,7 +6,7 @@ SSD_FILE = "SystemStructure.ssd"
 VERSIONS = ("1.0", "2.0")
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
-#: Namespaces by the prefixes that other tools expect: some read the prefix instead of the namespace.
+#: Namespaces by the prefixes that other tools expect: some tools read the prefix instead of the namespace.
 NAMESPACES = {
     "ssd": f"{_BASE}Description",
     "ssc": f"{_BASE}Common",
@@ -17,19 +17,19 @@ NAMESPACES = {
     "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
     "vibroimpact": "urn:vibroimpact:ssp",
 }
-#: What the annotations of this package say they are.
+#: Type of this package's annotations.
 ANNOTATION = "vibroimpact"
 #: The annotation in which libcosim looks for its step.
 OSP_ANNOTATION = "com.opensimulationplatform"
-#: The annotation without which OMSimulator's program takes no system, and in which it looks for its step.
+#: Annotation that OMSimulator's program requires, and in which it looks for its step.
 OMS_ANNOTATION = "org.openmodelica"
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
-#: Kinds of connectors of an element that give a value, and those that take one; of a system, seen from inside, the
-#: other way round.
+#: Kinds of connectors of an element that give a value, and kinds that take a value. For a system, seen from inside,
+#: the roles are exchanged.
 GIVING = frozenset({"output", "calculatedParameter", "local", "constant"})
 TAKING = frozenset({"input", "parameter", "structuralParameter"})
 
@@ -43,7 +43,7 @@ INTEGER_TYPES = frozenset(
 
 
 def tag(name: str) -> str:
-    """Return the name of an element as the parser gives it.
+    """Return the tag of an element as the parser writes it.
 
     >>> tag("ssd:System")
     '{http://ssp-standard.org/SSP1/SystemStructureDescription}System'

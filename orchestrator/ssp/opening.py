@@ -16,7 +16,7 @@ ENDING = ".ssp"
 def opened_scene(
     path: str | PathLike[str], changes: Sequence[str] = (), *, for_orbits: bool = False, strict: bool = False
 ) -> Scene:
-    """Return the scene of a file; what a system, or an FMU of it, leaves open is said on standard error.
+    """Return the scene of a file; notes on values that a system or its FMUs leave open go to standard error.
 
     The FMUs of a system lie unpacked until this process ends.
 
@@ -26,7 +26,7 @@ def opened_scene(
         A scene file (TOML), or a system, whose name ends in `.ssp`.
     changes : sequence of str
         `KEY=VALUE`, made before anything is checked.
-    for_orbits : bool
+    Whether an unset start may be on a stop: see `scene.parse_scene`.
         Whether a start that is not written may be on a stop: see `scene.parse_scene`.
     strict : bool
         Refuse FMUs that may run wrong.
@@ -34,7 +34,7 @@ def opened_scene(
     Raises
     ------
     SceneError
-        With all problems of the file, each on one line; with `strict`, what is assumed of its FMUs too.
+        With all problems of the file, each on one line; with `strict` also doubts about its FMUs.
     ComponentFileError
         The archive, or an FMU in it, is unsafe or damaged.
     """
@@ -51,7 +51,7 @@ def opened_scene(
 
 
 def _say_findings(path: str | PathLike[str], scene: Scene, strict: bool) -> None:
-    """Say what is assumed of the FMUs of a scene, or refuse it; count what is only odd."""
+    """Print doubts about the FMUs of a scene, or raise SceneError; count harmless remarks."""
     if scene.is_one_body:
         return
     if strict and scene.doubts:
@@ -65,7 +65,7 @@ def _say_findings(path: str | PathLike[str], scene: Scene, strict: bool) -> None
 
 
 def say_notes(notes: Iterable[str]) -> None:
-    """Say on standard error what a system leaves open, and what was chosen."""
+    """Print choices for values that a system leaves open, on standard error."""
     from vibroimpact.fmus.terminal import say
 
     for line in notes:
@@ -73,12 +73,12 @@ def say_notes(notes: Iterable[str]) -> None:
 
 
 def is_system(path: str | PathLike[str]) -> bool:
-    """Return whether a file is called as a system is."""
+    """Return whether a file has the name of a system."""
     return Path(path).suffix.lower() == ENDING
 
 
 def refuse_system_elsewhere(path: str | PathLike[str], scheduler: object) -> None:
-    """Refuse a system for workers that may be on other machines, where its FMUs do not lie.
+    """Raise UsageError for a system with workers on other machines, which do not have its FMUs.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Parameter sets from outside of a system: one changes its start values, several are the points of a sweep."""
+"""Outside parameter sets of a system: one set changes its start values, several are the points of a sweep."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PARAMETERS = Argument("parameters")
 
 
 def read_sets(archive: SspArchive, files: Sequence[FilePath]) -> dict[str, tuple[Parameter, ...]]:
-    """Return parameter sets by the names of their files; one that is no file is a member of the archive."""
+    """Return parameter sets by the names of their files; a name without a file is a member of the archive."""
     sets: dict[str, tuple[Parameter, ...]] = {}
     for file in files:
         name = str(file)
@@ -44,7 +44,7 @@ def with_sets(
 ) -> None:
     """Put parameter sets into the tables of a scene: one as start values, several as its sweep.
 
-    UsageError: a set has no parameter of the system, or several sets are not the points of a grid.
+    UsageError: a set has no parameter of the system, or several sets do not form a grid.
     """
     names = names_of(list(flat.components))
     points = [_point(name, parameters, flat, facts, names) for name, parameters in sets.items()]
@@ -52,7 +52,7 @@ def with_sets(
         swept = tables.get("sweep", {})
         for key, value in points[0].items():
             _give(tables, key, value)
-            if isinstance(swept, dict):  # what else it is, the scene's rules tell
+            if isinstance(swept, dict):  # the scene's rules report other types
                 swept.pop(key, None)
         return
     tables["sweep"] = {key: {"values": values} for key, values in _axes(points).items()}
@@ -68,7 +68,7 @@ def _point(
     facts: Mapping[Path, ComponentFacts],
     names: Mapping[Path, str],
 ) -> dict[str, StartValue]:
-    """Return the start values that a set gives, by key of the scene."""
+    """Return the start values in a set, by key of the scene."""
     values: dict[Path, dict[str, StartValue]] = {path: {} for path in facts}
     named = [one for parameter in parameters for one in flat.named(parameter)]
     connected = flat.connected()
@@ -90,7 +90,7 @@ def _point(
 def _gains(
     flat: FlatSystem, values: Mapping[Path, Mapping[str, StartValue]]
 ) -> Iterator[tuple[str, StartValue]]:
-    """Yield the gains of connections that a set gives, where they are components of the system."""
+    """Yield the gains of connections in a set, for gains that are components of the system."""
     given = {
         path: float(own["gain"])
         for path, own in values.items()
@@ -108,7 +108,7 @@ def _example(facts: Mapping[Path, ComponentFacts], names: Mapping[Path, str]) ->
 
 
 def _axes(points: list[dict[str, StartValue]]) -> dict[str, list[StartValue]]:
-    """Return the values of each key in which points differ, where the points are all combinations of them."""
+    """Return the values of each key in which points differ; the points must be all their combinations."""
     keys = dict.fromkeys(key for point in points for key in point)
     lacking = next((key for key in keys if any(key not in point for point in points)), None)
     if lacking is not None:

@@ -1,4 +1,4 @@
-"""From the XML of an SSD to a `Structure`; what this package cannot run is refused by name."""
+"""Reads the XML of an SSD as a `Structure`; parts that this package cannot run are refused by name."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from vibroimpact.orchestrator.ssp.values import (
 
 _TABLES = tag("vibroimpact:Tables")
 DEEPEST = 50
-"""Systems in each other."""
+"""Most levels of nested systems."""
 
 
 def read_structure(archive: SspArchive) -> Structure:
     """Read the default SSD of an archive.
 
-    RefusalError: it is no SSD, or has what this package cannot run. ComponentFileError: an XML file is damaged or
-    unsafe.
+    RefusalError: it is no SSD, or has parts that this package cannot run. ComponentFileError: an XML file is damaged
+    or unsafe.
     """
     root = archive.xml(SSD_FILE)
     expect(root, "ssd:SystemStructureDescription", SSD_FILE)
@@ -165,7 +165,7 @@ class _Reader:
         )
 
     def _note(self, kind: str, name: str, depth: int) -> Element | None:
-        """Return what this package has noted of an element of the outermost system."""
+        """Return this package's note on an element of the outermost system."""
         return self.notes.get((kind, name)) if depth == 1 else None
 
     def _bindings(self, element: Element, where: str) -> tuple[Binding, ...]:
@@ -216,7 +216,7 @@ _DICTIONARY = "Signal dictionaries are not available in this version: connect it
 
 
 def _annotations(element: Element | None, kind: str) -> Iterator[Element]:
-    """Yield what annotations of one type hold, of an element and of those in it."""
+    """Yield the contents of annotations of one type, in an element and below it."""
     if element is not None:
         for annotation in element.iter(tag("ssc:Annotation")):
             if annotation.get("type") == kind:
@@ -228,7 +228,7 @@ def _noted(root: Element) -> Iterator[Element]:
 
 
 def _notes(root: Element) -> dict[tuple[str, str], Element]:
-    """Return the notes on elements by kind and name; a connection's name is that of the input at its end."""
+    """Return the notes on elements by kind and name; a connection has the name of the input at its end."""
     found: dict[tuple[str, str], Element] = {}
     for scene in _noted(root):
         for note in scene:
@@ -243,11 +243,11 @@ def _time(experiment: Element | None, key: str) -> float | None:
 
 
 def _step(experiment: Element | None, root: Element) -> float | None:
-    """Return the step of a fixed-step master, as annotations of libcosim and OMSimulator have it."""
+    """Return the step of a fixed-step master from annotations of libcosim and OMSimulator, s."""
     for algorithm in _annotations(experiment, OSP_ANNOTATION):
         for fixed in algorithm.iterfind(tag("osp:FixedStepAlgorithm")):
             return number(fixed.get("baseStepSize", ""), f"{SSD_FILE}: FixedStepAlgorithm: baseStepSize")
     for master in root.iter():
-        if master.tag.endswith("}FixedStepMaster"):  # its namespace has changed from version to version
+        if master.tag.endswith("}FixedStepMaster"):  # its namespace differs between versions
             return number(master.get("stepSize", ""), f"{SSD_FILE}: FixedStepMaster: stepSize")
     return None

@@ -1,4 +1,4 @@
-"""Why a system cannot be read: raised wherever it shows, told with the name of the archive where it was opened."""
+"""The reason why a system cannot be read: raised at its place, reported with the name of the archive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from vibroimpact.orchestrator.scene.problems import Problem
 
 
 class RefusalError(Exception):
-    """One `problem` of a system: where it is, what is expected, what is there, what to do."""
+    """One `problem` of a system: its place, the expectation, the finding, and the remedy."""
 
     def __init__(self, where: str, expected: str, got: str, hint: str | Callable[[], str] = "") -> None:
         self.problem = Problem(where, expected, got, hint)

@@ -1,4 +1,4 @@
-"""From a flat system to the tables of a scene, with notes on what was chosen where the system does not say it."""
+"""Tables of a scene from a flat system, with notes on choices for values that the system leaves open."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.structure import Structure
 
 SAMPLES = 1000
-"""Samples of each output where nobody says what to record."""
+"""Default number of samples of each output."""
 MOST_RECORDED = 100
 OWN_TABLES = ("component", "connection")
-"""Tables of a scene that SSP has words for."""
+"""Tables of a scene that SSP expresses itself."""
 _NOT_OF_A_NAME = re.compile(r"[^A-Za-z0-9_]")
 
 
 def names_of(paths: Sequence[Path]) -> dict[Path, str]:
-    """Return a name for each component that a scene takes.
+    """Return a valid name in a scene for each component.
 
     >>> names_of([("rig", "body"), ("stop 1",), ("rig_body",)])
     {('rig', 'body'): 'rig_body', ('stop 1',): 'stop_1', ('rig_body',): 'rig_body_2'}
@@ -41,7 +41,7 @@ def names_of(paths: Sequence[Path]) -> dict[Path, str]:
 
 
 def noted_tables(structure: Structure) -> dict[str, Any]:
-    """Return the tables that this package has noted in a system; none in one from elsewhere."""
+    """Return the tables in this package's annotations of a system; empty for a system from elsewhere."""
     where = f"{SSD_FILE}: annotation"
     try:
         tables = parse_toml(structure.tables)
@@ -59,7 +59,7 @@ def scene_tables(
     fmus: Mapping[Path, tuple[str, str | None]],
     facts: Mapping[Path, ComponentFacts],
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the tables of a scene, and notes for a person; `fmus` has a scene's `fmu` and `fmi` of each component."""
+    """Return the tables of a scene, and notes for a person; `fmus` has `fmu` and `fmi` of each component."""
     names, values = names_of(list(flat.components)), flat.start_values()
     noted = noted_tables(structure)
     notes: list[str] = []
@@ -98,7 +98,7 @@ def _reference(node: Node, names: Mapping[Path, str]) -> str:
 
 
 def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connected: bool) -> Iterator[str]:
-    """Fill in how long to record and how often to exchange."""
+    """Fill in the recorded time and the macro step."""
     if structure.start_time:
         hint = "A scene begins at 0: shift what depends on time."
         raise RefusalError(f"{SSD_FILE}: startTime", "0", f"{structure.start_time:g}", hint)
@@ -123,7 +123,7 @@ def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connecte
 def _record(
     tables: dict[str, Any], flat: FlatSystem, names: Mapping[Path, str], facts: Mapping[Path, ComponentFacts]
 ) -> Iterator[str]:
-    """Record all outputs that the system names, where nobody says what to record."""
+    """Record all outputs that the system names, unless the scene selects its variables."""
     record = tables["record"]
     duration = record.get("recorded_time")
     if len(record) > 1 or not isinstance(duration, int | float) or duration <= 0.0:

@@ -17,27 +17,27 @@ class Connector:
     kind: str
     """`input`, `output`, `parameter`, ..."""
     unit: Unit | None = None
-    """None where the SSD does not say."""
+    """None if the SSD gives no unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A connection; which end gives the value follows from the kinds of its connectors."""
+    """A connection; the kinds of its connectors decide which end gives the value."""
 
     start: tuple[str | None, str]
     end: tuple[str | None, str]
     """`start` and `end`: element (None: the system itself) and connector."""
     factor: float | None = None
-    """Of its linear transformation, as the offset; None where there is none."""
+    """Factor of its linear transformation, and below it the offset; None without a transformation."""
     offset: float = 0.0
     suppressed: bool = False
     """Whether units are not converted."""
     gain_unit: str | None = None
-    """The unit of its gain, as this package has noted it."""
+    """The unit of its gain, from this package's notes."""
 
     @property
     def where(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
         start, end = (".".join(filter(None, place))[:60] for place in (self.start, self.end))
         return f"connection {start} -> {end}"
 
@@ -53,11 +53,11 @@ class Component:
     bindings: tuple[Binding, ...] = ()
     fmu: str = ""
     fmi: str = ""
-    """`fmu` and `fmi`: component of this package that it was exported of, and version; empty for any other."""
+    """`fmu` and `fmi`: the exported component of this package, and its version; empty for any other."""
     is_gain: bool = False
-    """Whether it stands for the gain of a connection."""
+    """Whether it is the gain of a connection."""
     gain_unit: str | None = None
-    """The unit of that gain, where the scene has one."""
+    """The unit of that gain, if the scene has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class System:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """All that an SSD says."""
+    """The content of an SSD."""
 
     name: str
     system: System
@@ -81,6 +81,6 @@ class Structure:
     stop_time: float | None = None
     """`start_time` and `stop_time` of its default experiment, s."""
     step: float | None = None
-    """Step of its master, s, where an annotation says it."""
+    """Step of its master, s, if an annotation gives one."""
     tables: str = ""
-    """TOML of the tables of a scene without words in SSP, as this package has noted them; may be empty."""
+    """Tables of a scene without a form in SSP, as TOML, from this package's notes; may be empty."""

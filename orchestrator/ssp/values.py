@@ -28,7 +28,7 @@ TRANSFORMATIONS = (
 
 LONGEST_NAME = 2000
 _MOST_NAMED = 5
-"""Elements that a message lists."""
+"""Most elements that a message lists."""
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 _WHOLE = re.compile(r"\s*[+-]?0{0,100}[0-9]{1,20}\s*", re.ASCII)
 _VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
@@ -36,7 +36,7 @@ _VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A value with its name; `unit` is None where it is not said."""
+    """A value with its name; `unit` is None if it is not given."""
 
     name: str
     value: StartValue
@@ -56,25 +56,25 @@ class Mapped:
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """Parameters of an element by the names that they have there."""
+    """Parameters of an element, by their names in it."""
 
     parameters: tuple[Parameter, ...]
     mapping: tuple[Mapped, ...] | None = None
-    """How they were renamed; None where they were not."""
+    """The mapping of their names; None without a mapping."""
     prefix: str = ""
-    """What their names had before that."""
+    """Prefix of their names before the mapping."""
     unmatched: tuple[str, ...] = ()
-    """Parameters that the mapping names, and that are not there."""
+    """Parameters that the mapping names, but that do not exist."""
 
     def renamed(self, parameter: Parameter) -> tuple[Parameter, ...]:
-        """Return what its mapping makes of a parameter of another set; nothing where it does not name it."""
+        """Return another set's parameter after this mapping; empty if the mapping does not name it."""
         if self.mapping is None:
             return ()
         return binding((parameter,), self.mapping, self.prefix).parameters
 
 
 def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | None, prefix: str) -> Binding:
-    """Return the parameters of a binding as they are applied: only the mapped ones where there is a mapping."""
+    """Return the parameters of a binding as applied: only mapped ones if there is a mapping."""
     named = {prefix + parameter.name: parameter for parameter in parameters}
     if mapping is None:
         return Binding(tuple(replace(parameter, name=name) for name, parameter in named.items()))
@@ -114,7 +114,7 @@ def _unit(element: Element, where: str) -> tuple[str, Unit]:
 
 
 def read_parameter_set(root: Element, where: str, units: Units | None = None) -> tuple[Parameter, ...]:
-    """Return the parameters of `ssv:ParameterSet`, in units of the file around it; messages begin with `where`."""
+    """Return the parameters of `ssv:ParameterSet`, with units of the enclosing file; messages begin with `where`."""
     expect(root, "ssv:ParameterSet", where)
     refuse_version(root, where)
     known = {**(units or {}), **read_units(root, where)}
@@ -145,7 +145,7 @@ def _parameter(element: Element, where: str, units: Units) -> Parameter:
 
 
 def _values_in(element: Element) -> int:
-    """Return how many values a parameter has; annotations and the like are none."""
+    """Return the number of values of a parameter; annotations do not count."""
     kinds = (child.tag.rpartition("}")[2] for child in element)
     return sum(kind in _READ or kind in REAL_TYPES or kind in INTEGER_TYPES for kind in kinds)
 
@@ -166,7 +166,7 @@ def _entry(element: Element, where: str) -> Mapped:
 
 
 def read_transformation(element: Element, where: str) -> tuple[float, float] | None:
-    """Return factor and offset of a linear transformation; None where there is no transformation."""
+    """Return factor and offset of a linear transformation; None without a transformation."""
     for child in element:
         kind = child.tag.rpartition("}")[2]
         if kind in TRANSFORMATIONS:
@@ -178,9 +178,9 @@ def read_transformation(element: Element, where: str) -> tuple[float, float] | N
 
 
 def start_value(variable: VariableFacts, parameter: Parameter, where: str) -> StartValue:
-    """Return the value of a parameter as its variable takes it, in its unit.
+    """Return the value of a parameter in the type and unit of its variable.
 
-    Another type, or a value out of range, raises RefusalError.
+    RefusalError: the type is another one, or the value is out of range.
     """
     value = parameter.value
     if variable.kind == "real" and not isinstance(value, bool | str):
@@ -198,7 +198,7 @@ def start_value(variable: VariableFacts, parameter: Parameter, where: str) -> St
 
 
 def converted(value: float, given: Unit | None, taken: Unit | None, where: str) -> float:
-    """Return a number in another unit; as it is where one of them is not known, or both mean the same."""
+    """Return a number in another unit; unchanged if a unit is unknown, or both are equal."""
     if given is None or taken is None or agree(given, taken):
         return value
     if given.exponents != taken.exponents:
@@ -207,20 +207,20 @@ def converted(value: float, given: Unit | None, taken: Unit | None, where: str) 
 
 
 def expect(root: Element, name: str, where: str) -> None:
-    """Refuse an element of another name."""
+    """Raise RefusalError unless an element has this name."""
     if root.tag != tag(name):
         raise RefusalError(where, f"<{name}>", f"<{root.tag.rpartition('}')[2][:60]}>")
 
 
 def refuse_version(root: Element, where: str) -> None:
-    """Refuse a file of a version that is not known."""
+    """Raise RefusalError for a file of an unknown version."""
     version = root.get("version", "")
     if not _VERSION.fullmatch(version):
         raise RefusalError(f"{where}: version", " or ".join(VERSIONS), quoted(version))
 
 
 def number(text: str, where: str) -> float:
-    """Read a finite number as XML writes it: in ASCII, without the underscores of Python."""
+    """Return a finite number in the notation of XML: in ASCII, without the underscores of Python."""
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
         raise RefusalError(where, "a finite number", quoted(text))
@@ -228,14 +228,14 @@ def number(text: str, where: str) -> float:
 
 
 def whole(text: str, where: str) -> int:
-    """Read a whole number of one of the types of SSP, which have 64 bits at most."""
+    """Return a whole number of an SSP type, at most 64 bits."""
     if not _WHOLE.fullmatch(text) or not -(2**63) <= int(text) < 2**64:
         raise RefusalError(where, "a whole number of 64 bits", quoted(text))
     return int(text)
 
 
 def truth(text: str, where: str) -> bool:
-    """Read a truth value as XML writes it."""
+    """Return a truth value in the notation of XML."""
     if text.strip() not in ("true", "1", "false", "0"):
         raise RefusalError(where, "true or false", quoted(text))
     return text.strip() in ("true", "1")

@@ -30,7 +30,7 @@ from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
 START_VALUES = "start"
 """Name of the parameter set of each component."""
 SWEPT_VALUES, SWEPT_MAPPING = "resources/system.sweep.ssv", "resources/system.sweep.ssm"
-"""Members with what the scene sweeps; no component has a dot in its name."""
+"""Members with the scene's swept values; no component has a dot in its name."""
 KINDS = {
     "1.0": frozenset({"input", "output", "parameter", "calculatedParameter"}),
     "2.0": frozenset({"input", "output", "parameter", "calculatedParameter", "local"}),
@@ -44,13 +44,13 @@ _TYPES = {
     "boolean": "Boolean",
     "text": "String",
 }
-"""Types of connectors; of an enumeration its numbers, which every tool sets."""
+"""Types of connectors; an enumeration is its number, which every tool can set."""
 
 
 def description(scene: Scene, parts: Mapping[str, Part], ssp: str, duration: float) -> bytes:
     """Return the SSD of a scene.
 
-    A connection from what this version of SSP has no word for raises UsageError.
+    UsageError: a connection has an end without a form in this version of SSP.
     """
     root = _root("ssd:SystemStructureDescription", ssp, ("ssc", "ssv", "ssm", "osp", "oms", "vibroimpact"))
     # OMSimulator makes a model of this name
@@ -76,7 +76,7 @@ def description(scene: Scene, parts: Mapping[str, Part], ssp: str, duration: flo
     _master(system, scene)
     _units(root, [variable for variables in shown.values() for variable in variables])
     experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
-    annotations = SubElement(experiment, "ssd:Annotations")  # OMSimulator takes none of the whole description
+    annotations = SubElement(experiment, "ssd:Annotations")  # OMSimulator accepts none higher up
     if scene.connections:
         step = SubElement(annotations, "ssc:Annotation", type=OSP_ANNOTATION)
         algorithm = SubElement(step, "osp:Algorithm")
@@ -107,9 +107,9 @@ def _parameter_set(name: str, values: Mapping[str, tuple[VariableFacts, StartVal
 
 
 def swept_values(scene: Scene, parts: Mapping[str, Part]) -> dict[str, tuple[str, str]]:
-    """Return what the scene sweeps that is a start value of a component: its element and variable, by its coordinate.
+    """Return element and variable of each swept start value of a component, by its coordinate.
 
-    A coordinate is what a dataset calls a swept key: `mass` of `b.mass`. A gain is one where it is a component.
+    A coordinate is a swept key's name in a dataset: `mass` for `b.mass`. A gain counts if it is a component.
     """
     gains = {part.gain_of: part.name for part in parts.values() if part.gain_of is not None}
     found = {}
@@ -124,9 +124,9 @@ def swept_values(scene: Scene, parts: Mapping[str, Part]) -> dict[str, tuple[str
 
 
 def swept_members(scene: Scene, parts: Mapping[str, Part], ssp: str) -> dict[str, bytes]:
-    """Return the SSV of what the scene sweeps, and the SSM that maps its names to the components'; nothing without.
+    """Return the SSV of the swept values, and the SSM that maps its names to the components; empty without a sweep.
 
-    Another tool varies in this one set what the scene sweeps; the values are those that the components have.
+    Another tool varies the sweep in this one set; the values are the components' present ones.
     """
     swept = swept_values(scene, parts)
     if not swept:
@@ -142,7 +142,7 @@ def swept_members(scene: Scene, parts: Mapping[str, Part], ssp: str) -> dict[str
 
 
 def _notes(scene: Scene, parts: Mapping[str, Part]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield what SSP has no words for, element by element; OMSimulator takes no annotations of elements."""
+    """Yield notes on elements, for parts without a form in SSP; OMSimulator accepts no annotations of elements."""
     for part in parts.values():
         if part.fmu:
             yield "Component", {"name": part.name, "fmu": part.fmu, "fmi": part.fmi}
@@ -172,7 +172,7 @@ def _written(root: Element) -> bytes:
 
 
 def _shown(part: Part, scene: Scene, ssp: str) -> list[VariableFacts]:
-    """Return the variables that are connectors: what is connected, and the outputs that are recorded."""
+    """Return the variables that are connectors: connected variables, and recorded outputs."""
     names: dict[str, None] = {}
     for number, connection in enumerate(scene.connections, start=1):
         for end, (component, name) in (("from", connection.source), ("to", connection.target)):
@@ -239,9 +239,9 @@ def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]
         endConnector=spec.target[1],
     )
     if differ or spec.gain_unit is not None:
-        connection.set("suppressUnitConversion", "true")  # the gain is all that happens to the number
+        connection.set("suppressUnitConversion", "true")  # the gain is the only change of the number
     if spec.gain != 1.0 or differ:
-        # some tools take 0 for an attribute that is left out
+        # some tools take 0 for a missing attribute
         SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset="0.0")
 
 
@@ -259,7 +259,7 @@ def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
 
 
 def _master(system: Element, scene: Scene) -> None:
-    """Say how OMSimulator is to step: as often as values are exchanged, and as they are sampled."""
+    """Write OMSimulator's step: the smaller of the exchange interval and the sampling interval."""
     rate = scene.sampling_rate
     step = min(scene.macro_step, 1.0 / rate) if rate else scene.macro_step
     annotations = SubElement(system, "ssd:Annotations")

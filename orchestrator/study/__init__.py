@@ -1,4 +1,4 @@
-"""Measured studies of a scene: `accuracy` is what accuracy costs in time, `effects` what each effect costs and changes.
+"""Measured studies of a scene: `accuracy` (cost of accuracy in time), `effects` (cost and changes of each effect).
 
-`ways` are the ways in which a scene can be simulated, `preparation` finds out how many modes it takes.
+`ways` are the ways to simulate a scene; `preparation` finds the number of modes that meets its tolerance.
 """

@@ -1,4 +1,4 @@
-"""The balance of energy of a run: what is left of it when all that went in and out is counted."""
+"""The energy balance of a run: its relative error when all work and all losses are counted."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ BALANCED = (
     *("energy.kinetic", "energy.potential"),
     *("energy.forcing_work", "energy.damping_loss", "energy.contact_loss"),
 )
-"""What a time series has for it, in this order."""
+"""Variables of the time series from which the balance follows, in this order."""
 SAMPLES = 64
-"""Over a run, at which it is looked at."""
+"""Number of samples of the time series, evenly over the recording."""
 
 
 def off_balance(samples: Floats) -> Floats:
-    """Return how far energy is off its balance, over all that has been turned over by then.
+    """Return the error of the energy balance at each sample, over the largest energy turned over until then.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ def off_balance(samples: Floats) -> Floats:
 
 
 def balance_of(scene: Scene) -> float:
-    """Return the largest relative error of the balance of a run; NaN of a body that does not follow its energies.
+    """Return the largest relative error of the energy balance of a run; NaN where the body has no energies.
 
-    The scene, of the short form and without a sweep, is run once more, since energies take time.
+    The scene has no sweep. It runs once more with a time series, since the samples of energies take time.
     """
     if not scene.is_lone_body or not scene.body.IS_STRUCTURE:
         return math.nan
@@ -59,6 +59,6 @@ def balance_of(scene: Scene) -> float:
             samples = runner.run({}).samples
         finally:
             runner.close()
-    except (ComponentError, SceneError):  # the way itself has failed, and says so
+    except (ComponentError, SceneError):  # the way fails too, and its own row has the message
         return math.nan
     return math.nan if samples is None or len(samples) < 2 else float(off_balance(samples).max())

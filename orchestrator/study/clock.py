@@ -1,4 +1,4 @@
-"""The clock of a study: what runs cost on this machine, in time, calls of FMUs and memory."""
+"""The clock of a study: the cost of runs on this machine, in time, calls of FMUs and memory."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from vibroimpact.orchestrator.study.ways.way import CallCounter, SceneTrial, Tri
 
 
 class Clock:
-    """Measures what runs cost, by further runs.
+    """Measures the cost of runs, by further runs.
 
-    Studies measure by `CLOCK` alone. Errors, texts and files do not depend on it: a test of these replaces it.
+    Studies measure only by `CLOCK`. Errors, texts and files do not depend on the clock: tests of these replace it.
     """
 
     def wall(self) -> float:
@@ -27,15 +27,15 @@ class Clock:
         return time.perf_counter()
 
     def spent(self) -> float:
-        """Return the processor time of all processes of this one, s."""
+        """Return the processor time of this process and of all processes that it started, s."""
         return processor_time_of_all()
 
     def limited(self, seconds: float) -> AbstractContextManager[None]:
-        """Give up each run of the block that takes more processor time than so much, s."""
+        """Give up each run of the block that takes more processor time than `seconds`, s."""
         return runs_limited(seconds, time.process_time)
 
     def observed(self, trial: Trial) -> tuple[Observation, float, float]:
-        """Run a trial; return what it shows, its processor time and its wall time, s."""
+        """Run a trial; return its observation, its processor time and its wall time, s."""
         return _run(trial)
 
     def timed(self, trial: Trial) -> tuple[float, float]:
@@ -47,7 +47,7 @@ class Clock:
         return _run(trial)[1]
 
     def calls(self, way: Way) -> int:
-        """Run a way; return how often it calls functions of FMUs; -1 where nobody counts them."""
+        """Run a way; return its number of calls of FMU functions; -1 where the calls are not counted."""
         counter = CallCounter()
         trial = way.open(counter.wrap)
         try:
@@ -59,14 +59,14 @@ class Clock:
     def memory(
         self, scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float
     ) -> dict[int, int]:
-        """Run ways in processes of their own; return their memory by place, bytes: see `memory_of_ways`."""
+        """Run each way in its own process; return their memory by place, bytes: see `memory_of_ways`."""
         return memory_of_ways(scene, given, parts, seconds)
 
 
 def _run(trial: Trial) -> tuple[Observation, float, float]:
-    """Run a trial; return what it shows, its processor time and its wall time, s.
+    """Run a trial; return its observation, its processor time and its wall time, s.
 
-    Another process that computes it counts by its wall time where the system does not tell its processor time.
+    A guarded trial computes in another process: its wall time counts where the system has no processor time of it.
     """
     processor: Callable[[], float] = time.process_time
     if getattr(trial, "is_guarded", False):

@@ -1,4 +1,4 @@
-"""How many modes a scene takes: runs with different numbers of modes, told by those with more."""
+"""The number of modes that a scene needs: each run is compared with runs that have more modes."""
 
 from __future__ import annotations
 
@@ -18,42 +18,43 @@ from vibroimpact.orchestrator.study.references import disturbed_scenes, observed
 from vibroimpact.orchestrator.study.statistics import statistics_of
 
 LADDER = (1, 2, 4, 8, 16, 32, MOST_MODES)
-"""Modes that are tried first; between two of them the fewest are looked for."""
-JUDGED = 4
-"""Modes from which on a motion that looks chaotic is taken for it."""
-LONG = 1.0
-"""Wall time of a run, s, above which it is told."""
+"""Numbers of modes that are tried first; the fewest are then searched between two of these numbers."""
+CHAOS_MODES = 4
+"""Number of modes of the run that decides whether the motion is chaotic; a scene with fewer modes takes all."""
+NOTED_SECONDS = 1.0
+"""Wall time of a run, s, above which `note` gets a line about the run."""
 REPLICATES = 4
-"""Further runs of chaotic motion, which tell what chance does to its statistics."""
+"""Further runs of chaotic motion, which give the sampling error of its statistics."""
 
 Note = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Convergence:
-    """How many modes a scene takes."""
+    """The number of modes that a scene needs."""
 
     modes: int
-    """The fewest that meet the tolerance."""
+    """The fewest modes that meet the tolerance."""
     error: float
-    """Their estimated error, relative."""
+    """Estimated error with `modes`, relative."""
     checked_with: int
-    """The most modes that they were compared with."""
+    """The largest number of modes with which `modes` was compared."""
     by: str
-    """`motion`, or `statistics` where motion is chaotic."""
+    """`motion`, or `statistics` where the motion is chaotic."""
     errors: dict[int, float]
-    """Distance of each number of modes that was tried from the most that it was compared with, the largest of all
-    points; inf: an impact is missing.
+    """Relative distance of the run with each tried number of modes from the finest run of its comparison.
+
+    The largest of all points; inf where an impact is missing.
     """
 
 
 class ModeRuns:
     """Runs of one point with different numbers of modes, each made once.
 
-    The scene has `modes = "auto"` and no sweep. The tolerance is relative, of all that is recorded
-    (`errors.errors_of`); in chaotic motion of the statistics of its impacts. `note` is told of each run that takes
-    longer than a second. `where` is the point of a sweep, for messages; empty without one. SceneError: the scene does
-    not run.
+    The scene has `modes = "auto"` and no sweep. The tolerance is relative and holds for all recorded quantities
+    (`errors.errors_of`); in chaotic motion it holds for the statistics of the impacts. `note` gets a line for each run
+    longer than a second. `where` names the point of a sweep in messages; it is empty without a sweep. SceneError: the
+    scene does not run.
     """
 
     def __init__(
@@ -67,14 +68,14 @@ class ModeRuns:
         most = getattr(scene.body, "size", MOST_MODES)
         fewest = next(n for n in range(1, most + 1) if n == most or self._is_valid(n))
         self.ladder = [fewest, *(n for n in LADDER if fewest < n < most), *([most] if most > fewest else [])]
-        self._judged = min(max(fewest, JUDGED), most)
-        if self.of(self._judged).failure:  # ten more such runs would tell nothing else
-            raise self.failed(self.tried[self._judged].failure)
-        self._scales = scales_of(self._with(self._judged))
+        self._chaos_modes = min(max(fewest, CHAOS_MODES), most)
+        if self.of(self._chaos_modes).failure:  # the ten disturbed runs would fail in the same way
+            raise self.failed(self.tried[self._chaos_modes].failure)
+        self._scales = scales_of(self._with(self._chaos_modes))
 
     @cached_property
     def _is_chaotic(self) -> bool:
-        return reference_of(self._with(self._judged)).chaotic
+        return reference_of(self._with(self._chaos_modes)).chaotic
 
     def _with(self, modes: int) -> Scene:
         return self.scene.with_values({MODES: modes})
@@ -87,17 +88,17 @@ class ModeRuns:
         return True
 
     def of(self, modes: int) -> Observation:
-        """Return what the scene shows with so many modes."""
+        """Return the observation of the scene with a number of modes."""
         if modes not in self.tried:
             self.tried[modes] = observed(self._with(modes))
-            if self.tried[modes].seconds > LONG:
+            if self.tried[modes].seconds > NOTED_SECONDS:
                 self._note(f"{modes} modes{self.where}: {self.tried[modes].seconds:.1f} s")
         return self.tried[modes]
 
     def distance(self, modes: int, others: int) -> float:
         """Return the relative distance between two runs; inf where they are different motions.
 
-        Motion that differs by more than the tolerance is compared by its statistics where it is chaotic.
+        Chaotic motions that differ by more than the tolerance are compared by their statistics.
         """
         found, reference = self.of(modes), self.of(others)
         errors = errors_of(found, reference, self._scales)
@@ -109,7 +110,7 @@ class ModeRuns:
         return off
 
     def _statistical_distance(self, found: Observation, reference: Observation, others: int) -> float:
-        """Return the distance of the statistics of two chaotic motions, less what chance alone makes of it."""
+        """Return the distance between the statistics of two chaotic motions, less its sampling error."""
         if others not in self._replicates:
             scenes = islice(disturbed_scenes(self._with(others), REPLICATES), REPLICATES)
             self._replicates[others] = [observed(one) for one in scenes]
@@ -120,7 +121,7 @@ class ModeRuns:
         return max(interval, compared.distribution_distance - compared.distribution_sampling, 0.0)
 
     def not_met(self) -> SceneError:
-        """Return that no number of modes meets the tolerance, with what was reached."""
+        """Return the error for the case that no number of modes meets the tolerance, with the best error reached."""
         finest = self.ladder[-1]
         errors = {n: self.distance(n, finest) for n in self.ladder[:-1]}
         best = min(errors, key=lambda n: errors[n])
@@ -143,7 +144,7 @@ class ModeRuns:
         )
 
     def failed(self, failure: str) -> SceneError:
-        """Return that the point does not run."""
+        """Return the error for the case that the point does not run."""
         return SceneError(
             [
                 f"{self.scene.source}: body.modes: expected runs to compare{self.where}, got one that failed: "
@@ -154,7 +155,7 @@ class ModeRuns:
 
 @dataclass(frozen=True, slots=True)
 class _Jointly:
-    """Points of which all have to meet a tolerance with the same number of modes."""
+    """Points that all have to meet a tolerance with the same number of modes."""
 
     points: Sequence[ModeRuns]
     tolerance: float
@@ -166,7 +167,7 @@ class _Jointly:
 
     @property
     def ends_exactly(self) -> bool:
-        """Whether the finest run has all modes that there are."""
+        """Whether the finest run has all modes of the body."""
         return self.points[0].scene.body.HAS_MASSES
 
     @property
@@ -174,7 +175,7 @@ class _Jointly:
         return "statistics" if any(one.by_statistics for one in self.points) else "motion"
 
     def distance(self, modes: int, others: int) -> float:
-        """Return the largest distance of all points; the first that is above the tolerance does."""
+        """Return the largest distance of all points, or the first distance above the tolerance."""
         largest = 0.0
         for one in self.points:
             largest = max(largest, one.distance(modes, others))
@@ -183,18 +184,19 @@ class _Jointly:
         return largest
 
     def errors(self, others: int, below: int) -> dict[int, float]:
-        """Return the distance of each number of modes below one that all points have tried, the largest of all."""
+        """Return the largest distance of all points for each number of modes below `below` that all have tried."""
         tried = set.intersection(*(set(one.tried) for one in self.points))
         return {n: max(one.distance(n, others) for one in self.points) for n in sorted(tried) if n < below}
 
 
 def converged_modes(points: Sequence[ModeRuns], tolerance: float) -> Convergence:
-    """Return the fewest modes with which all points meet a tolerance, checked by runs with more.
+    """Return the fewest modes with which all points meet a tolerance, checked by runs with more modes.
 
-    The number of modes is doubled until one run differs little enough from the next, and that one from the next but
-    one; between the last two the fewest are then found by bisection. The estimated error is the distance from the
-    finest run plus that run's own. Of a chain the finest has all modes, and no error; a chain that meets the tolerance
-    with none fewer takes all. SceneError: a point does not meet it with any number of modes.
+    The number of modes doubles until three runs in a row agree: their two distances add up to no more than the
+    tolerance. Bisection then finds the fewest modes in between. The
+    estimated error is the distance from the finer run plus the error of the finer run itself. The finest run of a
+    chain has all modes and no error; a chain takes all modes if no smaller number meets the tolerance.
+    SceneError: no number of modes meets the tolerance at some point.
     """
     runs = _Jointly(points, tolerance)
     for coarse, fine in pairwise(runs.ladder):
@@ -213,7 +215,7 @@ def converged_modes(points: Sequence[ModeRuns], tolerance: float) -> Convergence
 
 
 def _fewest(runs: _Jointly, coarse: int, fine: int, own: float, checked_with: int) -> Convergence:
-    """Return the fewest modes up to `coarse` whose distance from `fine`, and that one's own error, are small enough."""
+    """Return the fewest modes up to `coarse` whose distance from `fine`, plus `own`, meets the tolerance."""
     low = max((n for n in runs.ladder if n < coarse), default=runs.ladder[0] - 1)
     high = coarse
     while high - low > 1:

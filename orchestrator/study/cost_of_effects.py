@@ -1,4 +1,4 @@
-"""The study `effects`: what a scene asks for, what that costs, and what is not simulated."""
+"""The study `effects`: the effects of a scene, the cost of each, and the effects that are not simulated."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ from vibroimpact.orchestrator.study.preparing import with_modes
 
 @dataclass(eq=False)
 class CostOfEffects(Study[Share]):
-    """What effects cost and change; a row is an effect.
+    """The cost and the changes of the effects of a scene; a row is an effect.
 
     Parameters
     ----------
     scene : Scene
-        Its number of modes is known; its sweep is left out.
+        Has a known number of modes. The study leaves out its sweep.
     """
 
     name = "effects"
@@ -57,7 +57,7 @@ class CostOfEffects(Study[Share]):
 
     @classmethod
     def prepare(cls, options: Effects, stack: ExitStack) -> Self:
-        """Open the scene, and say how it runs."""
+        """Open the scene, and print its way of running."""
         opened = opened_scene(options.scene, options.changes or ())
         refuse_outputs(opened.files, options.output, options.figure)
         study = cls(with_modes(opened))
@@ -71,21 +71,21 @@ class CostOfEffects(Study[Share]):
 
     @property
     def shares(self) -> list[Share]:
-        """The effects, the dearest first."""
+        """The effects, the most expensive first."""
         return sorted(self.found, key=dearest_first)
 
     def made(self) -> xr.Dataset:
-        """Return what effects cost and change."""
+        """Return the dataset of the effects, with their cost and their changes."""
         return dataset_of_shares(self.scene.unswept(), self.shares, self.scene.found)
 
     def print_results(self) -> None:
-        """Print the effects, and what is not simulated."""
+        """Print the effects, and the effects that are not simulated."""
         rows = table(
             f"What effects cost: {self.scene.title or self.scene.source}",
             *("<effect", "<asked for by", ">of the time", ">spread", "<without it"),
         )
         for share in self.shares:
-            rows.add_row(share.effect.name, share.effect.asked_by, *_told(share), share.changes)
+            rows.add_row(share.effect.name, share.effect.asked_by, *_time_cells(share), share.changes)
         wide_terminal().print(rows)
         _print_motions(self.shares, self.scene.units)
         if self.found:
@@ -95,9 +95,9 @@ class CostOfEffects(Study[Share]):
 
 
 def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:
-    """Print what motions are as a whole where impacts cannot be compared one by one."""
-    told = [(share, share.motions) for share in shares if share.motions is not None]
-    if told:
+    """Print means over the motions whose impacts cannot be compared one by one."""
+    compared = [(share, share.motions) for share in shares if share.motions is not None]
+    if compared:
         names = [
             f"{name.replace('_', ' ')} ({written_unit(unit_in(system, unit))})"
             for name, unit in QUANTITIES.items()
@@ -106,9 +106,9 @@ def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:
             "Where impacts are lost or a motion is chaotic: means over the recording",
             *("<without", ">impacts", *(f">{name}" for name in names), "<motion"),
         )
-        scene = told[0][1][0]
+        scene = compared[0][1][0]
         rows.add_row("-", *_as_a_whole(scene))
-        for share, (full, without) in told:
+        for share, (full, without) in compared:
             rows.add_row(share.effect.asked_by, *_as_a_whole(without, full))
         wide_terminal().print(rows)
     for share in shares:
@@ -117,7 +117,7 @@ def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:
 
 
 def _as_a_whole(motion: Motion, full: Motion | None = None) -> tuple[str, ...]:
-    """Return the cells of a motion, with its changes from the one with all effects."""
+    """Return the cells of a motion, with its changes from the motion with all effects."""
     changes = {} if full is None else changes_of_motion(full, motion)
     chance = {} if full is None else sampling_of_change(full, motion)
     cells = []
@@ -129,7 +129,7 @@ def _as_a_whole(motion: Motion, full: Motion | None = None) -> tuple[str, ...]:
     return str(motion.impacts), *cells, motion.orbit or "-"
 
 
-def _told(share: Share) -> tuple[str, str]:
+def _time_cells(share: Share) -> tuple[str, str]:
     if np.isnan(share.seconds).all():
         return "-", "-"
     parts = 100.0 * share.seconds / share.full

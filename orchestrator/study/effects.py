@@ -1,4 +1,4 @@
-"""What a scene asks for, what that costs and what it changes: the scene with and without each effect, run in turn."""
+"""The effects of a scene, with the cost and the changes of each: runs with and without the effect, in turn."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
 from vibroimpact.orchestrator.study.ways.way import SceneTrial, opened_trial
 
 PAIRS = 5
-"""Pairs of runs, one with the effect and one without, in turn."""
+"""Number of pairs of runs, one with the effect and one without, in turn."""
 RECORDED = ("impacts", "extrema", "strobe")
-"""Keys of `[record]` that switch off what is kept of a run."""
+"""Keys of `[record]` that each switch off a part of the record of a run."""
 SERIES = "record.time_series"
 NOT_RECORDED = "nothing but what is kept"
 NO_CHANGE = "nothing"
@@ -69,38 +69,38 @@ class Effect:
     """Something that a scene asks for, and the scene without it."""
 
     name: str
-    """In words."""
+    """Name of the effect, in words."""
     asked_by: str
-    """The key that asks for it."""
+    """The keys that ask for the effect."""
     base: Scene
-    """The scene with it. What moves is compared without a time series: its samples take most of the time, and would
-    hide the rest.
+    """The scene with the effect. Motions are compared without a time series, whose samples take most of the time
+    and would hide the rest.
     """
     without: Scene
-    """The scene without it."""
+    """The scene without the effect."""
     keeps_motion: bool = False
-    """Whether what moves is the same without it: it only says what is kept, or how points run."""
+    """Whether the motion is the same without the effect, which only says what is recorded or how points run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """An effect with what it costs and changes."""
+    """An effect with its cost and its changes."""
 
     effect: Effect
     seconds: np.ndarray[Any, Any]
-    """Processor time that it costs in each pair of runs, s, shape (pair,); negative where the run without it took
-    longer.
+    """Processor time of the effect in each pair of runs, s, shape (pair,); negative where the run without the effect
+    took longer.
     """
     full: float
     """Median processor time of a run of the scene, s."""
     changes: str
-    """What is otherwise without it, in words."""
+    """Difference of the run without the effect, in words."""
     change: float
-    """Largest relative change of what both runs show; NaN where they cannot be compared."""
+    """Largest relative change of the observed quantities; NaN where the runs cannot be compared."""
     motions: tuple[Motion, Motion] | None = None
-    """What the motions with and without it are as a whole, where impacts are lost or a motion is chaotic."""
+    """The motions with and without the effect, where impacts are lost or a motion is chaotic."""
     statistics: Statistics | None = None
-    """Likewise how far distributions are apart, of a replay and of a general scene."""
+    """Distance between the distributions in the same cases, of a replay and of a general scene."""
 
     @property
     def share(self) -> float:
@@ -109,12 +109,12 @@ class Share:
 
     @property
     def statistics_in_words(self) -> str:
-        """What is otherwise as a whole without it; empty where impacts are compared one by one."""
+        """Difference between the motions as a whole; empty where impacts are compared one by one."""
         return motions_in_words(self.motions, self.statistics)
 
 
 def effects_of(scene: Scene) -> list[Effect]:
-    """Return what a scene without a sweep asks for that it could leave out, each with the scene without it."""
+    """Return the effects that a scene without a sweep could leave out, each with the scene without the effect."""
     found = list(_found(scene))
     return [effect for effect in found if effect is not None]
 
@@ -163,7 +163,7 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
 
 
 def _of_replay(scene: Scene) -> Iterator[Effect | None]:
-    """Yield what a recording does to the body, and what a reading makes of its motion."""
+    """Yield the effects of a replay: the recorded drive of the body, and the numbers of the sensor."""
     assert scene.replay is not None
     if scene.replay.drive is not None:
         yield _without(scene, "what the recording drives", "replay.drive", _no_drive)
@@ -188,7 +188,7 @@ def _drops(table: str, names: Sequence[str]) -> Change:
 
 
 def _without_component(scene: Scene, name: str) -> Effect | None:
-    """Return a component with all that it is joined by; compared are the variables of the others."""
+    """Return a component as an effect, with its connections; the variables of all other components are compared."""
     document = parse_toml(scene.text)
     document.pop("sweep", None)
     record = document.get("record", {})
@@ -218,7 +218,7 @@ def _owners(entry: Mapping[str, Any]) -> set[str]:
 
 
 def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
-    """Yield the effects that numbers other than 0 call for: all of one effect at once."""
+    """Yield the effects that numbers other than 0 ask for, all numbers of one effect together."""
     called: dict[str, list[str]] = {}
     for key, value in scene.constants().items():
         effect = rule_of(scene.field(key)).effect
@@ -235,7 +235,7 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
 def _without(
     scene: Scene, name: str, key: str, change: Change, *, keeps: bool = False, series: bool = False
 ) -> Effect | None:
-    """Return an effect, compared with or without a time series; None where the scene is none without it."""
+    """Return an effect, compared with or without a time series; None where the scene is invalid without it."""
     document = parse_toml(scene.text)
     document.pop("sweep", None)
     if key != SERIES and not series and scene.is_one_body:
@@ -297,7 +297,7 @@ def _only_fused(document: dict[str, Any]) -> None:
 
 
 def shares_of(scene: Scene, effects: Sequence[Effect]) -> Generator[Share, None, None]:
-    """Run a scene without a sweep with and without each of its effects, in turn; yield what each costs and changes."""
+    """Yield the cost and the changes of each effect of a scene without a sweep, by runs with and without it in turn."""
     compared = _Compared(scene)
     with opened(scene) as full:
         whole = float(np.median([clock.CLOCK.processor_time(full) for _ in range(PAIRS)]))
@@ -306,7 +306,7 @@ def shares_of(scene: Scene, effects: Sequence[Effect]) -> Generator[Share, None,
 
 
 def dearest_first(share: Share) -> float:
-    """Return what shares are sorted by: the negative share of the time, infinite of one that failed."""
+    """Return the sorting key of a share: its negative share of the time, infinite for a failed share."""
     return -share.share if share.share == share.share else math.inf
 
 
@@ -334,7 +334,7 @@ def _share(effect: Effect, whole: float, compared: _Compared) -> Share:
 
 
 class _Compared:
-    """Compares runs with and without an effect of a scene: impact by impact, else by what the motions are as a whole.
+    """Compares runs with and without an effect of a scene, impact by impact or as whole motions.
 
     The scene has all of its effects.
     """
@@ -344,7 +344,7 @@ class _Compared:
         self._motions: dict[Scene, Motion | None] = {}
 
     def share(self, share: Share, alone: Observation, reference: Observation) -> Share:
-        """Return a share with what is otherwise without its effect."""
+        """Return a share with the changes of the run without its effect."""
         errors = errors_of(alone, reference, self._scales)
         lost = (
             errors.failure.replace("missed", "loses")
@@ -371,7 +371,7 @@ class _Compared:
         return share if without is None else replace(share, motions=(full, without))
 
     def _by_samples(self, share: Share, alone: Observation, reference: Observation) -> Share:
-        """Add the distributions of what a general scene samples where its motion is chaotic."""
+        """Add the distributions of the samples of a general scene where its motion is chaotic."""
         replicates = [observed(one) for one in disturbed_scenes(share.effect.base, REPLICATES)]
         if not is_chaotic(reference, replicates, self._scales):
             return share
@@ -386,14 +386,14 @@ def _failed(effect: Effect, error: Exception) -> Share:
 
 
 def not_called(scene: Scene) -> list[str]:
-    """Return the effects that a scene does not call for, which are not simulated."""
+    """Return the names of the effects that a scene does not ask for, which are not simulated."""
     return [name for name, there in called_effects(scene).items() if not there]
 
 
 def dataset_of_shares(
     scene: Scene, shares: Sequence[Share], attributes: Mapping[str, Any] | None = None
 ) -> xr.Dataset:
-    """Return what effects cost and change as a dataset of kind `effects`."""
+    """Return the dataset of kind `effects`, with the cost and the changes of each effect."""
     motions = [share.motions for share in shares]
     values = {
         "share": [share.share for share in shares],

@@ -1,4 +1,4 @@
-"""How far what one way showed is from the reference: by quantity, relative, and what is missing altogether."""
+"""Relative error of one way against the reference, per quantity; missing impacts are counted."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ QUANTITIES = (
     *("impact_time", "impact_velocity", "displacement_range", "final_state", "samples"),
     *("interface_energy", "energy_balance"),
 )
-"""What errors are given of."""
+"""Quantities that have an error."""
 FIRST_IMPACTS = 10
-"""Impacts over which the growth of errors is shown where motion is chaotic."""
-STILL = 1e-6
-"""Spread of a sampled variable, over its size, below which it stands still but for rounding."""
-COMPARED = 1e-3
-"""Speed of an impact, over that of the fastest, below which it is not compared: ways end a chatter differently."""
+"""Number of impacts over which the growth of errors is shown where the motion is chaotic."""
+CONSTANT_SPREAD = 1e-6
+"""Spread of a sampled variable over its size, up to which it is constant but for rounding; above, it moves."""
+LEAST_SPEED = 1e-3
+"""Speed of an impact over the fastest speed, below which it is not compared: ways end a chatter differently."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """What errors are relative to."""
+    """Scales to which errors are relative."""
 
     time: float
-    """The forcing period, or the time recorded where there is none, s."""
+    """The forcing period, or the recorded time of an unforced scene, s."""
     window: tuple[float, float]
-    """Start and end of the recording, s: an impact at its edge may be in one way and not in another."""
+    """Start and end of the recording, s: one way may have an impact at an edge that another way lacks."""
     masses: tuple[float, ...] = ()
-    """What hits each stop, kg: energy is relative to that of the impacts; empty where nobody knows."""
+    """Mass that hits each stop, kg: energy errors are relative to the energy of the impacts; empty if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +40,14 @@ class Errors:
     """The errors of a way."""
 
     of: Mapping[str, float]
-    """By quantity, relative; NaN where the way does not tell it, or the reference does not."""
+    """Relative error by quantity; NaN where the way or the reference has no value."""
     failure: str
-    """What is wrong altogether; empty where nothing is."""
+    """Failure of the way, or its missing and extra impacts, in words; empty where all impacts match."""
     growth: Floats
     """Relative error of the velocity of each compared impact, in their order, shape (impact,)."""
 
     def worst(self, quantity: str = "all") -> float:
-        """Return the error of a quantity, or the largest of all that are known; NaN where none is."""
+        """Return the error of a quantity, or the largest of all known errors; NaN where none is known."""
         if quantity != "all":
             return self.of[quantity]
         known = [error for error in self.of.values() if not math.isnan(error)]
@@ -55,16 +55,16 @@ class Errors:
 
 
 def no_errors(failure: str) -> Errors:
-    """Return the errors of a way that showed nothing."""
+    """Return the errors of a way that has no results."""
     return Errors(dict.fromkeys(QUANTITIES, math.nan), failure, np.empty(0))
 
 
 def errors_of(
     found: Observation, reference: Observation, scales: Scales, *, impacts: int | None = None
 ) -> Errors:
-    """Compare what a way showed with the reference.
+    """Return the errors of the observation of a way against the reference.
 
-    `impacts` compares no more than so many impacts, and nothing else: what chaos leaves comparable.
+    `impacts` is the number of first impacts to compare, without the motion: chaos leaves only these comparable.
     """
     if found.failure:
         return no_errors(found.failure)
@@ -89,7 +89,7 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
     rate = 2.0 * math.pi / scales.time
     if size > 0.0:
         errors["displacement_range"] = abs(found.displacement_range - size) / size
-    else:  # an unforced scene has no extremes; the state at its end tells how large the motion is
+    else:  # an unforced scene has no extremes; its final state gives the size of the motion
         size = math.hypot(reference.final[0], reference.final[1] / rate)
     if 0.0 < size < math.inf:
         off = np.abs(np.subtract(found.final, reference.final)) / (size, size * rate)
@@ -97,7 +97,7 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
     samples, expected = found.samples, _at_the_instants_of(found, reference)
     if samples is not None and expected is not None and expected.size and samples.shape == expected.shape:
         spread, size = np.ptp(expected, axis=0), np.abs(expected).max(axis=0)
-        scale = np.where(spread > STILL * size, spread, size)  # what stands still is told by its own size
+        scale = np.where(spread > CONSTANT_SPREAD * size, spread, size)  # size of a constant variable
         off = np.abs(samples - expected).max(axis=0)
         moving = scale > 0.0
         errors["samples"] = float((off[moving] / scale[moving]).max()) if moving.any() else math.nan
@@ -105,7 +105,7 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
 
 
 def _error_of_energy(found: Observation, reference: Observation, scales: Scales) -> float:
-    """Return the energy that an exchange of forces added, over the kinetic energy of all impacts."""
+    """Return the energy that the exchange of forces added, over the kinetic energy of all impacts."""
     impacts = reference.impacts
     if not len(impacts) or impacts[:, 2].max() > len(scales.masses):
         return math.nan
@@ -115,7 +115,7 @@ def _error_of_energy(found: Observation, reference: Observation, scales: Scales)
 
 
 def _at_the_instants_of(found: Observation, reference: Observation) -> Floats | None:
-    """Return the samples of the reference where those that were found are, linear between its own."""
+    """Return the samples of the reference at the instants of `found`, by linear interpolation."""
     own, times, samples = reference.sample_times, found.sample_times, reference.samples
     if samples is None or own is None or times is None or np.array_equal(own, times):
         return samples
@@ -125,10 +125,10 @@ def _at_the_instants_of(found: Observation, reference: Observation) -> Floats | 
 def matched(
     found: Floats, reference: Floats, scales: Scales, most: int | None = None
 ) -> tuple[np.ndarray, str]:
-    """Return which impacts are the same ones (places in both), and what is missing or too much, in words.
+    """Return the pairs of equal impacts, as places in both, and the missing and extra impacts, in words.
 
-    Impacts are in the order of time, shape (impact, 3): time, velocity, contact. Of the reference no more than the
-    first `most` are taken.
+    Impacts are in the order of time, shape (impact, 3): time, velocity, contact. `most` limits the comparison to the
+    first impacts of each.
     """
     own, other = _compared(found), _compared(reference)
     if most is not None:
@@ -164,11 +164,11 @@ def _compared(impacts: Floats) -> np.ndarray:
     speeds = np.abs(impacts[:, 1])
     if np.isnan(speeds).all():
         return np.arange(len(impacts))
-    return np.flatnonzero(speeds >= COMPARED * np.nanmax(speeds))
+    return np.flatnonzero(speeds >= LEAST_SPEED * np.nanmax(speeds))
 
 
 def _reach(impacts: Floats, scales: Scales) -> float:
-    """Return how far apart in time two impacts may be that are the same: half of the shortest interval, s."""
+    """Return the largest time between two equal impacts: half of the shortest interval, s."""
     intervals = np.diff(impacts[:, 0])
     intervals = intervals[intervals > 1e-9 * scales.time]
     return 0.5 * min(float(intervals.min()) if intervals.size else math.inf, scales.time)

@@ -1,4 +1,4 @@
-"""What a scene is without each part of its measuring chain: changes of its document."""
+"""Changes of a scene's document that each remove one part of its measuring chain."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Change = Callable[[dict[str, Any]], None]
 
 
 def measuring_changes(scene: Scene) -> Iterator[tuple[str, str, Change]]:
-    """Yield each part of a chain that only says what is seen of the motion: its name, its key, and what takes it away.
+    """Yield the name, the key and the removal of each part of a chain that only measures the motion.
 
-    What pushes the body (the exciter) changes the motion: forcing and the numbers that call for an effect are that.
+    The exciter is none of these parts: it pushes the body, and belongs to the forcing.
     """
     changes: dict[str, Change] = {
         "sensor": _without_sensor,
@@ -32,7 +32,7 @@ def measuring_changes(scene: Scene) -> Iterator[tuple[str, str, Change]]:
 
 
 def motion_alone(scene: Scene) -> Scene:
-    """Return a scene without its measuring chain, in which the same moves: its forcing is in N.
+    """Return a scene with the same motion and without the measuring chain: its forcing is in N.
 
     The scene has no sweep. UsageError: the force of its exciter falls with the distance, or has a constant part.
     """

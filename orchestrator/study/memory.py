@@ -1,4 +1,4 @@
-"""What memory a way takes: each runs once in a process of its own, whose resident memory the system counts."""
+"""The memory of each way: the way runs once in its own process, whose resident memory the system counts."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from vibroimpact.orchestrator.study.ways.all_ways import ways_of
 from vibroimpact.orchestrator.study.ways.way import Way
 
 UNKNOWN = -1
-"""Where nobody measures it."""
+"""Memory of a way that was not measured, in place of bytes."""
 IS_MEASURED = sys.platform == "linux"
-"""Elsewhere the resident memory of a process that was forked is not told by its peak."""
+"""Whether the peak of a forked process gives its resident memory, which is so only on Linux."""
 
 
 def memory_of_ways(
     scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float = math.inf
 ) -> dict[int, int]:
-    """Return the largest resident memory that ways add to a process, by place, Python's and that of the FMUs, bytes.
+    """Return the largest resident memory that ways add to a process, of Python and FMUs, by place, bytes.
 
-    A process is started that loads this package and nothing else; each way is opened and run once in a fork of it, so
-    that none finds what another has left. Libraries of FMUs and Python modules that a way loads count, too. The scene
-    has no sweep; `given` is what `ways_of` is given beside it. Of each way that is measured `parts` have its place, in
-    the order of `ways_of`, and the part of the time that it simulates. After so many seconds of processor time no
-    further way is measured. What a process that died would have taken is missing, and ways for which no time was left.
-    Nothing is there where the system does not tell, or the FMUs run in processes of their own.
+    A new process loads only this package. Each way opens and runs once in a fork of it, so no way finds libraries of
+    another. Libraries of FMUs and Python modules that a way loads count.
+
+    The scene has no sweep; `given` are the other arguments of `ways_of`. Each entry of `parts` is the place of a way
+    in `ways_of` and the part of the time that it simulates. No way starts after `seconds` of processor time. Ways
+    whose process died or for which no time was left are missing. The result is empty where the system has no such
+    count, or where the FMUs run in processes of their own.
     """
     guarded = scene.execution.guard
     if guarded or not IS_MEASURED:
@@ -56,7 +57,7 @@ def _in_forks(
 
 
 def memory_in_fork(way: Way, part: float = 1.0) -> int:
-    """Open and run a way in a fork of this process; return what its resident memory grew by at most, bytes."""
+    """Open and run a way in a fork of this process; return the growth of its peak resident memory, bytes."""
     answers, answer = os.pipe()
     process = forked(lambda: os.write(answer, str(_growth(way, part)).encode()))
     os.close(answer)
@@ -77,7 +78,7 @@ def _growth(way: Way, part: float) -> int:
 
 
 def _peak() -> int:
-    """Return the largest resident memory that this process has had, bytes."""
+    """Return the peak resident memory of this process, bytes."""
     import resource
 
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

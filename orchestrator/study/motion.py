@@ -1,4 +1,4 @@
-"""What a motion is as a whole, where its impacts cannot be compared one by one: range, speeds, energies, class."""
+"""A motion as a whole (range, speeds, energies, class), where its impacts cannot be compared one by one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ QUANTITIES = {
     "kinetic_energy": "J",
     "potential_energy": "J",
 }
-"""What a motion is told by, with its SI unit; the last three are means over the recording."""
+"""Quantities of a motion, with their SI units; the last three are means over the recording."""
 OF_MOTIONS: tuple[TableRow, ...] = (
     *(
         (name, "effect motion", unit, f"{name.replace('_', ' ')}, with the effect and without it")
@@ -48,27 +48,27 @@ OF_MOTIONS: tuple[TableRow, ...] = (
     ),
     ("distribution_sampling", "effect", "1", "distance that chance alone makes"),
 )
-"""Rows of a table of results that say what motions are as a whole."""
+"""Rows of a table of results that describe motions as a whole."""
 REPLICATES = 6
-"""Runs from slightly different numbers, that tell chaos and the sampling error of its statistics."""
+"""Runs from slightly different numbers, which detect chaos and give the sampling error of its statistics."""
 SAMPLES_A_PERIOD, MOST_SAMPLES = 256, 2**16
-"""Samples of the energies in a forcing period, and over a run; an unforced run has the latter over 16."""
+"""Samples of the energies in a forcing period, and at most in a run; an unforced run has `MOST_SAMPLES` / 16."""
 CHAOS = "chaotic"
-"""The class of a motion that a small change of a number takes to another one."""
+"""Class of a motion that becomes another motion by a small change of a number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What one run showed as a whole."""
+    """The motion of one run as a whole."""
 
     of: Mapping[str, float]
-    """By quantity: m, m/s, J, J; NaN where it is not known, as the velocity of no impacts is."""
+    """Value by quantity: m, m/s, J, J; NaN where unknown, as the impact velocity without impacts."""
     impacts: int
-    """How many were recorded."""
+    """Number of recorded impacts."""
     orbit: str
-    """`P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it."""
+    """Class of the motion: `P(p,q)`, `chaotic`, `no impacts`, ...; empty without forcing."""
     sampling: Mapping[str, float] = field(default_factory=dict)
-    """By quantity, the largest relative difference among runs from slightly different numbers; empty without chaos."""
+    """Largest relative difference among runs from slightly different numbers, by quantity; empty without chaos."""
 
     @property
     def chaotic(self) -> bool:
@@ -77,9 +77,9 @@ class Motion:
 
 
 def motion_of(scene: Scene) -> Motion | None:
-    """Run a scene of the short form or a replay and return what its motion is as a whole; None where it fails.
+    """Return the motion of a scene of the short form or of a replay as a whole, by a run; None where the run fails.
 
-    The scene has no sweep. Of a replay the impacts alone are known.
+    The scene has no sweep. A replay gives only its impacts.
     """
     followed, scales = _followed(scene), scales_of(scene)
     found = observed(followed)
@@ -101,8 +101,8 @@ def motion_of(scene: Scene) -> Motion | None:
 
 
 def is_chaotic(found: Observation, replicates: Sequence[Observation], scales: Scales) -> bool:
-    """Whether runs from slightly different numbers come to another motion, as `accuracy` tells it."""
-    # of a body its impacts and its end: what jumps at an impact may be sampled on either side of it
+    """Whether runs from slightly different numbers come to another motion, by the criterion of `accuracy`."""
+    # a body with impacts is compared by impacts and end: a sample at an impact may be on either side of its jump
     own = replace(found, samples=None) if len(found.impacts) else found
     for one in replicates:
         errors = errors_of(replace(one, samples=None) if len(found.impacts) else one, own, scales)
@@ -117,7 +117,7 @@ def changes_of_motion(full: Motion, without: Motion) -> dict[str, float]:
 
 
 def sampling_of_change(full: Motion, without: Motion) -> dict[str, float]:
-    """Return how far chance alone takes each of these changes, relative to the first motion; 0 without chaos."""
+    """Return the sampling error of the change of each quantity, relative to the first motion; 0 without chaos."""
     found = {}
     for name in QUANTITIES:
         ratio = 1.0 + _relative(without.of[name], full.of[name])
@@ -131,7 +131,7 @@ def _relative(value: float, base: float) -> float:
 
 
 def _followed(scene: Scene) -> Scene:
-    """Return a scene that records its impacts, its extremes, and a time series of its energies; a replay as it is."""
+    """Return a scene that records its impacts, its extremes and a time series of its energies; a replay unchanged."""
     if scene.replay is not None:
         return scene
     begin, end = scales_of(scene).window
@@ -139,7 +139,7 @@ def _followed(scene: Scene) -> Scene:
     if scene.period is not None:
         count = min(SAMPLES_A_PERIOD * round((end - begin) / scene.period), MOST_SAMPLES)
     series: dict[str, Any] = {"variables": ["displacement", *CONSERVATIVE]}
-    if scene.daq is None:  # else its rate is that of the converter
+    if scene.daq is None:  # a converter has a rate of its own
         series["rate"] = count / (end - begin)
     changes: dict[str, Any] = {"record.impacts": True, "record.time_series": series}
     return scene.with_values(changes | ({} if scene.period is None else {"record.extrema": True}))
@@ -148,17 +148,17 @@ def _followed(scene: Scene) -> Scene:
 def _quantities(found: Observation, scene: Scene) -> dict[str, float]:
     is_followed = found.samples is not None and scene.replay is None
     samples = found.samples if is_followed and found.samples is not None else np.empty((0, 3))
-    # the last sample of whole periods is the first one again
+    # after whole periods the last sample repeats the first one
     means = samples[:-1, 1:].mean(axis=0).tolist() if len(samples) > 1 else [math.nan, math.nan]
     span = found.displacement_range
-    if math.isnan(span) and len(samples):  # nothing forces it: it has no extremes of periods
+    if math.isnan(span) and len(samples):  # an unforced motion has no extremes of periods
         span = float(np.ptp(samples[:, 0]))
     speed = float(np.abs(found.impacts[:, 1]).mean()) if len(found.impacts) else math.nan
     return dict(zip(QUANTITIES, (span, speed, *means), strict=True))
 
 
 def motions_in_words(motions: tuple[Motion, Motion] | None, statistics: Statistics | None) -> str:
-    """Return what is otherwise in the second motion; empty where nothing is known.
+    """Return the difference of the second motion from the first, in words; empty where nothing is known.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def motions_in_words(motions: tuple[Motion, Motion] | None, statistics: Statisti
 
 
 def change_in_words(change: float, sampling: float) -> str:
-    """Return a relative change in percent, and what chance alone makes of it where it does.
+    """Return a relative change in percent, with its sampling error unless that is 0.
 
     >>> change_in_words(-0.25, 0.0), change_in_words(0.031, 0.05)
     ('-25 %', '+3.1 % (by chance 5 %)')
@@ -195,7 +195,7 @@ def change_in_words(change: float, sampling: float) -> str:
 def values_of_motions(
     motions: Sequence[tuple[Motion, Motion] | None], statistics: Sequence[Statistics | None]
 ) -> dict[str, Any]:
-    """Return the values of `OF_MOTIONS`: what motions are as a whole, with and without each effect, shape (effect,)."""
+    """Return the values of the rows `OF_MOTIONS` for motions with and without each effect, shape (effect,)."""
     none = Motion(dict.fromkeys(QUANTITIES, math.nan), -1, "")
     pairs = [pair or (none, none) for pair in motions]
     missing = Statistics(math.nan, math.nan, math.nan, math.nan)

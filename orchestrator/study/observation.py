@@ -1,4 +1,4 @@
-"""What one run of a scene showed, whichever way it was simulated, and what it cost."""
+"""The observation of one run of a scene: its results and its time, in the same form for all ways."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ def _no_impacts() -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What one run showed while it was recorded."""
+    """The results of one run while it was recorded."""
 
     impacts: Floats = field(default_factory=_no_impacts)
     """Time (s), velocity (m/s), contact (1-based) of each impact, shape (impact, 3)."""
     lowest: float = math.nan
-    """Smallest displacement, m; NaN where this way does not tell."""
+    """Smallest displacement, m; NaN where the way has none."""
     highest: float = math.nan
-    """Largest displacement, m; likewise."""
+    """Largest displacement, m; NaN where the way has none."""
     final: tuple[float, float] = (math.nan, math.nan)
     """Displacement (m) and velocity (m/s) at the end."""
     energy_residual: float = math.nan
     """Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged."""
     energy_balance: float = math.nan
-    """Largest error of the balance of a body's energies, relative; NaN where nobody followed them."""
+    """Largest relative error of the energy balance of a body; NaN where its energies were not followed."""
     samples: Floats | None = None
-    """What a general scene samples, or a replay reads, without the time, shape (sample, variable)."""
+    """Sampled variables of a general scene, or readings of a replay, without the time, shape (sample, variable)."""
     sample_times: Floats | None = None
-    """When a replay reads, s, shape (sample,); None where the samples of all ways are of the same instants."""
+    """Times of the readings of a replay, s, shape (sample,); None where all ways sample at the same instants."""
     seconds: float = math.nan
     """Wall time, s."""
     failure: str = ""
-    """Why there is no result, or what is wrong with it; empty where it is one."""
+    """Why the run has no result, or why the result is invalid; empty for a valid result."""
     variance: float = math.nan
     """Least variance accounted for among the channels that a replay is compared with, percent; else NaN."""
     reached: float = math.nan
-    """How far a run came that was given up, over its whole time; NaN where the way does not tell."""
+    """Simulated part of the time of a run that was given up, 0 to 1; NaN where the way does not give it."""
     held: OrbitClass = OrbitClass.unknown
-    """`sticking` where impacts are without number (a complete chatter, or a rest on a stop), `rest` where the body
-    rests for good, else `unknown`; the class of the run goes by it.
+    """`sticking` with infinitely many impacts (a complete chatter, or a rest on a stop), `rest` where the body rests
+    for good, else `unknown`. The class of the run follows from it.
     """
 
     @property
@@ -63,7 +63,7 @@ class Observation:
 
 
 def observation_of(record: RunRecord) -> Observation:
-    """Return what the record of a run shows, of a scene of either form."""
+    """Return the observation in the record of a run, for scenes of both forms."""
     failure = ""
     if record.outcome == Outcome.timeout:
         failure = LATE
@@ -89,7 +89,7 @@ def observation_of(record: RunRecord) -> Observation:
 
 
 def _held(record: RunRecord) -> OrbitClass:
-    """Return whether a run rests for good, or has impacts without number: as `classify` takes it."""
+    """Return the class of a run that rests for good or has infinitely many impacts, as `classify` does."""
     if record.outcome == Outcome.stuck:
         return OrbitClass.rest
     sticks = record.sticks is not None and len(record.sticks) > 0

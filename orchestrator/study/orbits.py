@@ -1,4 +1,4 @@
-"""The class of an orbit: P(p,q), p impacts in q forcing periods; P(inf,q) where they are without number."""
+"""The class of an orbit: P(p,q), p impacts in q forcing periods; P(inf,q) with infinitely many impacts."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.orchestrator.study.errors import COMPARED
+from vibroimpact.orchestrator.study.errors import LEAST_SPEED
 from vibroimpact.orchestrator.study.observation import Observation
 
 REPEATS = 1e-6
-"""Relative difference of times and velocities below which an impact is one of a period before."""
+"""Relative difference of times and velocities below which an impact repeats an impact of an earlier period."""
 LEAST_TURNS = 2
-"""How often an orbit must repeat itself in the recording, to be called one."""
+"""Number of times that a recording must contain the orbit; longer orbits count as not periodic."""
 
 
 def orbit_of(found: Observation, period: float | None, window: tuple[float, float]) -> str:
-    """Return the class of an orbit: `P(p,q)`, `no impacts`, `not periodic in the recording`; nothing where unforced.
+    """Return the class of an orbit: `P(p,q)`, `no impacts`, `not periodic in the recording`; empty without forcing.
 
     A complete chatter is `P(inf,q)` and a body that rests for good is at `rest`, as `classify` names them. The slowest
-    impacts of a chatter do not tell whether it repeats: their number is the engine's. The period is that of the
-    forcing, s; the window is start and end of the recording, s.
+    impacts of a chatter are not compared: their number depends on the engine. `period` is the forcing period, s;
+    `window` is start and end of the recording, s.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def orbit_of(found: Observation, period: float | None, window: tuple[float, floa
     is_endless = found.held is OrbitClass.sticking
     if is_endless:
         speeds = found.impacts[:, 1]
-        found = replace(found, impacts=found.impacts[speeds > COMPARED * speeds.max(initial=0.0)])
+        found = replace(found, impacts=found.impacts[speeds > LEAST_SPEED * speeds.max(initial=0.0)])
     if not len(found.impacts):
         return "P(inf,1)" if is_endless else "no impacts"
     most = round((window[1] - window[0]) / period) // LEAST_TURNS
@@ -50,7 +50,7 @@ def orbit_of(found: Observation, period: float | None, window: tuple[float, floa
 
 
 def _repeats(found: Observation, length: float, period: float, window: tuple[float, float]) -> bool:
-    """Return whether all impacts are those one length before, but for those at the edges of the recording."""
+    """Return whether all impacts repeat after `length`, s, except at the edges of the recording."""
     rows, margin = found.impacts, REPEATS * period
     speed = float(np.abs(rows[:, 1]).max()) or 1.0
     early = rows[rows[:, 0] < window[1] - length - margin]

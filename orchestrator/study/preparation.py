@@ -1,4 +1,4 @@
-"""What is found out about a scene before it runs: how many modes it takes, and how large its errors are."""
+"""The preparation of a scene before it runs: its number of modes, and its estimated error."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.references import observed, reference_of
 from vibroimpact.orchestrator.study.swept_modes import SweepPlaces, modes_of_sweep
 
-TOLD = 3
-"""Points at which no number of modes meets a tolerance that are told; all of them are in the dataset."""
+MOST_NAMED = 3
+"""Most points that a note names where no number of modes meets the tolerance; the dataset has all of them."""
 
 
 def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
-    """Return a scene that is ready to run, with what was found out about it.
+    """Return a scene that is ready to run, with its number of modes and its estimated error.
 
-    A scene without `execution.tolerance` is ready as it is. Else `modes = "auto"` becomes the fewest modes that meet
-    it at points of the sweep (`swept_modes.modes_of_sweep`), and the error of what is recorded is estimated: that of
-    the number of modes at those points, where it was found here, and that of the solution (`references.reference_of`)
-    at the ends of the sweep and in its middle. All of this follows from the scene alone and is the same in every run,
-    on every machine; so a campaign that is resumed has the modes with which it began.
+    A scene without `execution.tolerance` stays as it is. With a tolerance, `modes = "auto"` becomes the fewest modes
+    that meet the tolerance at points of the sweep (`swept_modes.modes_of_sweep`). The estimated error adds two parts.
+    The error of the number of modes counts where that number was found here. The error of the solution
+    (`references.reference_of`) is estimated at the ends and in the middle of the sweep. The result depends only on the
+    scene, on every machine: a resumed campaign has the modes with which it began.
 
     Parameters
     ----------
     scene : Scene
     note : callable
-        Told what was found, a line at a time.
+        Receives the results, a line at a time.
 
     Returns
     -------
@@ -57,8 +57,8 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
         found = {**scene.found, "tolerance": tolerance, "estimated_error": math.nan, "estimated_error_of": of}
         return scene.model_copy(update={"found": found})
     errors = [_error_of_solution(point, run) for point, run in zip(points, ran, strict=True)]
-    told = [error for error in errors if not math.isnan(error)]
-    solution = max(told, default=math.nan)
+    known = [error for error in errors if not math.isnan(error)]
+    solution = max(known, default=math.nan)
     error = solution if truncation is None else float(truncation)
     if truncation is not None and not math.isnan(solution):
         error += solution
@@ -66,7 +66,9 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
         **scene.found,
         "tolerance": tolerance,
         "estimated_error": error,
-        "estimated_error_of": _what(len(points), int(scene.found.get("modes_checked_points", 0)), len(told)),
+        "estimated_error_of": _estimated_parts(
+            len(points), int(scene.found.get("modes_checked_points", 0)), len(known)
+        ),
     }
     if math.isnan(error):
         note("the motion is chaotic: no error of single impacts is estimated")
@@ -76,12 +78,12 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
 
 
 def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
-    """Return a scene with `modes = "auto"` replaced by the fewest that meet its tolerance; others as they are.
+    """Return a scene with `modes = "auto"` replaced by the fewest modes that meet its tolerance; others unchanged.
 
     Raises
     ------
     SceneError
-        No number of modes meets it.
+        No number of modes meets the tolerance.
     """
     tolerance = scene.execution.tolerance
     if tolerance is None or not _finds_modes(scene):
@@ -104,7 +106,7 @@ def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
     }
     if looked_at.unmet:
         found["modes_unmet_points"] = "; ".join(looked_at.unmet)
-        few, more = looked_at.unmet[:TOLD], len(looked_at.unmet) - TOLD
+        few, more = looked_at.unmet[:MOST_NAMED], len(looked_at.unmet) - MOST_NAMED
         note(
             f"no number of modes meets execution.tolerance = {tolerance:g} at {'; '.join(few)}"
             f"{f'; and {more} more' if more > 0 else ''}"
@@ -113,7 +115,7 @@ def with_found_modes(scene: Scene, note: Note = lambda text: None) -> Scene:
 
 
 def round_off(error: float) -> float | str:
-    """Return an error with three digits, as JSON has it.
+    """Return an error with three digits as a value for JSON.
 
     >>> round_off(0.00123456), round_off(float("inf"))
     (0.00123, 'another motion')
@@ -121,20 +123,20 @@ def round_off(error: float) -> float | str:
     return float(f"{error:.3g}") if math.isfinite(error) else "another motion"
 
 
-def _what(points: int, of_modes: int, told: int) -> str:
-    """Return what an error is estimated of, in words.
+def _estimated_parts(points: int, of_modes: int, regular: int) -> str:
+    """Return the parts of the estimated error, in words.
 
-    `points` counts those of the sweep at which the solution was looked at, `told` those whose motion is not chaotic.
-    `of_modes` counts those at which numbers of modes were compared; 0 where none were.
+    `points` is the number of points of the sweep with a solution, `regular` the number whose motion is not chaotic.
+    `of_modes` is the number of points at which numbers of modes were compared; 0 where there was no comparison.
     """
     parts = [
         *([f"the number of modes{_largest(of_modes)}"] if of_modes else []),
-        *([f"the solution of the motion{_largest(points)}"] if told else []),
+        *([f"the solution of the motion{_largest(points)}"] if regular else []),
     ]
-    chaotic = points - told
+    chaotic = points - regular
     left_out = (
         ""
-        if not chaotic or not told
+        if not chaotic or not regular
         else f"; of {chaotic}, which are chaotic, that of the solution means nothing"
     )
     return (" and ".join(parts) or f"nothing: the motion is chaotic{_largest(points)}") + left_out
@@ -149,12 +151,12 @@ def _finds_modes(scene: Scene) -> bool:
 
 
 def _error_of_solution(scene: Scene, run: Observation) -> float:
-    """Return the estimated error of how the motion of a scene is solved for; NaN where it is chaotic."""
+    """Return the estimated error of the solution of a scene's motion; NaN where the motion is chaotic."""
     reference = reference_of(scene)
     if reference.chaotic:
         return math.nan
     errors = errors_of(run, reference.observation, reference.scales)
-    told = [name for name, error in errors.of.items() if not math.isnan(error)]
-    if errors.failure or not told:
+    known = [name for name, error in errors.of.items() if not math.isnan(error)]
+    if errors.failure or not known:
         return math.inf
-    return max(errors.of[name] + reference.error.get(name, 0.0) for name in told)
+    return max(errors.of[name] + reference.error.get(name, 0.0) for name in known)

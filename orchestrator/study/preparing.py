@@ -1,6 +1,6 @@
-"""What is found out about a scene before a command runs it, for the scenes that ask for it.
+"""The preparation of a scene before a command runs it, imported only for scenes with a tolerance.
 
-Studies import half of scipy, which a scene without a tolerance starts without.
+Studies import half of scipy; a scene without a tolerance starts without that import.
 """
 
 from __future__ import annotations

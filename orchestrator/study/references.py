@@ -1,4 +1,4 @@
-"""What errors are measured against: the best that is known of a scene, and how far it may be off itself."""
+"""The reference of a scene, against which errors are measured, with its own error."""
 
 from __future__ import annotations
 
@@ -22,51 +22,51 @@ from vibroimpact.orchestrator.study.ways.span import first_part, window_of
 from vibroimpact.orchestrator.study.ways.way import opened_trial
 
 DISTURBANCE = 1e-9
-"""Relative change of a number of the scene by which the sensitivity of its motion is measured."""
+"""Relative change of a number of the scene that measures the sensitivity of its motion."""
 DISTURBED = (
     *("body.mass", "body.masses[1]", "body.mass_per_length", "body.stiffness", "body.frequency"),
     *("forcing.amplitude", "stop[1].position", "body.velocity_start", "body.displacement_start"),
 )
-"""Numbers that are disturbed, where a scene has them."""
+"""Keys of the numbers that are disturbed, where a scene has them."""
 CHAOTIC = 1e-3
-"""Relative change of the motion that so small a disturbance leads to, above which the motion is taken for chaotic."""
+"""Relative change of the motion by a change `DISTURBANCE` of a number, above which the motion counts as chaotic."""
 ROUNDING = float(np.finfo(float).eps)
 FINEST, NEXT = 1e-12, 1e-11
-"""Tolerances of contacts that are integrated: of the reference, and of the run that tells its error."""
+"""Tolerances of integrated contacts: of the reference, and of the run that estimates the reference's error."""
 SAME_MOTION = 1e-9
-"""Relative distance between a run and a motion in closed form below which the run has come to it."""
+"""Relative distance between a run and a closed form, below which the run has reached that motion."""
 FINEST_STEP = 1.0 / 16.0
-"""Macro step of the reference of a general scene, over that of the scene."""
+"""Macro step of the reference of a general scene, over the macro step of the scene."""
 SAFETY = 64.0
-"""What an estimated error is multiplied with, to be a bound in practice."""
+"""Safety factor on the estimated rounding error, which makes it a bound in practice."""
 
 CONTACT_SAFETY = 8.0
-"""Likewise the part of it that is the rounding of how deep a stop is pressed in."""
+"""Safety factor on the rounding of the depth by which a stop is pressed in."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What errors are measured against."""
+    """The reference against which errors are measured."""
 
     observation: Observation
     name: str
-    """Where it comes from, in words."""
+    """Origin of the reference, in words."""
     error: Mapping[str, float]
-    """By quantity, how far it may be off itself, relative."""
+    """Relative error of the reference itself, by quantity."""
     sensitivity: float
-    """Relative change of the motion over that of a number of the scene; NaN where none could be changed."""
+    """Relative change of the motion over the relative change of a number; NaN where no number could be changed."""
     chaotic: bool
-    """Whether nothing but statistics can be compared after the first impacts."""
+    """Whether only statistics can be compared after the first impacts."""
     scales: Scales
     best: Scene
-    """What was run for it."""
+    """The scene of the reference run."""
 
 
 def _finest_exchange(scene: Scene) -> Reference:
-    """Return the reference of a general scene: iterated exchange at macro steps below those that are compared.
+    """Return the reference of a general scene: iterated exchange at a macro step below all compared steps.
 
-    Its error is told by the run at twice its step, and by the order that this and the one at four times show; whether
-    the motion is chaotic by runs at the scene's own step.
+    Runs at twice and four times this step give the error of the reference: the first its size, both its order. Runs at
+    the scene's own step decide whether the motion is chaotic.
     """
     scales, own, best = scales_of(scene), scene.macro_step, best_of(scene)
     steps = [{"execution.macro_step": own * FINEST_STEP * part} for part in (4.0, 2.0)]
@@ -84,7 +84,7 @@ def _finest_exchange(scene: Scene) -> Reference:
 
 
 def best_of(scene: Scene) -> Scene:
-    """Return a scene as its reference runs: fused, with the finest tolerance of contacts, or the finest exchange."""
+    """Return the scene of the reference run: fused, with the finest tolerance of contacts, or the finest exchange."""
     if not scene.is_one_body:
         step = scene.macro_step * FINEST_STEP
         return scene.with_values({"execution.macro_step": step, "execution.exchange": "iterated"})
@@ -97,7 +97,7 @@ def best_of(scene: Scene) -> Scene:
 
 
 def sensitivity_of(scene: Scene, scales: Scales) -> float:
-    """Return the relative change of a motion over that of a number of its scene, the largest; NaN without a number."""
+    """Return the largest relative change of a motion over the change of a number; NaN without such a number."""
     base = observed(scene)
     changes = [errors_of(observed(_disturbed(scene, key)), base, scales) for key in disturbed_keys(scene)]
     if any(change.failure for change in changes):
@@ -106,7 +106,7 @@ def sensitivity_of(scene: Scene, scales: Scales) -> float:
 
 
 def scales_of(scene: Scene, part: float = 1.0) -> Scales:
-    """Return what errors of a scene are relative to, of the first part of its time where no other is meant."""
+    """Return the scales of the errors of a scene over the first part of its time, by default over all of it."""
     if not scene.is_lone_body:
         scene = first_part(scene, part)
     if not scene.is_one_body:
@@ -154,10 +154,10 @@ def reference_of(scene: Scene) -> Reference:
 
 
 def _shallowness(scene: Scene, observation: Observation) -> float:
-    """Return the position of a Kelvin-Voigt stop over how deep it is pressed in, the largest; 0 without one.
+    """Return the largest ratio of position to depth of the Kelvin-Voigt stops; 0 without such a stop.
 
-    The depth is the difference of two displacements of the size of the position, and its rounding is an error of the
-    velocity after the contact of sqrt(stiffness / mass) times that, whatever the velocity.
+    The depth is the difference of two displacements of the size of the position. The rounding of the depth, times
+    sqrt(stiffness / mass), is an error of the velocity after the contact, at any velocity.
     """
     if not len(observation.impacts):
         return 0.0
@@ -171,7 +171,7 @@ def _shallowness(scene: Scene, observation: Observation) -> float:
 
 
 def observed(scene: Scene) -> Observation:
-    """Return what a run of a scene by its own runner shows."""
+    """Return the observation of a scene's run by its own runner."""
     trial = opened_trial(scene)
     try:
         return trial.run()
@@ -180,9 +180,9 @@ def observed(scene: Scene) -> Observation:
 
 
 def disturbed_keys(scene: Scene) -> list[str]:
-    """Return numbers of a scene on which its motion depends, by their keys: of the body first.
+    """Return the keys of numbers on which the motion of a scene depends, those of the body first.
 
-    A body's own number changes more than the scale of the motion, which is all that the force does to a stop at 0.
+    The force comes later: with a stop at 0 it changes only the scale of the motion; a number of the body changes more.
     """
     found: list[str] = []
     if not scene.is_one_body:
@@ -206,13 +206,13 @@ def _disturbed_parameters(scene: Scene) -> list[str]:
 
 
 def disturbed_scenes(scene: Scene, count: int) -> list[Scene]:
-    """Return scenes of which one number is slightly different; none where there is no such number."""
+    """Return scenes that differ slightly in one number; none where the scene has no such number."""
     keys = disturbed_keys(scene)
     return [_disturbed(scene, key, k) for key in keys[:1] for k in range(1, count + 1)]
 
 
 def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
-    """Return a scene with one number slightly larger, or smaller where a body that starts on its stop forbids that."""
+    """Return a scene with one number slightly larger, or smaller where a body starting on its stop forbids larger."""
     number, change = scene.value(key), times * DISTURBANCE
     if not scene.is_one_body:
         return scene.at({key: number * (1.0 + change)})
@@ -223,7 +223,7 @@ def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
 
 
 def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Observation | None:
-    """Return the observation with the impacts of the P(1,1) motion in closed form, where that is what it does."""
+    """Return the observation with impacts from the closed form of P(1,1); None where the motion is another one."""
     if scene.period is None or len(observation.impacts) < 2 or scene.forcing is None:
         return None
     if not all_rigid(scene.stops):

@@ -1,4 +1,4 @@
-"""Statistics of chaotic motion: what two runs of it have in common when no impact of theirs does."""
+"""Statistics of chaotic motion, which two runs share although their impacts differ one by one."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from numpy.typing import NDArray
 from vibroimpact.orchestrator.study.observation import Observation
 
 LEAST_IMPACTS = 20
-"""Impacts below which there are no statistics."""
+"""Number of impacts (or samples) of a run, below which no statistics are compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """How far the statistics of a run are from those of the reference, and how far chance alone takes them."""
+    """Distance between the statistics of a run and of the reference, with the sampling error of that distance."""
 
     mean_interval_error: float
     """Relative difference of the mean interval between impacts."""
     mean_interval_sampling: float
-    """The largest among runs of the reference."""
+    """Largest such difference among runs of the reference."""
     distribution_distance: float
-    """Distance between the distributions of impact velocity (Kolmogorov-Smirnov); where no impacts are known, of what
-    is sampled, the largest.
+    """Kolmogorov-Smirnov distance between the distributions of impact velocity; without known impacts, the largest of
+    the sampled variables.
     """
     distribution_sampling: float
-    """Likewise the largest among runs of the reference."""
+    """Largest such distance among runs of the reference."""
 
 
 def statistics_of(
     found: Observation, reference: Observation, replicates: Sequence[Observation]
 ) -> Statistics | None:
-    """Compare a run of chaotic motion with the reference; None where there are too few impacts.
+    """Return the statistics of a chaotic run against the reference; None with fewer than `LEAST_IMPACTS`.
 
     Replicates are further runs of the reference, from slightly different numbers.
     """
-    apart, told = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
-    if min(told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
+    apart, count_of = (_off, _impacts) if len(reference.impacts) else (_off_samples, _samples)
+    if min(count_of(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
         return None
     interval, distance = apart(found, reference)
     by_chance = [apart(one, reference) for one in replicates]

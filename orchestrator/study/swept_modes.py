@@ -1,4 +1,4 @@
-"""How many modes a whole sweep takes: the ends of it decide, and points between them that need more."""
+"""The number of modes that a whole sweep needs: its ends decide, and points between them that need more modes."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from vibroimpact.orchestrator.scene.sweep import Dimension, dimensions
 from vibroimpact.orchestrator.study.convergence import Convergence, ModeRuns, Note, converged_modes
 
 MOST_ENDS = 16
-"""Combinations of the ends of all dimensions that are looked at; of more, the two opposite ones."""
+"""Number of combinations of the ends of all dimensions, up to which all run; above, two opposite ones run."""
 ALL_CHECKED = 64
-"""Points of a sweep up to which each of them is looked at."""
+"""Number of points of a sweep, up to which all of them run; above, a sample of them runs."""
 PROBED = 32
-"""Inner points of a larger sweep, from a Sobol sequence: the same for a scene on every machine."""
+"""Number of inner points of a larger sweep that run, from a Sobol sequence: the same on every machine."""
 SEED = 0
-"""Of that sequence."""
+"""Seed of the Sobol sequence."""
 REFINED = 32
-"""Further points at most, between those where errors are large."""
+"""Largest number of further points, between points where errors are large."""
 
 Place = tuple[int, ...]
-"""Of a point in a sweep: an index for each dimension."""
+"""Place of a point in a sweep: an index for each dimension."""
 
 
 class SweepPlaces:
-    """The points of a sweep at which a scene is looked at before it runs.
+    """The points of a sweep at which a scene is tried before it runs.
 
-    Which of its recordings is replayed makes no other point. Of adaptive axes there are their start values.
+    All recordings of a replay share one point. An adaptive axis has its start values.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -44,7 +44,7 @@ class SweepPlaces:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of points of the sweep."""
         return math.prod(self.shape)
 
     def values_at(self, place: Place) -> dict[str, float]:
@@ -58,7 +58,7 @@ class SweepPlaces:
         return self._alone.with_values(values) if values else self._alone
 
     def ends(self) -> list[Place]:
-        """Return the places where each dimension is at an end of its values, and the one in the middle."""
+        """Return the places where each dimension is at an end of its values, and the place in the middle."""
         ends = [_ends_of(members) for members in self._dimensions]
         many = math.prod(map(len, ends)) > MOST_ENDS
         corners = [tuple(end[0] for end in ends), tuple(end[1 % len(end)] for end in ends)]
@@ -66,17 +66,17 @@ class SweepPlaces:
         return list(dict.fromkeys([*places, tuple(map(_middle_of, self._dimensions))]))
 
     def inner(self) -> Iterator[Place]:
-        """Return further places: all, where there are few, else those of a Sobol sequence."""
+        """Return further places: all places of a small sweep, else the places of a Sobol sequence."""
         if self.count <= ALL_CHECKED:
             return product(*map(range, self.shape))
         shares = unit_design("sobol", PROBED, len(self.shape), SEED)
         return (tuple(int(u * n) for u, n in zip(row, self.shape, strict=True)) for row in shares)
 
     def halfway(self, errors: Mapping[Place, float]) -> Place | None:
-        """Return the place halfway between two that are known where most may be missed; None where none is left.
+        """Return the place halfway between the two known neighbours with the largest score; None where none is left.
 
-        Between two neighbours (no other place is in the ball of which they span a diameter) that is taken to be the
-        larger of their errors times their distance. An error is NaN where a place says nothing.
+        Two places are neighbours if the ball with both on its diameter contains no other place. Their score is the
+        larger of their errors times their distance. An error is NaN where a place has no result.
         """
         known = np.array(list(errors))
         size = np.nan_to_num(np.array(list(errors.values())))
@@ -96,7 +96,7 @@ class SweepPlaces:
 
 
 def _ends_of(members: Dimension) -> list[int]:
-    """Return where the values of a dimension are lowest and highest, of each of its keys."""
+    """Return the indices of the lowest and the highest value of each key of a dimension."""
     ends = []
     for axis in members:
         indices = range(len(axis.values))
@@ -111,24 +111,24 @@ def _middle_of(members: Dimension) -> int:
 
 @dataclass(frozen=True, slots=True)
 class SweepModes:
-    """How many modes a sweep takes."""
+    """The number of modes that a sweep needs."""
 
     convergence: Convergence
-    """Its error is the largest of all points that were looked at."""
+    """Result for the whole sweep; its error is the largest of all tried points."""
     points: int
-    """How many were looked at."""
+    """Number of tried points."""
     unmet: tuple[str, ...]
-    """Points between the ends at which no number of modes meets the tolerance, by their values."""
+    """Points between the ends where no number of modes meets the tolerance, as words with their values."""
 
 
 def modes_of_sweep(scene: Scene, tolerance: float, note: Note = lambda text: None) -> SweepModes:
-    """Return the fewest modes that meet a tolerance at the points of a sweep that are looked at.
+    """Return the fewest modes that meet a tolerance at the tried points of a sweep.
 
-    The ends and the middle decide first. Further points are then run with the number found and with the most that it
-    was compared with: all others where there are few, else 32 of a Sobol sequence and up to 32 between those where
-    errors are large. A point that differs by more than the tolerance decides from then on. `note` is told of each run
-    that takes longer than a second. The scene has `modes = "auto"`. SceneError: no number of modes meets the tolerance
-    at an end, or in the middle.
+    The ends and the middle decide first. Further points then run with the number found and with the largest number of
+    its comparison. A small sweep tries all points; a larger one tries 32 points of a Sobol sequence and up to 32 more
+    where errors are large. A point that differs by more than the tolerance decides from then on. `note` gets a line
+    for each run longer than a second. The scene has `modes = "auto"`. SceneError: no number of modes meets the
+    tolerance at an end, or in the middle.
     """
     search = _Search(SweepPlaces(scene), tolerance, note)
     for place in search.places.inner():
@@ -142,7 +142,7 @@ def modes_of_sweep(scene: Scene, tolerance: float, note: Note = lambda text: Non
 
 
 class _Search:
-    """Points that were looked at, and the fewest modes that they take so far."""
+    """Points that were tried, and the fewest modes that they need so far."""
 
     def __init__(self, places: SweepPlaces, tolerance: float, note: Note) -> None:
         self.places, self._tolerance, self._note = places, tolerance, note
@@ -163,7 +163,7 @@ class _Search:
         return ", ".join(f"{key} = {value:.6g}" for key, value in self.places.values_at(place).items())
 
     def look_at(self, place: Place) -> float:
-        """Return how far the number found is from more modes at a place, which decides if that is too far.
+        """Return the distance of the number found from more modes at a place, which decides if that is too large.
 
         NaN where no number of modes meets the tolerance, or the scene does not run.
         """
@@ -186,11 +186,11 @@ class _Search:
 
     def errors(self) -> dict[Place, float]:
         """Return the error at each place where a number of modes meets the tolerance."""
-        told = {place: self.look_at(place) for place in list(self.runs)}
-        return {place: error for place, error in told.items() if not math.isnan(error)}
+        distances = {place: self.look_at(place) for place in list(self.runs)}
+        return {place: error for place, error in distances.items() if not math.isnan(error)}
 
     def refine(self) -> None:
-        """Look at places between those that are known, where errors are large and neighbours far."""
+        """Try places between known neighbours, where errors are large and neighbours are far apart."""
         for _ in range(REFINED):
             place = self.places.halfway(self.errors() | dict.fromkeys(self.unmet, math.nan))
             if place is None:
@@ -198,7 +198,7 @@ class _Search:
             self.look_at(place)
 
     def settle(self) -> None:
-        """Look at all places again until the number of modes does for each of them."""
+        """Try all places again until the number of modes meets the tolerance at each of them."""
         before = None
         while self.found is not before:
             before = self.found

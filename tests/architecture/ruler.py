@@ -1,7 +1,7 @@
-"""The ruler: how large the code is, how often it says the same thing, and how much of it a use runs.
+"""The ruler: the size of the code, its repetitions, and the share of it that a use runs.
 
-`PYTHONPATH=tests python -m architecture.ruler` prints the table, `--write` lowers the ceilings of `ruler.toml`;
-`test_ruler` holds them, and the names that are gone for good.
+`PYTHONPATH=tests python -m architecture.ruler` prints the table, `--write` lowers the ceilings of `ruler.toml`.
+`test_ruler` checks the ceilings, and the names that are gone for good.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from support.places import ROOT
 
 KEPT = Path(__file__).with_name("ruler.toml")
 MAY_LAG = 0.01
-"""Share of a ceiling by which a figure may be below it."""
+"""Distance of a figure below its ceiling, relative, above which the ceiling has to follow."""
 STAYING = ("median", "p90")
-"""Ends of the names of figures whose ceilings stay: they may rise by a tenth in all."""
+"""Ends of the names of figures with fixed ceilings: together these may rise by a tenth."""
 LONG = 500
 """Lines above which a module counts as long."""
 BODIES = {"OscillatorBody", "ChainBody", "BeamBody"}
@@ -31,7 +31,7 @@ STOPS = {"RestitutionStop", "KelvinVoigtStop", "HertzStop", "HuntCrossleyStop"}
 SCENE = ("orchestrator", "scene")
 STARTING_MODULES = {"subprocess", "multiprocessing"}
 STARTING_ATTRIBUTES = {"fork", "posix_spawn", "executable"}
-"""What starts another process: a module that is imported, or an attribute of `os` or `sys`."""
+"""Starters of processes: a module that is imported, or an attribute of `os` or `sys`."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 COUNTED = (
     *(ast.FunctionDef, ast.AsyncFunctionDef, ast.Expr, ast.Call, ast.MatchClass),
@@ -50,12 +50,12 @@ def modules() -> dict[Path, str]:
 
 @cache
 def nodes_of(path: Path) -> tuple[ast.AST, ...]:
-    """Return the nodes of a module that are counted."""
+    """Return the nodes of a module of the counted kinds."""
     return tuple(node for node in ast.walk(ast.parse(modules()[path])) if isinstance(node, COUNTED))
 
 
 def nodes() -> Iterator[ast.AST]:
-    """Yield each node of the package that is counted."""
+    """Yield each node of the package of the counted kinds."""
     for path in modules():
         yield from nodes_of(path)
 
@@ -95,7 +95,7 @@ def lengths_of_functions() -> list[int]:
 
 
 def questions_of_class(names: set[str]) -> int:
-    """Return how often an object is asked whether it is of one of these classes, by isinstance or a case."""
+    """Return the number of isinstance calls and match cases that test for one of these classes."""
     return sum(_asks(node, names) for node in nodes())
 
 
@@ -106,7 +106,7 @@ def _asks(node: ast.AST, names: set[str]) -> bool:
 
 
 def starters() -> list[Path]:
-    """Return the modules that start processes, or name the interpreter to others that do."""
+    """Return the modules that start processes, or pass the interpreter's path on for that purpose."""
     return [path for path in modules() if any(map(_starts, nodes_of(path)))]
 
 
@@ -130,7 +130,7 @@ def places_of(name: str) -> list[str]:
 
 
 def figures_of_text() -> dict[str, float]:
-    """Return what is counted in the text of the code."""
+    """Return the figures from the text of the code."""
     files, functions = list(map(lines_of, modules())), lengths_of_functions()
     scene = [lines_of(path) for path in modules() if path.parts[:2] == SCENE]
     return {
@@ -152,7 +152,7 @@ def figures_of_text() -> dict[str, float]:
 
 
 def figures_of_uses() -> dict[str, float]:
-    """Return how many functions of the package each use runs, and of how many files."""
+    """Return the numbers of functions and files of the package that each use runs."""
     counts = counts_of_uses()
     return {
         f"{what}, {use}": count
@@ -167,7 +167,7 @@ def kept() -> Mapping[str, Any]:
 
 
 def behind(figures: Mapping[str, float], ceilings: Mapping[str, float]) -> dict[str, float]:
-    """Return the figures that are so far below their ceilings that these have to follow."""
+    """Return the figures so far below their ceilings that the ceilings have to follow."""
     return {
         name: figure
         for name, figure in figures.items()
@@ -176,14 +176,14 @@ def behind(figures: Mapping[str, float], ceilings: Mapping[str, float]) -> dict[
 
 
 def with_ceilings(text: str, figures: Mapping[str, float]) -> str:
-    """Return the text of the kept file with figures in the place of their ceilings."""
+    """Return the text of the ceilings' file with the figures as new ceilings."""
     for name, figure in figures.items():
         text = re.sub(rf'^"{re.escape(name)}" = \S+', f'"{name}" = {figure:g}', text, flags=re.MULTILINE)
     return text
 
 
 def main() -> None:
-    """Print the table beside the ceilings; with `--write` lower these."""
+    """Print the table next to the ceilings; with `--write` lower the ceilings."""
     figures, ceilings = figures_of_text() | figures_of_uses(), kept()["ceilings"]
     for name, figure in figures.items():
         print(f"{name:48s} {figure:8g}   ceiling {ceilings[name]:8g}")

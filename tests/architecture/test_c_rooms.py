@@ -1,4 +1,4 @@
-"""The C core: modules without a circle, folders that look down only, by what they include and what they call."""
+"""The C core: modules without a circle, and folders that only look down, by their includes and calls."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path, PurePosixPath
 
 CORE = Path(__file__).parents[2] / "fmus" / "native" / "core"
-#: Folders from the ground up; those of one floor do not know each other.
+#: Folders from the ground up; folders of one floor are independent of each other.
 FLOORS = (
     (".",),
     ("motion",),
@@ -39,12 +39,12 @@ HOMES = {
 
 
 def module(name: str) -> str:
-    """Return what a C file and its header are together: `motion/flow`."""
+    """Return the module of a C file or a header, without suffix: `motion/flow`."""
     return str(PurePosixPath(name).with_suffix(""))
 
 
 def needed() -> dict[str, set[str]]:
-    """Return for each module those whose header it includes or whose functions it calls."""
+    """Return for each module the modules whose header it includes or whose functions it calls."""
     graph: dict[str, set[str]] = {module(name): set() for name in FILES}
     for name, text in FILES.items():
         calls = {HOMES[function] for function in NAMED.findall(text) if function in HOMES}

@@ -1,4 +1,4 @@
-"""Each contact law is said once: no C file but that of the table names one, and scenes have those of the table."""
+"""Each contact law is named once: only the C file of the table names one, and scenes have the laws of the table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import STOP_MODELS
 
 TABLE = ("core/contact/contact_law.c", "core/contact/contact_law.h")
-#: Words for a law that are words for nothing else in the C: constants, names, and its number beside a sign.
+#: Names of laws that mean nothing else in the C: constants, names, and a number next to a comparison sign.
 CONSTANT, NUMBER = re.compile(r"\bVI_LAW_[A-Z_]+\b(?<!_H)"), re.compile(r"\blaw *(?:[=!<>]=?) *[0-9]")
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 

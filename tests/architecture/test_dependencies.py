@@ -1,4 +1,4 @@
-"""What pyproject.toml asks for has two bounds, a reason beside them, and no version with a hole that is known."""
+"""The requirements of pyproject.toml have two bounds, a reason next to them, and no version with a known hole."""
 
 import json
 import re
@@ -14,15 +14,15 @@ from support.places import ROOT
 
 OWN = "vibroimpact"
 LAST_WITH_A_HOLE = {"starlette": "0.49.0", "h11": "0.15.0", "fastapi": "0.120.0", "cryptography": "44.0.0"}
-"""The last version with a known hole, or that keeps another package at such a version."""
+"""The last version of a package with a known hole, or with a requirement of such a version of another package."""
 
 
 OF_DEVELOPERS = ("bench", "peers", "lint", "docs", "dev", "audit")
-"""Extras that nobody installs who uses the package; one reason stands above all of them."""
+"""Extras that no user of the package installs; one reason stands above all of them."""
 
 
 def requirements() -> Iterator[Requirement]:
-    """Yield every requirement of pyproject.toml on packages of others."""
+    """Yield every requirement of pyproject.toml, except for the package itself."""
     document = tomllib.loads((ROOT / "pyproject.toml").read_text())
     project = document["project"]
     lists = [document["build-system"]["requires"], project["dependencies"]]
@@ -104,7 +104,7 @@ def test_a_hole_fails_and_a_database_out_of_reach_is_said_and_does_not(
     answer = subprocess.CompletedProcess([], expected, stdout=out, stderr=said)
     monkeypatch.setattr(audit.subprocess, "run", lambda *_, **__: answer)
     assert audit.audited("the lowest versions") == expected
-    told = capsys.readouterr()
+    output = capsys.readouterr()
     answered = any("vulns" in one for one in dependencies or [])
-    assert ("could not be reached" in told.err) == (not answered and not expected)
-    assert ("CVE-2025-43859" in told.out) == bool(expected and dependencies)
+    assert ("could not be reached" in output.err) == (not answered and not expected)
+    assert ("CVE-2025-43859" in output.out) == bool(expected and dependencies)

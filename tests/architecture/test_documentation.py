@@ -1,4 +1,4 @@
-"""Pages lead to each other, and their lines can be read: no link into nowhere, no page that nobody finds."""
+"""Links of pages and their lines: no link leads nowhere, every page is linked, and no line is too long."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def test_the_version_is_told_alike_by_the_changelog_the_citation_and_the_form_fo
         "CITATION.cff": r"^version: (\S+)",
         ".github/ISSUE_TEMPLATE/bug.yml": r"vibroimpact (\d[^\s,]*)",
     }
-    told = {
+    stated = {
         name: re.findall(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)[0]
         for name, pattern in places.items()
     }
-    assert told == dict.fromkeys(places, project["version"])
+    assert stated == dict.fromkeys(places, project["version"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import import_drawing
 import pytest
-from harness.kept_costs import DEAR_FIXTURE, dear_tests
+from harness.kept_costs import EXPENSIVE_FIXTURE, expensive_tests
 from support.places import ROOT
 
 PACKAGES = import_drawing.LAYERS
@@ -51,7 +51,7 @@ def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> No
     [
         # a fork of a process with threads may hang: the supervisor of guarded points forks
         ("vibroimpact.orchestrator.guard.supervisor", ("numpy", "pydantic", "vibroimpact.analysis")),
-        # half a second for each process that an FMU has taken down
+        # half a second for each process that an FMU has ended
         ("vibroimpact.orchestrator.guard.child", ("xarray", "pandas", "scipy")),
         # a tenth of a second that a run without workers does not need
         ("vibroimpact.orchestrator.running.whole", ("dask", "distributed")),
@@ -79,13 +79,13 @@ def test_what_opens_or_takes_datasets_lets_them_know_their_runs(imported_first: 
 
 
 def test_every_benchmark_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing else of the tests runs them: a name that has moved would be found by the next person who measures."""
+    """No other test runs the benchmarks: without this test, only a benchmark's next user would see a moved name."""
     folder = ROOT / "tests" / "benchmarks"
     monkeypatch.setattr(sys, "path", [str(folder), *sys.path])
     benchmarks = sorted(folder.glob("bench_*.py"))
     assert len(benchmarks) > 10
     for benchmark in benchmarks:
-        # in this process, which has loaded most of what they need
+        # in this process, which has already loaded most of their imports
         runpy.run_path(str(benchmark), run_name=benchmark.stem)
 
 
@@ -104,8 +104,10 @@ def test_every_room_has_a_folder_of_tests_of_which_make_fast_runs_some() -> None
 
 
 def has_quick_tests(path: Path) -> bool:
-    """Return whether a module has a test that `make fast` runs if it finds no other in the room."""
+    """Return whether a module has a test that `make fast` runs when it is the only one of the room."""
     name = path.relative_to(ROOT).as_posix()
     functions = re.findall(r"^def (test\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
-    dear = {one.partition("[")[0] for one, took in dear_tests().items() if took >= DEAR_FIXTURE}
-    return any(f"{name}::{function}" not in dear for function in functions)
+    expensive = {
+        one.partition("[")[0] for one, took in expensive_tests().items() if took >= EXPENSIVE_FIXTURE
+    }
+    return any(f"{name}::{function}" not in expensive for function in functions)

@@ -1,4 +1,4 @@
-"""What `make` offers is what it says it does."""
+"""The targets of `make` do what their help says."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import subprocess
 import sys
 
 import pytest
-from harness.kept_costs import dear_tests
+from harness.kept_costs import expensive_tests
 from support.places import ROOT
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
 
 
 def make(*arguments: str) -> subprocess.CompletedProcess[str]:
-    # the make that runs these tests hands down what it was given
+    # the make that runs these tests passes its own variables on
     theirs = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "MAKELEVEL", "PYTHON", "VENV", "INSTALL")
     environment = {name: value for name, value in os.environ.items() if name not in theirs}
     return subprocess.run(
@@ -69,7 +69,7 @@ def test_the_fast_tests_say_what_they_leave_out() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
     collected = set(result.stdout.splitlines())
     assert "tests/architecture/test_c_rooms.py::test_folders_of_the_core_look_down_only" in collected
-    assert not collected & dear_tests().keys()
+    assert not collected & expensive_tests().keys()
     assert re.search(
         r"^\d+ dear or long tests, and tests/conformance, tests/documentation, tests/end_to_end, .*tests/soak$",
         result.stdout,

@@ -1,4 +1,4 @@
-"""What a message tells a person to type, a command takes."""
+"""Commands accept all options and arguments that messages tell a user to type."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def options_of(command: Any) -> Iterator[str]:
 
 
 def arguments_in(text: str) -> Iterator[Argument]:
-    """Yield the arguments that the messages of a module name in so many words."""
+    """Yield the arguments that the messages of a module name literally."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Argument":
             words = [each.value if isinstance(each, ast.Constant) else "1" for each in node.args]

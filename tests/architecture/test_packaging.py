@@ -1,4 +1,4 @@
-"""The wheel made from the sdist holds everything, and works where nothing else of the project is."""
+"""The wheel made from the sdist is complete, and works without the rest of the project."""
 
 import os
 import shutil
@@ -79,7 +79,7 @@ def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: 
 
 @pytest.mark.parametrize("name", [pytest.param("Oscillator", marks=pytest.mark.long), "Gain"])
 def test_a_library_compiled_twice_in_different_places_has_the_same_bytes(name: str, tmp_path: Path) -> None:
-    # files that are optimized together, and files that are not
+    # one set of files that are optimized together, and one set of others
     elsewhere = tmp_path / "native"
     shutil.copytree(NATIVE, elsewhere)
     (component,) = (each for each in read_components(elsewhere) if each.name == name)
@@ -92,10 +92,10 @@ def test_the_wheel_works_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> 
     environment = tmp_path / "venv"
     venv.create(environment)
     python = str(environment / ("Scripts" if sys.platform == "win32" else "bin") / "python")
-    # the pip of these tests: to give the environment its own takes longer than all else here
+    # the pip of these tests: a pip of the environment's own would take longer than all else here
     pip = (sys.executable, "-m", "pip", "--python", python)
     run(*pip, "install", "--quiet", "--no-index", "--no-deps", str(wheel), cwd=tmp_path)
-    # finding the FMUs takes the standard library only, so the other dependencies need not be there
+    # finding the FMUs takes only the standard library, so the other dependencies may be missing
     code = (
         "from vibroimpact.fmus import components, fmu_path; "
         "print(*(fmu_path(name, version) for name in components() for version in ('3.0', '2.0')))"

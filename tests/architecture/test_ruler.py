@@ -1,4 +1,4 @@
-"""The code grows neither in size nor in what a use of it runs: `ruler.toml` has the ceilings, which only fall."""
+"""Neither the size of the code nor the part that a use runs grows: `ruler.toml` has the ceilings, which only fall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One module writes to the terminal, so that no text of a file gets there as it is."""
+"""One module writes to the terminal, and escapes the texts of files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 from support.places import ROOT
 
-# Run as a script of its own, before the command line is there.
+# Modules that run as scripts of their own, before the command line exists.
 SCRIPTS = ("fmus/packaging/build.py",)
 WRITES = re.compile(
     r"typer\.(?:echo|secho)\(|\bConsole\(|^\s*print\((?!printable\()|sys\.std(?:out|err)\.write", re.MULTILINE

@@ -1,4 +1,4 @@
-"""Commands and names of `vi` load a heavy package only where they compute with it."""
+"""Commands and names of `vi` load a heavy package only if they compute with it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import vibroimpact as vi
 PACKAGES = ("analysis", "door", "fmus", "hardware", "orchestrator", "service")
 
 BASIS = ("numpy", "pandas", "xarray", "netCDF4")
-"""Packages that most commands need. Those of `LIGHT` do without; for the others they are loaded once, beforehand."""
+"""Packages that most commands need. Commands of `LIGHT` do not; for the others they are loaded once, beforehand."""
 HEAVY = (
     "dask",
     "distributed",
@@ -35,7 +35,7 @@ HEAVY = (
     "uvicorn",
 )
 WHEN_USED = ("pint", "scipy")
-"""Packages that are imported by the functions that compute with them, and by no module."""
+"""Packages that are imported only inside the functions that compute with them."""
 SCENE = """
 [body]
 mass = 1.0
@@ -63,9 +63,9 @@ sample = { design = "saltelli", points = 8, seed = 2 }
 "body.damping_ratio" = { distribution = "uniform", low = 0.05, high = 0.1 }
 """
 NOWHERE = "http://127.0.0.1:1"
-"""Address at which no service is."""
-ASKED = "dask pint scipy"
-"""Packages that xarray imports when it computes, to know whether an array is one of theirs; `dask.array` has scipy."""
+"""Address without a service."""
+RECOGNIZED = "dask pint scipy"
+"""Packages that xarray imports to recognize an array of theirs when it computes; `dask.array` loads scipy."""
 Rows = dict[str, tuple[str, int]]
 LIGHT: Rows = {
     "--help": ("", 0),
@@ -79,7 +79,7 @@ LIGHT: Rows = {
     f"fetch 0123456789abcdef0123456789abcdef -o fetched.nc --service {NOWHERE} --data served": ("httpx", 1),
     f"cancel 0123456789abcdef0123456789abcdef --service {NOWHERE} --data served": ("httpx", 1),
 }
-"""Commands that need no datasets, with what they may load of `BASIS` and `HEAVY`, and their exit code."""
+"""Commands that need no datasets, with the packages of `BASIS` and `HEAVY` that they may load, and their exit code."""
 OTHERS: Rows = {
     "check scene.toml": ("", 0),
     "run scene.toml -o run.nc": ("", 0),
@@ -97,26 +97,26 @@ OTHERS: Rows = {
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
     # the names of connections are labels
-    "run two_oscillators.toml -o two.nc": (f"{ASKED} fmpy", 0),
-    "sensitivity drawn.nc": (ASKED, 0),
-    "hard-cases --only grazing-from-below": (ASKED, 0),
-    "import signal.csv --rate 100 --unit m -o signal.nc": (ASKED, 0),
-    "estimate decay signal.nc": (ASKED, 0),
-    "estimate impacts run.nc --angular-frequency 0.9 --channel displacement": (ASKED, 0),
-    "estimate bounces signal.nc": (ASKED, 1),
-    "estimate response signal.nc --drive absent": (ASKED, 2),
-    "spikes signal.nc": (ASKED, 0),
-    "fmu replay signal.nc -o signal.fmu": (ASKED, 0),
-    "lyapunov swept.nc": (ASKED, 0),
-    "energies swept.nc": (ASKED, 0),
-    "resonances swept.nc": (ASKED, 2),
-    "basins scene.toml --points 5": (ASKED, 0),
-    "transients scene.toml --starts 1": (ASKED, 0),
-    # xarray asks which scheduler of Dask there is when it writes
-    "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{ASKED} distributed", 0),
+    "run two_oscillators.toml -o two.nc": (f"{RECOGNIZED} fmpy", 0),
+    "sensitivity drawn.nc": (RECOGNIZED, 0),
+    "hard-cases --only grazing-from-below": (RECOGNIZED, 0),
+    "import signal.csv --rate 100 --unit m -o signal.nc": (RECOGNIZED, 0),
+    "estimate decay signal.nc": (RECOGNIZED, 0),
+    "estimate impacts run.nc --angular-frequency 0.9 --channel displacement": (RECOGNIZED, 0),
+    "estimate bounces signal.nc": (RECOGNIZED, 1),
+    "estimate response signal.nc --drive absent": (RECOGNIZED, 2),
+    "spikes signal.nc": (RECOGNIZED, 0),
+    "fmu replay signal.nc -o signal.fmu": (RECOGNIZED, 0),
+    "lyapunov swept.nc": (RECOGNIZED, 0),
+    "energies swept.nc": (RECOGNIZED, 0),
+    "resonances swept.nc": (RECOGNIZED, 2),
+    "basins scene.toml --points 5": (RECOGNIZED, 0),
+    "transients scene.toml --starts 1": (RECOGNIZED, 0),
+    # xarray looks for a scheduler of Dask when it writes
+    "maps --kind square-root --points 20 --from 0.1 --to 0.2 -o map.nc": (f"{RECOGNIZED} distributed", 0),
     "plot swept.nc -o swept.png": ("dask matplotlib", 0),
     "campaign swept.toml -o few": ("", 0),
-    # no workers answer there: what is loaded is what a client needs
+    # no worker answers there: only the client's own needs are loaded
     "campaign swept.toml -o campaign --scheduler tcp://127.0.0.1:1": ("dask distributed", 2),
     "demo -o scene.toml": ("dask distributed matplotlib", 2),
     "rig devices --rig virtual:oscillator.toml": ("grpc nidaqmx", 0),
@@ -131,17 +131,17 @@ OTHERS: Rows = {
     ),
     "rig recover absent.journal": ("grpc nidaqmx", 2),
     "rig sine --output Dev1/ao0 --frequency 5 --amplitude 99": ("grpc nidaqmx", 2),
-    "rig sweep sweep.toml -o rig_sweep --dry-run": (f"{ASKED} grpc matplotlib nidaqmx", 0),
+    "rig sweep sweep.toml -o rig_sweep --dry-run": (f"{RECOGNIZED} grpc matplotlib nidaqmx", 0),
     "serve --data served --host 192.0.2.1": ("dask distributed fastapi fmpy matplotlib uvicorn", 2),
 }
-"""All other commands, with what they may load of `HEAVY`, and their exit code."""
+"""All other commands, with the packages of `HEAVY` that they may load, and their exit code."""
 NAMES = {
     "figures": "matplotlib",
     "draw": "matplotlib",
     **dict.fromkeys(("export_fmu", "export_ssp", "import_ssp"), "fmpy"),
     **dict.fromkeys(("drive_sine", "record", "record_spikes", "recover"), "grpc nidaqmx"),
 }
-"""Names of `vi` that load something of `HEAVY`, and what; all others load nothing of it."""
+"""Names of `vi` that load packages of `HEAVY`, with these packages; all others load none."""
 CALLS: Rows = {
     "vi.run('scene.toml', progress=False)": ("", 0),
     "vi.cost_of('scene.toml')": ("", 0),
@@ -150,13 +150,13 @@ CALLS: Rows = {
     "vi.classify(vi.open_dataset('swept.nc'))": ("dask", 0),
     "vi.draw(vi.open_dataset('swept.nc'))": ("dask matplotlib", 0),
 }
-"""Calls, with what they may load of `HEAVY`."""
+"""Calls, with the packages of `HEAVY` that they may load."""
 WARM = OTHERS | {f"vi.{name}": (NAMES.get(name, ""), 0) for name in dir(vi)} | CALLS
 
 
 @pytest.fixture(scope="module")
 def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, set[str], str]]:
-    """Return the modules that each row loads beyond those of its group: exit code, modules, end of what it printed."""
+    """Return for each row exit code, modules that the rows before it in its group had not loaded, end of output."""
     folder = tmp_path_factory.mktemp("loaded")
     for name, text in (("scene", SCENE), ("swept", SCENE + SWEEP), ("drawn", SCENE + DRAWN)):
         (folder / f"{name}.toml").write_text(text)
@@ -186,7 +186,7 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, set
 
 
 def grouped(rows: Rows) -> list[list[str]]:
-    """Return rows by what they may load: one process runs a group, and the first that loads too much is named."""
+    """Return rows grouped by allowed packages: one process runs a group, and names its first row that loads more."""
     groups: dict[str, list[str]] = {}
     for row, (may_load, _) in rows.items():
         groups.setdefault(may_load, []).append(row)
@@ -194,14 +194,14 @@ def grouped(rows: Rows) -> list[list[str]]:
 
 
 def order_of(row: str) -> list[str] | str:
-    """Return a row as the other process takes it."""
+    """Return a row in the form that the other process reads."""
     return f"import vibroimpact as vi; {row}" if row.startswith("vi.") else row.split()
 
 
 def answers(orders: list[dict[str, object]], folder: Path) -> list[list[tuple[int, list[str], str]]]:
     """Return the answers to all groups of some orders, from a process that has loaded nothing of the package."""
     command = [sys.executable, "-P", str(TESTS / "support" / "loaded_modules.py")]
-    # Python warns of a fork beside threads, which OpenBLAS would start
+    # Python warns of a fork when threads run, and OpenBLAS would start some
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "200"}
     done = subprocess.run(
         command, input=json.dumps(orders), capture_output=True, text=True, cwd=folder, env=environment

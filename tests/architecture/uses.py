@@ -1,4 +1,4 @@
-"""How many functions of the package a use runs: `counts_of_uses` asks a new process, which has used nothing before."""
+"""Numbers of functions of the package that a use runs: `counts_of_uses` counts them in a new process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Use = Callable[[Path], object]
 
 
 def uses(folder: Path) -> dict[str, Use]:
-    """Return the uses that are counted; each takes a new path for its result."""
+    """Return the counted uses; each takes a new path for its result."""
     scene, swept = vi.Scene.from_file(SINGLE_RUN), folder / "swept.toml"
     swept.write_text(SINGLE_RUN.read_text(encoding="utf-8") + SWEEP, encoding="utf-8")
     rig = f"virtual:{_unhurried_rig(folder)}"
@@ -50,7 +50,7 @@ def uses(folder: Path) -> dict[str, Use]:
 
 
 def _unhurried_rig(folder: Path) -> Path:
-    """Write a rig whose time is slower than life: no buffer runs over where functions are counted."""
+    """Write a rig with a clock slower than real time: counting slows the program, and no buffer may overrun."""
     there = EXAMPLES / "rig"
     text = (there / "oscillator.toml").read_text(encoding="utf-8")
     slow = text.replace('scene = "', f'speed = 0.2\nscene = "{there.as_posix()}/')
@@ -67,7 +67,7 @@ def command(*words: str | Path) -> None:
 
 
 def executed(use: Callable[[], object]) -> tuple[int, int]:
-    """Return how many functions of the package a use runs, in all threads, and of how many files."""
+    """Return the numbers of functions and files of the package that a use runs, in all threads."""
     seen: set[CodeType] = set()
 
     def look(frame: FrameType, event: str, argument: Any) -> None:
@@ -81,20 +81,20 @@ def executed(use: Callable[[], object]) -> tuple[int, int]:
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-    # threads of a library may go on meanwhile
+    # threads of a library may still be running
     own = [code for code in seen.copy() if is_own(code.co_filename)]
     return len(own), len({code.co_filename for code in own})
 
 
 @cache
 def is_own(name: str) -> bool:
-    """Return whether a file is one of the package."""
+    """Return whether a file belongs to the package."""
     path = os.path.realpath(name)
     return any(path.startswith(f"{ROOT / room}{os.sep}") for room in ROOMS)
 
 
 def counts_of_uses() -> dict[str, tuple[int, int]]:
-    """Return functions and files of each use, once it has been made before."""
+    """Return functions and files of each use, counted at its second run."""
     done = subprocess.run(
         [sys.executable, "-m", "architecture.uses"],
         cwd=ROOT,

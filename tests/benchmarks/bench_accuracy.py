@@ -1,12 +1,12 @@
-"""Is what `vibroimpact accuracy` recommends the cheapest, and does it meet its tolerance?
+"""Does `vibroimpact accuracy` recommend the cheapest adequate setting, and does that setting meet its tolerance?
 
-For three scenes (an oscillator on a rigid stop, one on a Hertz stop, a beam of eight modes on a Kelvin-Voigt stop) the
-command runs as a user types it, with a tolerance and `--write`. Then, in a fresh process:
+Three scenes: an oscillator on a rigid stop, an oscillator on a Hertz stop, and a beam of eight modes on a Kelvin-Voigt
+stop. The command runs as a user types it, with a tolerance and `--write`. Then, in a fresh process:
 
-- the recommendation is timed beside all ways that the study found adequate (medians, in turns): goal at most 1.5 times
-  the cheapest of them;
-- the scene that was written is compared with a reference that the study did not see: the modal equations integrated by
-  scipy's DOP853, restarted at each touch and release.
+- the recommendation and all adequate methods of the study are timed (medians, in turns); the goal is at most 1.5 times
+  the cheapest;
+- the written scene is compared with a reference outside of the study. It integrates the modal equations with scipy's
+  DOP853, restarted at each touch and release.
 
 Run with `python tests/benchmarks/bench_accuracy.py [--repetitions 9]`.
 """
@@ -91,7 +91,7 @@ recorded_periods = 5
 
 
 class Modal:
-    """The equations of motion of a body with one upper stop, written again: equations.md 1.1, 6.1."""
+    """The equations of motion of a body with one upper stop, written independently: equations.md 1.1, 6.1."""
 
     def __init__(self, scene: Scene) -> None:
         body, forcing = scene.body, scene.forcing
@@ -126,7 +126,7 @@ class Modal:
         """Return time, speed and end of each contact that has ended, and the state at the end."""
         modes = len(self.shape)
         rigid = isinstance(self.stop, RestitutionStop)
-        position, touching, begun = self.stop.position, False, (0.0, 0.0)
+        position, touching, contact_start = self.stop.position, False, (0.0, 0.0)
 
         def rates(t: float, y: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
             q, p = y[:modes], y[modes:]
@@ -155,12 +155,12 @@ class Modal:
                 return touches, y
             if touching:
                 touching = False
-                touches.append((*begun, t))
+                touches.append((*contact_start, t))
                 continue
             speed = float(self.shape @ y[modes:])
-            begun = (t, speed)
+            contact_start = (t, speed)
             if rigid:
-                touches.append((*begun, t))
+                touches.append((*contact_start, t))
                 restitution = self.stop.restitution  # type: ignore[union-attr]
                 y[modes:] -= (1.0 + restitution) * speed * self.shape / (self.shape @ self.shape)
             touching = not rigid
@@ -168,7 +168,7 @@ class Modal:
 
 
 def unseen(scene: Scene) -> Observation:
-    """Return what the independent integration shows of a scene."""
+    """Return the observation of a scene by the independent integration."""
     begin, end = recorded_window(scene, float_parameters(scene, None))
     modal = Modal(scene)
     touches, state = modal.motion(end)
@@ -181,7 +181,7 @@ def unseen(scene: Scene) -> Observation:
 def judged(
     scene_file: Path, tuned: Path, labels: list[str], chosen: str, repetitions: int
 ) -> dict[str, float]:
-    """Time the adequate ways in turns, and compare the scene that was written with the unseen reference."""
+    """Time the adequate methods in turns, and compare the written scene with the independent reference."""
     scene = studied_scene(load_scene(scene_file))
     trials = {way.label: way.open(None) for way in ways_of(scene) if way.label in labels}
     times: dict[str, list[float]] = {label: [] for label in trials}

@@ -1,12 +1,12 @@
-"""Adaptive sweeps beside uniform ones whose steps are their tolerance: what they find, and with how many points.
+"""Adaptive sweeps against uniform sweeps with a step of their tolerance: jumps found, and points needed.
 
-- Thesis figure 3.3, up and down, to 1e-5: begun with 51 and with 401 values each way, and 200,002 points of a uniform
-  sweep. Each jump of the uniform sweep is looked for among the brackets: the nearest between the same two motions.
-- A map over frequency and gap, from rest, to 0.002 and 0.004, and the 328,833 points of the uniform map of its finest
-  cells: pairs of neighbours between which the motion jumps, and how many of them have both points in the adaptive map.
+- Thesis figure 3.3, up and down, to 1e-5: adaptive from 51 and from 401 values each way, and uniform with 200,002
+  points. Each jump of the uniform sweep is compared with the nearest bracket between the same two motions.
+- A map over frequency and gap, from rest, to 0.002 and 0.004, and a uniform map of its finest cells with 328,833
+  points. The counts are neighbours between which the motion jumps, and pairs with both points in the adaptive map.
 
-It leaves the table of jumps, the two pictures of docs/campaigns.md and a sentence for each. On two cores it takes some
-eight minutes and 1 GB of memory; `--quick` has steps and cells that are eight times as wide.
+The output is the table of jumps, the two pictures of docs/campaigns.md and a sentence for each. On two cores it takes
+some eight minutes and 1 GB of memory; `--quick` makes steps and cells eight times as wide.
 
 Run with `python tests/benchmarks/bench_adaptive.py [--output results/benchmarks] [--quick]`.
 """
@@ -34,16 +34,16 @@ from support.borders import borders_found  # noqa: E402
 
 FIGURE = ROOT / "examples" / "thesis" / "figure_3_3.toml"
 KEY, GAP = "forcing.angular_frequency", "stop[1].position"
-BEGUN_WITH = (51, 401)
-"""Values each way in the first round."""
+FIRST_VALUES = (51, 401)
+"""Values each way in the first round of the adaptive sweeps."""
 NEAR = 1e-4
-"""Distance within which a bracket counts as that of a uniform sweep's jump: points of a path depend on its steps."""
+"""Distance below which a bracket matches a jump of the uniform sweep: points of a path depend on its steps."""
 RECORD = {"impacts": False, "extrema": True, "strobe": True}
 MAP = {"transient_periods": 200, "recorded_periods": 20, **RECORD}
 
 
 def timed(folder: Path, sweep: dict[str, Any], record: dict[str, Any]) -> tuple[xr.Dataset, int, float]:
-    """Return the campaign of figure 3.3 over a sweep, its points, and its seconds."""
+    """Return the campaign of figure 3.3 over a sweep, its number of points, and its duration in s."""
     scene = vi.Scene.from_file(FIGURE)
     scene = scene.with_values({f"record.{name}": value for name, value in record.items()}).with_sweep(sweep)
     began = time.perf_counter()
@@ -58,7 +58,7 @@ def measure_figure(folder: Path, output: Path, step: float) -> None:
     uniform = jumps_of(whole)
     print(f"figure 3.3, uniform: {points} points in {seconds:.0f} s, {uniform.sizes['jump']} jumps")
     nearest = {}
-    for count in BEGUN_WITH:
+    for count in FIRST_VALUES:
         adaptive = {KEY: axis | {"points": count, "adaptive": {"tolerance": step, "at_most": 5000}}}
         dataset, fewer, seconds = timed(folder / str(count), adaptive, {})
         found = jumps_of(dataset)
@@ -88,7 +88,7 @@ def measure_figure(folder: Path, output: Path, step: float) -> None:
 
 
 def _distance(jump: xr.Dataset, found: xr.Dataset) -> float:
-    """Return how far the nearest bracket between the same two motions is from a jump; NaN where there is none."""
+    """Return the distance of a jump from the nearest bracket between the same two motions; NaN without one."""
     same = (found.direction == jump.direction) & (found.period == jump.period).all("side")
     same &= (found.impacts == jump.impacts).all("side")
     there = found.isel(jump=same.values)
@@ -122,7 +122,7 @@ def measure_map(folder: Path, output: Path, cuts: int) -> None:
 
 
 def main() -> None:
-    """Measure, write the table and the pictures, and say what was seen."""
+    """Measure, write the table and the pictures, and print the result."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=Path("results/benchmarks"))
     parser.add_argument("--quick", action="store_true", help="wider steps and cells")

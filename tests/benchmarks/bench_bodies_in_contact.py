@@ -1,8 +1,8 @@
-"""What an impact between two bodies costs, and what 10^4 of them keep.
+"""Cost of an impact between two bodies, and the energy error after 10^4 impacts.
 
-Newton's cradle of five balls with restitution 1 swings until it has made the impulses asked for, in FMI 3.0 and 2.0;
-two chains pound, and two masses on springs hit each other with a law that yields. Processor time for each impulse (or
-contact), and the relative change of the energy.
+Newton's cradle of five balls with restitution 1 swings until it has made the given number of impulses, in FMI 3.0 and
+2.0. Two chains pound, and two masses on springs hit each other with a compliant law. The results are the processor
+time for each impulse (or contact), and the relative change of the energy.
 Run with `python tests/benchmarks/bench_bodies_in_contact.py [--impacts 10000]`.
 """
 
@@ -23,7 +23,7 @@ MOST_CHANGE = 1e-12
 
 
 def pounding_chains() -> PairRun:
-    """Return two chains of three masses, which hit each other at their second."""
+    """Return two chains of three masses whose second masses hit each other."""
     chain: dict[str, Any] = {"masses": 3, "contact[1].mass_number": 2}
     lower = hit("lower", "Chain", **chain | {"velocity_start[3]": 1.0})
     upper = hit("upper", "Chain", **chain | {"mass[2]": 3.0, "displacement_start[2]": -0.5})
@@ -37,7 +37,7 @@ def yielding_masses() -> PairRun:
 
 
 def measure(name: str, make: Callable[[], PairRun], impacts: int) -> bool:
-    """Run a system until it has made its impacts; say what each has cost, and whether the energy is kept."""
+    """Run a system for a number of impacts; print the cost of each, and return whether the energy is conserved."""
     run = make()
     energy = run.energy()
     began = time.process_time()

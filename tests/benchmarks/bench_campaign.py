@@ -1,12 +1,12 @@
-"""What a map of many points costs: overhead of a point, memory of the client and the workers, bytes, opening.
+"""Cost of a map of many points: overhead of a point, memory of client and workers, bytes, opening.
 
 A map over frequency and amplitude of a forced oscillator with a rigid stop, 100 periods before 20 recorded ones, with
 two workers. For each number of points it prints
 
-- `overhead`: wall time of the workers per point, from the first chunk's begin to the last one's end, less what the
-  points took in the body (`point_seconds`), us;
-- the peak memory of the client (with Dask's scheduler, which lives in it) and of the largest worker, MB;
-- the size of the dataset per point, and how long it takes to open, in a process that has read it before.
+- `overhead`: wall time of the workers per point, us. It counts from the first chunk's start to the last one's end,
+  without the time of the body (`point_seconds`);
+- the peak memory of the client (it holds Dask's scheduler) and of the largest worker, MB;
+- the size of the dataset per point, and its opening time in a process that has read it before.
 
 Run with `python tests/benchmarks/bench_campaign.py [--points 10000 100000 1000000] [--impacts]`.
 """
@@ -54,14 +54,14 @@ impacts = {impacts}
 
 
 def map_of(points: int, impacts: bool) -> Scene:
-    """Return a map of about so many points."""
+    """Return a map of about `points` points."""
     side = math.isqrt(points)
     text = SCENE.format(impacts=str(impacts).lower(), amplitudes=side, frequencies=points // side)
     return parse_scene(text, "map.toml")
 
 
 def measured(points: int, impacts: bool) -> None:
-    """Run one campaign and print what it cost."""
+    """Run one campaign and print its costs."""
     scene = map_of(points, impacts)
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
@@ -89,7 +89,7 @@ def measured(points: int, impacts: bool) -> None:
 
 
 def main() -> None:
-    """Measure each number of points in a process of its own, since memory is counted by its peak."""
+    """Measure each number of points in a process of its own, since memory is measured by its peak."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

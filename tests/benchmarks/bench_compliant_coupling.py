@@ -1,8 +1,8 @@
-"""The energy of one elastic contact between a mass and a stop that yields, as two FMUs, against steps per contact.
+"""The energy of one elastic contact between a mass and a compliant stop, as two FMUs, against steps per contact.
 
-A plain importer of fixed steps (Jacobi, Gauss-Seidel), this importer with a stop that answers a force alone (steps are
-repeated), and with one that answers slopes too (the default, linearly implicit). For each law a dataset and a figure
-are left; the table also has what the importer itself reports as the residual.
+The methods are a plain importer of fixed steps (Jacobi, Gauss-Seidel), and this importer with two kinds of stop. A stop
+that returns only a force needs repeated steps; a stop that returns slopes too is coupled linearly implicitly (the
+default). Each law leaves a dataset and a figure; the table also has the residual that the importer reports.
 
 Run with `python tests/benchmarks/bench_compliant_coupling.py [FOLDER]`.
 """
@@ -28,26 +28,26 @@ from vibroimpact.analysis.landmarks import observed_order
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
 METHODS = ("jacobi", "gauss_seidel", "force", "slopes")
-"""Two plain importers; this one with a stop that answers a force alone, and with one that answers slopes too."""
+"""Two plain importers; this importer with a stop that returns only a force, and with one that returns slopes too."""
 DEFAULT_STEPS = 30
 REPETITIONS = 3
 GOAL = 1e-6
-"""Energy error that the default may have at 30 steps per contact, kelvin_voigt."""
+"""Largest relative energy error of the default at 30 steps per contact, kelvin_voigt."""
 ROUNDING = 1e-11
-"""An error below this is rounding and written as 0: it has no order."""
+"""Relative error below which it is rounding and written as 0: it has no order."""
 
 
 def measured(law: str, method: str, steps: int) -> tuple[float, float, float, float]:
-    """Return energy error, residual as reported (both relative), seconds of the contact, steps with repetitions.
+    """Return relative energy error, relative residual, seconds of the contact, and steps with repetitions.
 
-    The seconds are those of the quickest of some repetitions: what else the machine does only adds to them.
+    The seconds are those of the quickest of some repetitions: other programs only lengthen a run.
     """
     runs = [contact(law, method, steps) for _ in range(REPETITIONS)]
     return min(runs, key=lambda run: run[2])
 
 
 def contact(law: str, method: str, steps: int) -> tuple[float, float, float, float]:
-    """Return what `measured` does, of one contact."""
+    """Return the values of `measured` for one contact."""
     if method in ("jacobi", "gauss_seidel"):
         error, seconds = plain_contact(method, steps, STIFFNESS[law], law)
         return error, math.nan, seconds, 3.0 * steps
@@ -112,7 +112,7 @@ def table(law: str, dataset: xr.Dataset) -> None:
 
 
 def draw(dataset: xr.Dataset, figure: Path) -> None:
-    """Leave the figures, where figures can be drawn: errors over the step, and over what they cost."""
+    """Write the figures, where matplotlib is installed: errors over the step, and over the cost."""
     try:
         from vibroimpact.analysis.figures import convergence, save, work_precision
     except ImportError as error:
@@ -125,11 +125,11 @@ def draw(dataset: xr.Dataset, figure: Path) -> None:
 
 
 def main() -> int:
-    """Measure, print, leave datasets and figures; return 1 if a goal is missed."""
+    """Measure, print, write datasets and figures; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="folder of the results")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     held = True

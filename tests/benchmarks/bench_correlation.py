@@ -1,12 +1,13 @@
-"""What correlation sums cost: the C function behind `fmus.core.near_pairs`, a k-d tree, and nolds 0.6.2.
+"""Cost of correlation sums: the C function behind `fmus.core.near_pairs`, a k-d tree, and nolds 0.6.2.
 
-Delay vectors of the Henon map, the max norm, every pair counted exactly at the same 41 radii (five octaves, C from
-about .001 to .1). The C function gives all embeddings from 1 to m in one pass; the others are asked for the largest
-only. nolds counts each vector as its own neighbour (its matrix of distances includes the diagonal); what that does to
-small radii is shown beside the exact sums. It keeps all N^2 distances, so it is not asked for more than 10,000 points
-(.8 GB).
+Delay vectors of the Henon map in the max norm; every pair is counted exactly. The 41 radii are the same for all: five
+octaves, C from about .001 to .1. The C function gives all embeddings from 1 to m in one pass; the others compute only
+the largest.
 
-Wall time, and the processor time of all threads together, the smallest of the repetitions. The goals are held against
+nolds counts each vector as its own neighbour: its matrix of distances includes the diagonal. The figure shows the
+effect at small radii next to the exact sums. nolds keeps all N^2 distances, so it gets at most 10,000 points (.8 GB).
+
+Times are wall time and the processor time of all threads together, the smallest of the repetitions. The goals apply to
 the processor time, which other work on the machine hardly changes: with several processors the wall time is less.
 Run with `python tests/benchmarks/bench_correlation.py [--repetitions 2] [--output results/bench_correlation]`.
 """
@@ -36,19 +37,19 @@ from vibroimpact.fmus.core import near_pairs, radius_ladder
 Floats = NDArray[np.float64]
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000)
-#: nolds keeps N^2 distances; the tree's time grows with the pairs too.
+#: Most points for nolds, which keeps N^2 distances, and for the tree, whose time grows with the pairs too.
 MOST_FOR_NOLDS, MOST_FOR_TREE = 10_000, 30_000
 EMBEDDING, EMBEDDINGS = 2, 6
-#: The goals of the issue: seconds by number of points, and how many times faster than nolds.
+#: The goals of the issue: seconds by number of points, and the least speed-up over nolds.
 GOALS, FASTER = {10_000: 1.0, 100_000: 10.0}, 10.0
 RADII = radius_ladder(1.0 / 128.0, 0.25)
-#: Where nolds's own neighbours show: C of the largest embedding there is far below 1 / N.
+#: Radii at which nolds's own neighbours show: C of the largest embedding there is far below 1 / N.
 SMALL_RADII = radius_ladder(2.0**-14, 0.25)
 
 
 @dataclass(frozen=True)
 class Timing:
-    """One measurement: who counted how many points in which embeddings, and how long it took."""
+    """One measurement: method, number of points, embeddings, and time."""
 
     name: str
     points: int
@@ -57,7 +58,7 @@ class Timing:
     processor: float
 
     def sentence(self) -> str:
-        """Return it in words."""
+        """Return the measurement in words."""
         return (
             f"{self.name:34}{self.points:8d} points, m = {self.embedding}{self.wall:10.3f} s"
             f"   ({self.processor:.3f} s of processor time)"
@@ -88,7 +89,7 @@ def by_tree(values: Floats, embedding: int) -> Floats:
     """Return the near pairs from scipy's k-d tree, which counts ordered pairs and each vector with itself."""
     vectors = np.lib.stride_tricks.sliding_window_view(values, embedding)
     tree = cKDTree(vectors)
-    # the tree counts distances up to the radius, not below it: ask just below
+    # the tree counts distances up to and including the radius; the C function counts distances below it
     ordered = tree.count_neighbors(tree, np.nextafter(RADII, 0.0), p=np.inf)
     return np.asarray((ordered - len(vectors)) // 2)
 
@@ -108,14 +109,14 @@ def by_nolds(values: Floats, embedding: int, radii: Floats) -> Floats:
             fit="poly",
             debug_data=True,
         )
-    # it leaves radii out at which it found nothing
+    # nolds leaves out radii at which it found no pair
     full = np.zeros(len(radii))
     full[np.searchsorted(radii, np.exp(log_radii) * (1.0 - 1e-12))] = np.exp(log_sums)
     return full
 
 
 def measure(repetitions: int, with_nolds: bool) -> list[Timing]:
-    """Time all that can be timed, and check that all count the same pairs."""
+    """Time all methods, and check that all count the same pairs."""
     timings = []
     for points in SIZES:
         values = henon(points)
@@ -151,7 +152,7 @@ def measure(repetitions: int, with_nolds: bool) -> list[Timing]:
 
 
 def bias(points: int) -> tuple[Floats, Floats]:
-    """Return exact correlation sums and those of nolds, down to radii at which hardly a pair is left."""
+    """Return the exact correlation sums and those of nolds, down to radii with hardly a pair."""
     values = henon(points)
     number = points - EMBEDDING + 1
     exact = near_pairs(values, SMALL_RADII, EMBEDDING)[-1] / math.comb(number, 2)

@@ -1,9 +1,12 @@
-"""What coupling costs and how exact it is, beside FMPy's classes doing the same in the same process.
+"""Cost and accuracy of coupling, against FMPy's classes doing the same in the same process.
 
-Five tables: microseconds per coupled impact and per plain step; a black-box ball by step revision and by a plain
-loop of fixed steps; what the guard process costs; two oscillators with a spring between them over a ladder of macro
-steps, left as a dataset and a figure. Everything timed is run several times in turn with what it is compared
-to; tables show the median and the smallest.
+- microseconds per coupled impact
+- microseconds per plain step
+- a black-box ball, by step revision and by a plain loop of fixed steps
+- the cost of the guard process
+- two oscillators with a spring between them over a ladder of macro steps, written as a dataset and a figure
+
+Every timing runs several times, in turns with its counterpart; tables show the median and the smallest.
 
 Run with `python tests/benchmarks/bench_coupled.py [FOLDER]` on a quiet machine.
 """
@@ -60,14 +63,14 @@ from vibroimpact.orchestrator.scene import parse_scene
 
 PERIOD = 2.0 * math.pi
 IMPACT_GOALS = {"3.0+3.0": 2.0, "2.0+2.0": 4.0}
-"""us per coupled impact, by the FMI versions of body and stop."""
+"""Most us per coupled impact, by the FMI versions of body and stop."""
 STEP_GOAL, GUARD_GOAL, ERROR_GOAL = 1.5, 2.0, 1e-13
-"""us per plain step, percent of a point of 10 ms, rad in the phase of the last impact on P(1,1)."""
+"""Most us per plain step; most cost of the guard, % of a point of 10 ms; largest phase error of P(1,1), rad."""
 REPETITIONS = 9
 
 
 def timed(*tasks: Callable[[], int], repetitions: int = REPETITIONS) -> list[list[float]]:
-    """Return the seconds per unit of work of each task, run in turn; a task returns how many units it did."""
+    """Return the seconds per unit of work of each task, run in turn; a task returns its number of units."""
     seconds: list[list[float]] = [[] for _ in tasks]
     gc.collect()
     for _ in range(repetitions):
@@ -92,7 +95,7 @@ def verdict(value: float, goal: float, unit: str) -> str:
 def fmpy_instance(
     name: str, *, event_mode: bool, parameters: Mapping[str, float]
 ) -> tuple[Any, dict[str, int]]:
-    """Return an instantiated, not initialized FMI 3.0 instance by FMPy's class, and its references by name."""
+    """Return an instance of FMI 3.0 by FMPy's class, not yet initialized, and its references by name."""
     folder = str(unpack(fmu_path(name)).folder)
     description = read_model_description(folder)
     fmu = FMU3Slave(
@@ -123,19 +126,19 @@ class FmpyCoupled:
         self.body.enterStepMode()
         self.outputs = [names["contact[1].displacement"], names["contact[1].velocity"]]
         self.inputs = [names["contact[1].applied_restitution"], names["contact[1].applied_force"]]
-        self.asked = [stop_names["displacement"], stop_names["velocity"]]
+        self.stop_inputs = [stop_names["displacement"], stop_names["velocity"]]
         self.answers = [stop_names["applied_restitution"], stop_names["applied_force"]]
         self.time = 0.0
 
     def advance(self, end: float) -> int:
-        """Advance to `end`; returns the number of impacts."""
+        """Advance to `end`; return the number of impacts."""
         impacts, body, stop = 0, self.body, self.stop
         while self.time < end:
             body.setFloat64(self.inputs, stop.getFloat64(self.answers))
             event, _, _, reached = body.doStep(
                 currentCommunicationPoint=self.time, communicationStepSize=end - self.time
             )
-            stop.setFloat64(self.asked, body.getFloat64(self.outputs))
+            stop.setFloat64(self.stop_inputs, body.getFloat64(self.outputs))
             stop.doStep(currentCommunicationPoint=self.time, communicationStepSize=reached - self.time)
             self.time = reached
             if event:
@@ -148,7 +151,7 @@ class FmpyCoupled:
 
 
 def impact_table() -> bool:
-    """Microseconds per coupled impact; returns whether the goals are met."""
+    """Print the microseconds per coupled impact; return whether the goals are met."""
     ours = {}
     for versions_used in (("3.0", "3.0"), ("3.0", "2.0"), ("2.0", "2.0")):
         importer = Importer(
@@ -197,7 +200,7 @@ def impact_table() -> bool:
 
 
 def step_table() -> bool:
-    """Microseconds per plain step of one FMU; returns whether the goal is met."""
+    """Print the microseconds per plain step of one FMU; return whether the goal is met."""
     importer = Importer([body("body", {"displacement_start": 1.0})], macro_step=0.01)
     importer.begin()
     fmu, _ = fmpy_instance("Oscillator", event_mode=False, parameters={"displacement_start": 1.0})
@@ -226,7 +229,7 @@ def step_table() -> bool:
     return median <= STEP_GOAL
 
 
-# ---- a ball that knows of no events ----
+# ---- a ball without events of its own ----
 
 
 def exact_bounces(count: int) -> np.ndarray:
@@ -235,7 +238,7 @@ def exact_bounces(count: int) -> np.ndarray:
 
 
 def fixed_step_bounces(importer: Importer, step: float, end: float) -> list[float]:
-    """Return the bounces that a plain loop sees: where the ball's speed has turned upwards."""
+    """Return the times at which a plain loop sees the ball's velocity turn upwards."""
     importer.begin()
     instance, times, speed = importer.components["ball"].instance, [], 0.0
     velocity = importer.components["ball"].group("Float64", ["v"])
@@ -272,7 +275,7 @@ def fixed_steps(fmu: Path, step: float, end: float, found: dict[str, list[float]
 
 
 def ball_table(folder: Path) -> None:
-    """Bounce times and cost by step revision and by a plain loop."""
+    """Print bounce times and cost by step revision and by a plain loop."""
     fmu, end = bouncing_ball(folder), 2.0
     exact = exact_bounces(4)
     print("\nblack-box ball (FMI 2.0), bounces up to 2 s      error of bounce 1  largest of 4  cost, ms")
@@ -325,14 +328,14 @@ macro_step = {step}
 
 
 POINTS, POINT_TIME, PAIRS, GUARD_ROUNDS = 20, 0.010, 9, 8
-"""Points of a chunk, what each takes alone (s of processor time), and how often both ways take turns in a pair of
-runners. Where a process has its memory makes some per cent: so there are several pairs, each of fresh ones."""
+"""Points of a chunk; processor time of a point without a guard, s; pairs of runners; turns of a pair. The placement of
+a process's memory changes times by some per cent: so there are several pairs, each of fresh processes."""
 
 
 def guard_table() -> bool:
-    """What points of about 10 ms cost in a guarded child process, run as a worker of a campaign runs them.
+    """Print the cost of a guarded child process for points of about 10 ms, run as by a worker of a campaign.
 
-    Returns whether the goal is met.
+    Return whether the goal is met.
     """
     print(
         "\nguard, points of about 10 ms      alone, ms   cost of the guard, %: processor time (quartiles)   wall time"
@@ -340,7 +343,7 @@ def guard_table() -> bool:
     worst = -math.inf
     for name, unit, step in (("impacts", PERIOD, 1e9), ("steps", 0.01, 0.01)):
         count = 500
-        for _ in range(2):  # what a point costs beside its impacts or steps is not little beside 500 of them
+        for _ in range(2):  # a point has a fixed cost too, which is not small against 500 impacts or steps
             count = int(
                 count * POINT_TIME / statistics.median(chunk_times(count * unit, step, rounds=2)[0][0])
             )
@@ -358,13 +361,13 @@ def guard_table() -> bool:
 
 
 def chunk_times(end: float, step: float, rounds: int) -> tuple[list[list[float]], list[list[float]]]:
-    """Return processor and wall times of a point, s: each without and with a guard, in turn, mean of a chunk."""
+    """Return processor and wall times of a point, s: each without and with a guard, in turn; means of a chunk."""
     scenes = [
         parse_scene(GUARDED.format(end=end, step=step, guard=guard), "guard.toml")
         for guard in ("false", "true")
     ]
     runners = [open_scene(scene) for scene in scenes]
-    # on Linux the number of a process is that of its clock too
+    # Linux derives the clock of a process from its number
     clocks = [~child.pid << 3 | 2 for child in psutil.Process().children(recursive=True)]
 
     def spent() -> float:
@@ -373,7 +376,7 @@ def chunk_times(end: float, step: float, rounds: int) -> tuple[list[list[float]]
     points = independent_points({}, POINTS)
     processor: list[list[float]] = [[], []]
     wall: list[list[float]] = [[], []]
-    for turn in range(-1, rounds):  # the first is not counted
+    for turn in range(-1, rounds):  # the first turn is not counted
         for way in (0, 1) if turn % 2 else (1, 0):
             before, began = spent(), time.perf_counter()
             runners[way].rows(points)
@@ -390,7 +393,7 @@ def chunk_times(end: float, step: float, rounds: int) -> tuple[list[list[float]]
 
 STIFFNESS, SPRING, END = 1.0, 0.1, 50.0
 ROUNDING = 1e-12
-"""An energy drift below this, J, is rounding and written as 0: it has no order."""
+"""Energy drift, J, below which it is rounding and written as 0: it has no order."""
 STEPS = np.array([0.4, 0.2, 0.1, 0.05, 0.025, 0.0125])
 
 
@@ -509,7 +512,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="folder of the results")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     load = f", load {os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else ""

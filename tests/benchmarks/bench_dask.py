@@ -1,15 +1,15 @@
-"""What a Dask campaign costs beside two bare processes that run the same chunks.
+"""Cost of a Dask campaign over two bare processes that run the same chunks.
 
 Each repetition times, one after the other and in alternating order:
 
 - `campaign`: `run_campaign` with two workers, from the first chunk handed out to the last one done. Start and
-  stop of the cluster and the compaction are outside of this span: they happen once, however long the sweep.
-- `bare`: two processes that take the very chunks of that campaign from a shared counter and write their
-  parts in the same way; no Dask, no network, no resume. From a common start to the last chunk done.
-- `points`: two processes that only run the points and keep nothing.
+  stop of the cluster and the compaction are excluded: they happen once, however long the sweep.
+- `bare`: two processes that take the very chunks of that campaign from a shared counter, without Dask, network or
+  resume. They write their parts in the same way. Timed from a common start to the last chunk done.
+- `points`: two processes that only run the points and store nothing.
 
-Run with `python tests/benchmarks/bench_dask.py [--points 20000] [--repetitions 5]`, on a quiet machine: what
-else runs there is taken from one of the three at a time.
+Run with `python tests/benchmarks/bench_dask.py [--points 20000] [--repetitions 5]`, on a quiet machine: other
+programs slow down one of the three at a time.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.scene.sweep import expand
 
 WORKERS = 2
 LONGEST_SECONDS = 600.0
-"""How long the bare processes may take before they count as dead, s."""
+"""Time after which the bare processes count as dead, s."""
 
 SCENE = """
 [scene]
@@ -64,7 +64,7 @@ Task = Callable[[Chunk], object]
 
 
 def bare_seconds(work: Work, chunks: Sequence[Chunk], *, write: bool) -> float:
-    """Return how long two bare processes take for the chunks, s."""
+    """Return the time of two bare processes for the chunks, s."""
     context = multiprocessing.get_context("spawn")
     barrier, counter, results = context.Barrier(WORKERS), context.Value("i", 0), context.Queue()
     processes = [

@@ -1,10 +1,13 @@
-"""A body of another tool in contact with a stop that yields: energy of one elastic contact, and what an impact costs.
+"""A body of another tool in contact with a compliant stop: energy of one elastic contact, and cost of an impact.
 
-The body is a mass that holds a force over a step (`tests/support/fmus/mass.c`), free or on a spring of its own, with
-states that can be kept and without. Its contact by a plain connection of the stop's force, and by `[[contact]]`, over
-the steps per contact; then rigid impacts, of random masses, speeds and restitutions against the closed form, and of a
-run of many; then microseconds per impact beside a body of ours whose law is another FMU's, and fused. For each law
-that yields a dataset and a figure are left.
+The body is a mass that holds a force over a step (`tests/support/fmus/mass.c`). It is free or on a spring of its own,
+and its states can be saved or not. Three parts:
+
+- one contact, by a plain connection of the stop's force and by `[[contact]]`, over the steps per contact
+- rigid impacts: random masses, speeds and restitutions against the closed form, and a long run
+- microseconds per impact, also of a body of this package with the stop in another FMU, and fused
+
+Each compliant law leaves a dataset and a figure.
 
 Run with `python tests/benchmarks/bench_foreign_bodies.py [FOLDER]`.
 """
@@ -40,17 +43,17 @@ from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
 SPRING, WAY, SPEED = 100.0, 0.1, 2.0
-"""Stiffness of the body's own spring, N/m; where the stop is, m; speed at 0, m/s."""
+"""Stiffness of the body's own spring, N/m; position of the stop, m; velocity at time 0, m/s."""
 METHODS = ("plain", "free", "free_stateless", "spring", "spring_stateless")
 DEFAULT_STEPS, GOAL = 30, 1e-6
-"""Energy error that a contact may have at so many steps."""
+"""Steps per contact of the goal, and the largest relative energy error of a contact with them."""
 ROUNDING = 1e-11
-"""An error below this is rounding and written as 0: it has no order."""
+"""Relative error below which it is rounding and written as 0: it has no order."""
 REPETITIONS = 5
 
 
 def error_and_residual(law: str, method: str, steps: int, folder: Path) -> tuple[float, float]:
-    """Return the energy gained in one contact and the residual reported, relative."""
+    """Return the energy gained in one contact and the reported residual, both relative."""
     spring = SPRING if method.startswith("spring") else 0.0
     start = {"v": SPEED, "k": spring}
     stop = yielding_stop("s", law, {"stiffness": STIFFNESS[law]}, WAY)
@@ -131,7 +134,7 @@ def table(law: str, dataset: xr.Dataset) -> None:
 
 
 def draw(dataset: xr.Dataset, figure: Path) -> None:
-    """Leave the figure of errors over the step, where figures can be drawn."""
+    """Write the figure of errors over the step, where matplotlib is installed."""
     try:
         from vibroimpact.analysis.figures import convergence, save
     except ImportError as error:
@@ -145,11 +148,11 @@ def draw(dataset: xr.Dataset, figure: Path) -> None:
 
 IMPACTS, SEED = 200, 13
 LONG_RUN = 2000.0
-"""Seconds of a run of a body of ours and a foreign one that hit each other about every 3.5 s."""
+"""Duration of a run in which an own and a foreign body hit each other about every 3.5 s, s."""
 
 
 def rigid_errors(version: str, ours: bool, folder: Path) -> tuple[float, float, float]:
-    """Return the largest relative errors of momentum, closing speed and energy over impacts with random numbers."""
+    """Return the largest relative errors of momentum, closing speed and energy over impacts with random parameters."""
     fmu, random, worst = mass(folder, version), np.random.default_rng(SEED), np.zeros(3)
     for _ in range(IMPACTS):
         lower, upper, speed = (float(10.0**power) for power in random.uniform(-3.0, 3.0, 3))
@@ -173,7 +176,7 @@ def rigid_errors(version: str, ours: bool, folder: Path) -> tuple[float, float, 
 
 
 def long_run(version: str, folder: Path) -> tuple[int, float, float]:
-    """Return impacts, relative energy gained, and seconds, of a body of ours and a foreign one on springs."""
+    """Return impacts, relative energy gain and seconds of a run with an own and a foreign body on springs."""
     theirs = part("b", mass(folder, version), m=3.0, k=3.0)
     pair = PairSpec(("a", "contact[1]"), BodyPoint("b", "x", "v", "f", 3.0), 0.2)
     importer = Importer(
@@ -209,12 +212,12 @@ def rigid_table(folder: Path) -> None:
 # ---- microseconds per impact ----
 
 CONTACTS = 40
-"""Contacts of a mass that goes to and fro between two springs at -1 and 1 m."""
+"""Contacts of a mass that travels to and fro between two springs at -1 and 1 m."""
 CYCLE = 4.0 + 2.0 * math.pi / 100.0
 
 
 def shuttle(kind: str, folder: Path) -> Callable[[], None]:
-    """Return what runs the contacts once."""
+    """Return a function that runs the contacts once."""
     sides = (("high", 1.0, "upper"), ("low", -1.0, "lower"))
     stops = [yielding_stop(n, "kelvin_voigt", {"stiffness": 1e4}, p, side) for n, p, side in sides]
     if kind == "fused":
@@ -259,11 +262,11 @@ def impact_table(folder: Path) -> None:
 
 
 def main() -> int:
-    """Measure, print, leave datasets and figures; return 1 if a goal is missed."""
+    """Measure, print, write datasets and figures; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="folder of the results")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     held = True

@@ -1,8 +1,8 @@
-"""The fused Oscillator in one step over many periods beside plain loops and scipy's solve_ivp, on the same orbit.
+"""The fused Oscillator in one step over many periods against plain loops and scipy's solve_ivp, on the same orbit.
 
 P(1,1) of m=1, k=1, zeta=.1, F=.5, w=1, r=.7, stop 1; phase and velocity of its impacts are known in closed form.
-A plain loop of 40 lines, in C and by numba (extra `bench`), is what a student writes; nothing of it is certified.
-All are timed in turns, several times, in one process; medians are compared.
+The plain loop, in C and by numba (extra `bench`), is the 40 lines that a student would write; nothing in it is
+certified. All are timed in turns, several times, in one process; medians are compared.
 
 Run with `python tests/benchmarks/bench_fused.py [--impacts 1000000] [--repetitions 7] [--output FOLDER]`.
 """
@@ -33,7 +33,7 @@ from vibroimpact.orchestrator.scene import parse_scene
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
 PERIOD = 2.0 * math.pi
 DAMPING, FORCE, STOP, RESTITUTION = 0.2, 0.5, 1.0, 0.7
-#: Of solve_ivp; it is this many times slower, and its time per impact does not depend on their number.
+#: Impacts of a run of solve_ivp: it is far slower, and its time per impact does not depend on their number.
 PEER_IMPACTS = 100
 PLAIN_IMPACTS = 100_000
 
@@ -80,7 +80,7 @@ class Fused:
 
 
 class Peer:
-    """scipy's solve_ivp, stopped by an event at every impact and started again behind it."""
+    """scipy's solve_ivp, stopped by an event at every impact and restarted after it."""
 
     def __init__(self, tolerance: float) -> None:
         self.name = f"solve_ivp RK45, rtol {tolerance:g}, events"
@@ -116,7 +116,7 @@ class Peer:
 
 
 def compiled_loop() -> Callable[[int], tuple[float, float]]:
-    """Return the loop in C, for this processor: given impacts, phase and velocity of the last."""
+    """Return the loop in C, compiled for this processor: from impacts to phase and velocity of the last one."""
     with tempfile.TemporaryDirectory() as folder:
         built = Path(folder, "plain_loop.so")
         command = [os.environ.get("CC", "cc"), "-O3", "-march=native", "-shared", "-fPIC", "-o", str(built)]
@@ -187,15 +187,15 @@ class Plain:
 
 
 def machine(*others: str) -> dict[str, str]:
-    """Return the processor and the versions, of other packages too, that the figures hold for."""
+    """Return the processor and the versions of the packages, for the record of the figures."""
     model = platform.processor()
     if Path("/proc/cpuinfo").is_file():
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), model)
     compiler = os.environ.get("CC", "cc")
     try:
-        told = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
-        compiler = told.splitlines()[0]
+        output = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+        compiler = output.splitlines()[0]
     except (OSError, subprocess.CalledProcessError):
         compiler = "unknown"
     packages = {name: version(name) for name in ("numpy", "scipy", *others)}
@@ -210,7 +210,7 @@ def machine(*others: str) -> dict[str, str]:
 
 
 def measure(impacts: int, repetitions: int) -> list[dict[str, float | str]]:
-    """Time all in turns; returns medians and the largest errors."""
+    """Time all in turns; return medians and the largest errors."""
     candidates: list[Fused | Plain | Peer] = [
         Fused(impacts),
         Plain("a C loop of 40 lines, not certified", compiled_loop(), PLAIN_IMPACTS),

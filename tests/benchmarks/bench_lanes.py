@@ -1,7 +1,8 @@
-"""Many points in lanes, in every instruction set of this machine, beside the fused Oscillator, scipy, diffrax and FMPy.
+"""Many points in lanes, in every instruction set of this machine, against the fused FMU, scipy, diffrax and FMPy.
 
-P(1,1) of bench_fused, with its errors beside the times; chaos (r .8, no damping, F 1, stop 0, w 2.8); how the cost
-grows with modes, contacts, points and recorded periods. Timed in turns, by processor time; medians are compared.
+The motions are P(1,1) of bench_fused, with its errors, and chaos (r .8, no damping, F 1, stop 0, w 2.8). Further rows
+show the cost over modes, contacts, points and recorded periods. All are timed in turns, by processor time; medians are
+compared.
 
 Run with `python tests/benchmarks/bench_lanes.py [--periods 5000] [--repetitions 7] [--output FOLDER]`.
 """
@@ -40,18 +41,18 @@ SETS = {
     "strobe and extremes of all periods": ("periods", "extrema"),
     "all of all periods": ("periods", "impacts", "extrema"),
 }
-"""What is recorded, by its name."""
+"""Recorded variables, by the name of the set."""
 OTHER_IMPACTS = 100
-"""Of diffrax and FMPy, one in each period: their time per impact does not depend on their number."""
+"""Impacts of diffrax and FMPy, one in each period: the time per impact does not depend on the number."""
 HERE = [each for each in Instructions if each and instructions() >= each]
 
 
 class Clock:
-    """Counts the processor time of the calls of C alone."""
+    """Counts only the processor time of the calls of C."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
-        setattr(lane_points, "run_lanes", self._run)  # noqa: B010 - it stands in for what that module imports
+        setattr(lane_points, "run_lanes", self._run)  # noqa: B010 - it replaces the function that the module imports
 
     def _run(
         self,
@@ -67,7 +68,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """Points, how often they are hit in all, and what of them is recorded."""
+    """Points, the total number of their impacts, and their recorded variables."""
 
     points: Columns
     impacts: float
@@ -82,7 +83,7 @@ class Case:
 
 
 def oscillators(periods: int, recorded: int, **values: float) -> Columns:
-    """Return points of mass 1 and stiffness 1 with one stop that differ in where they start."""
+    """Return points of mass 1 and stiffness 1 with one stop and different starts."""
     points = taken(drawn(1, 1, 1, 0), np.zeros(POINTS, np.int64))
     given = {"held": 0.0, "phase": 0.0, "shape": 1.0, "impulse": 1.0, "observed": 1.0, "stiffness": 1.0}
     for name, value in {**given, "yield_velocity": 0.0, "direction": 1.0, "force": 1.0, **values}.items():
@@ -93,13 +94,13 @@ def oscillators(periods: int, recorded: int, **values: float) -> Columns:
 
 
 def periodic(periods: int, recorded: int = 1) -> Columns:
-    """Return points that all come to P(1,1)."""
+    """Return points that all converge to P(1,1)."""
     body = {"decay": 0.1, "force": 0.5, "angular_frequency": 1.0, "position": 1.0, "restitution": 0.7}
     return oscillators(periods, recorded, start_p=0.0, **body)
 
 
 def counted(points: Columns, *recorded: str) -> Case:
-    """Return those of the points that run in lanes, with how often they are hit."""
+    """Return the points that run in lanes, with their number of impacts."""
     whole = {**points, "begin": np.zeros_like(points["begin"])}
     found = run(whole, extrema=False, periods=False, room=1_000_000)
     kept = np.flatnonzero(found.has_run)
@@ -122,7 +123,7 @@ class Other:
         if found.observation.failure or len(found.observation.impacts) != OTHER_IMPACTS:
             raise RuntimeError(f"{self.name}: expected {OTHER_IMPACTS} impacts, got {found.observation}")
         at, velocity = found.observation.impacts[-1, :2]
-        # the orbit begins half a period behind an impact
+        # the orbit starts half a period after an impact
         return (
             seconds / OTHER_IMPACTS,
             abs(math.remainder(at - 0.5 * PERIOD, PERIOD)),
@@ -131,7 +132,7 @@ class Other:
 
 
 def others() -> list[Peer | Other]:
-    """Return what is measured beside: scipy; diffrax, compiled, alone and vmapped; FMPy without and with CVode."""
+    """Return the other solvers: scipy; diffrax, compiled, alone and vmapped; FMPy without and with CVode."""
     compiled = [Other(way, 1e-6) for way in jax_flights.ways() if "Dopri8" in way.name]
     stepped, _, integrated = fmpy_import.ways()
     return [Peer(1e-6), *compiled, Other(stepped, 1.0), Other(integrated, 1e-6)]
@@ -144,7 +145,7 @@ def errors() -> tuple[float, float]:
 
 
 def cases(periods: int) -> dict[str, Case]:
-    """Return what is timed, by its name."""
+    """Return the timed cases, by name."""
     chaos = {"decay": 0.0, "angular_frequency": 2.8, "position": 0.0, "restitution": 0.8}
     found = {
         "P(1,1)": counted(periodic(periods)),
@@ -162,7 +163,7 @@ def cases(periods: int) -> dict[str, Case]:
 
 
 def measure(periods: int, repetitions: int) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Time all in turns; returns median microseconds per impact, and the others' errors of phase and velocity."""
+    """Time all in turns; return median microseconds per impact, and the others' errors of phase and velocity."""
     clock, fused, off = Clock(), Fused(100_000), {}
     timed: dict[str, Callable[[], float]] = {"fused Oscillator": lambda: fused.run()[0]}
 

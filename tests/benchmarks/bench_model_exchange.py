@@ -1,7 +1,7 @@
-"""What model exchange costs beside co-simulation: seconds per impact and error, one driven mass with a rigid stop.
+"""Cost of model exchange against co-simulation: seconds per impact and error, one driven mass with a rigid stop.
 
-The same FMU in FMPy: stepped by its own exact motion (co-simulation), and integrated by CVode (model exchange) at a
-ladder of tolerances; and by this package's own run. The error is that of the last impact's time, against the exact one.
+FMPy steps the FMU by its own exact motion (co-simulation), and integrates it by CVode (model exchange) at a ladder of
+tolerances. The third run is by this package. The error compares the last impact's time with the exact time.
 
 Run with `python tests/benchmarks/bench_model_exchange.py [FOLDER]`.
 """
@@ -28,7 +28,7 @@ from vibroimpact.fmus.shipped import fmu_path
 TOLERANCES = np.array([1e-4, 1e-6, 1e-8, 1e-10])
 PERIODS = 100
 OWN_PERIODS = 100 * PERIODS
-"""Of our own run, which begins and ends in tenths of a second."""
+"""Forcing periods of the run by this package, whose start and end alone take tenths of a second."""
 REPETITIONS = 3
 FREQUENCY = 0.9
 VALUES = {
@@ -48,7 +48,7 @@ SCENE = {
 
 
 def quickest(run: Callable[[], Any]) -> tuple[Any, float]:
-    """Return a result and the seconds of the quickest of some repetitions."""
+    """Return the result and the time, s, of the quickest of some repetitions."""
     seconds, result = math.inf, None
     for _ in range(REPETITIONS):
         began = time.perf_counter()
@@ -80,7 +80,7 @@ def simulated(kind: str, tolerance: float = 1e-6) -> tuple[float, float, float]:
 
 
 def measured() -> xr.Dataset:
-    """Measure model exchange at all tolerances, co-simulation and our own run once."""
+    """Measure model exchange at all tolerances, and co-simulation and the run by this package once."""
     _, own = quickest(lambda: vi.run(SCENE))
     count, exact, stepped = simulated("CoSimulation")
     ladder = np.array([simulated("ModelExchange", float(t)) for t in TOLERANCES])
@@ -127,11 +127,11 @@ def table(dataset: xr.Dataset) -> None:
 
 
 def main() -> None:
-    """Measure, print, leave a dataset."""
+    """Measure, print, write a dataset."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="folder of the results")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     dataset = measured()

@@ -1,9 +1,11 @@
-"""How many modes the thesis's beams take on stops that yield, and what residual vectors buy.
+"""Number of modes of the thesis's beams on compliant stops, and the benefit of residual vectors.
 
-The scenes of `examples/thesis` with beams and stops, from rest, each stop a Kelvin-Voigt one of so many times the
-static stiffness of the beam at its place: at the tip, and at 0.6 of the length. For each tolerance the fewest modes
-that `modes = "auto"` finds, natural ones alone and with residual vectors, and the processor time of a run with the
-second over one with the first (medians, in turns). The numbers of modes are the same on each machine.
+The scenes are those of `examples/thesis` with beams and stops, from rest. Each stop is a Kelvin-Voigt stop at the tip
+or at 0.6 of the length. Its stiffness is a multiple of the beam's static stiffness there.
+
+For each tolerance the table has the fewest modes that `modes = "auto"` finds, natural modes alone and with residual
+vectors. The last column is the processor time of the second run over the first (medians, in turns). The numbers of
+modes are the same on each machine.
 
 Run with `python tests/benchmarks/bench_modes.py [--repetitions 5]`.
 """
@@ -29,11 +31,11 @@ STIFFNESS_RATIOS = (10.0, 1000.0)
 TOLERANCES = (1e-2, 1e-3, 1e-4)
 PERIODS = 20
 MANY = 400
-"""Modes whose flexibility is summed."""
+"""Modes in the sum of the static flexibility."""
 
 
 def scene_of(name: str, place: float, ratio: float, impacts: bool) -> Scene:
-    """Return a thesis beam on a stop that yields, with modes to be found."""
+    """Return a thesis beam on a compliant stop, with an automatic number of modes."""
     document = parse_toml((THESIS / f"{name}.toml").read_text(encoding="utf-8"))
     body = document["body"]
     modes = beam_modes("clamped_free", MANY)
@@ -52,7 +54,7 @@ def scene_of(name: str, place: float, ratio: float, impacts: bool) -> Scene:
 
 
 def found(scene: Scene, tolerance: float, residual: bool) -> Scene | None:
-    """Return the scene with the fewest modes that meet a tolerance; None where 64 do not."""
+    """Return the scene with the fewest modes that meet a tolerance; None where 64 modes do not meet it."""
     try:
         return with_found_modes(
             scene.with_values({"execution.tolerance": tolerance, "body.residual": residual})

@@ -1,13 +1,13 @@
-"""What it costs to follow orbits and to find basins, beside what one would do instead.
+"""Cost of following orbits and finding basins, against the usual alternatives.
 
 - A branch: P(1,1) of `examples/bifurcation.toml`, and of a clamped beam of 8 modes, with its bifurcations to rounding.
-- Its period doubling by sweeps instead: runs of 20,000 periods; the bracket narrows by one sweep of 41 points after the
-  other, down to 1e-8. A transient near the doubling dies out too slowly for that to be right.
-- One orbit by `scipy.optimize.root` on a shooting function whose flight is `solve_ivp` with an event, beside
-  one by Newton's method on the phases.
-- Basins of 100 x 100 starts, beside single runs of 1,064 periods that are classified.
+- Its period doubling by sweeps instead: runs of 20,000 periods. One sweep of 41 points after the other narrows the
+  bracket down to 1e-8. A transient near the doubling dies out too slowly for a right answer.
+- One orbit by `scipy.optimize.root` on a shooting function whose flight is `solve_ivp` with an event, and by Newton's
+  method on the phases.
+- Basins of 100 x 100 starts, and single runs of 1,064 periods that are classified.
 
-Medians of repetitions in turns, processor time of one core (basins: wall time, two threads), and their range.
+Times are medians and ranges of repetitions in turns, processor time of one core (basins: wall time, two threads).
 Run with `python tests/benchmarks/bench_orbits.py [--repetitions 5]`.
 """
 
@@ -64,12 +64,12 @@ def oscillator() -> vi.Scene:
 
 
 def branches(scene: vi.Scene, span: tuple[float, float], step: float) -> list[Branch]:
-    """Follow P(1,1) and what doubles from it."""
+    """Follow P(1,1) and the branches that double from it."""
     return whole(Following(scene, FREQUENCY, *span, step=step)).followed.branches
 
 
 def doubling_by_sweeps(tolerance: float) -> tuple[float, int]:
-    """Return the period doubling of P(1,1) by sweeps, each of 41 points of the bracket before; and runs made."""
+    """Return the period doubling of P(1,1), and the number of runs; each sweep has 41 points of the last bracket."""
     record = {"record.transient_periods": 20_000, "record.recorded_periods": 64, "record.impacts": True}
     low, high, runs = 0.93, 0.95, 0
     while high - low > tolerance:
@@ -85,7 +85,7 @@ def doubling_by_sweeps(tolerance: float) -> tuple[float, int]:
 
 
 def orbit_by_shooting() -> float:
-    """Return the impact velocity of P(1,1) at .9 by SciPy: unknown are time and speed of the impact."""
+    """Return the impact velocity of P(1,1) at .9 by SciPy; the unknowns are time and speed of the impact."""
     force, w, r, ratio, stop = 0.5, 0.9, 0.7, 0.05, 1.0
 
     def motion(t: float, y: np.ndarray[Any, Any]) -> list[float]:
@@ -118,7 +118,7 @@ BODY = impacting_body(oscillator().with_values({FREQUENCY: 0.9}))
 
 
 def orbit_by_phases() -> float:
-    """Return the same by Newton's method on the phase of the impact."""
+    """Return the same velocity by Newton's method on the phase of the impact."""
     return float(find_orbit(BODY, [0.12]).velocities[0])
 
 
@@ -130,7 +130,7 @@ def basins() -> Any:
 
 
 def single_runs(count: int) -> None:
-    """Run and classify starts one by one in one campaign, as `classify` wants them."""
+    """Run a grid of starts in one campaign and classify each run, with the record that `classify` needs."""
     record = {
         "record.transient_periods": 1000,
         "record.recorded_periods": 64,
@@ -159,7 +159,7 @@ def timed(
     return found
 
 
-def told(times: list[float]) -> str:
+def summary(times: list[float]) -> str:
     """Return the median and the range of times."""
     return f"{statistics.median(times):.4g} s ({min(times):.3g} to {max(times):.3g})"
 
@@ -188,7 +188,7 @@ def main() -> None:
         time.process_time,
     )
     for name, seconds in times.items():
-        print(f"{name}: {told(seconds)}")
+        print(f"{name}: {summary(seconds)}")
     print(f"  speeds differ by {abs(orbit_by_phases() - orbit_by_shooting()):.1e}")
     began = time.process_time()
     where, runs = doubling_by_sweeps(1e-8)
@@ -206,7 +206,7 @@ def main() -> None:
         time.perf_counter,
     )
     for name, seconds in walls.items():
-        print(f"{name}: {told(seconds)}")
+        print(f"{name}: {summary(seconds)}")
     single = statistics.median(walls["400 single runs, classified"]) / 400.0
     own = statistics.median(walls["basins of 10,000 starts"]) / 10_000.0
     print(

@@ -1,11 +1,11 @@
-"""What it costs to record: nothing, extremes, impacts, a time series; and what each example scene calls and writes.
+"""Cost of recording nothing, extremes, impacts or a time series; and calls and bytes of each example scene.
 
-- Records: the motion of `examples/single_run.toml`, 4,000 periods of it, with each record in turns. Processor time,
-  medians of repetitions and their range, over that of the run which records nothing. A time series costs its samples:
-  the time of one sample is told too, at two rates.
-- Points in lanes: what a recorded period of P(1,1) adds through `vi.run`, by the slope between two lengths of a record.
-- Examples: calls of the functions of FMUs, and bytes of the dataset, of one point of each example scene. They are
-  counts, the same on each machine.
+- Records: 4,000 periods of the motion of `examples/single_run.toml`, with each record in turns. The table has the
+  processor time (median and range of repetitions) over that of the run which records nothing. A time series costs
+  time for each sample: this time is printed too, at two rates.
+- Points in lanes: the cost of a recorded period of P(1,1) through `vi.run`, by the slope between two record lengths.
+- Examples: calls of FMU functions, and bytes of the dataset, of one point of each example scene. These counts are
+  the same on each machine.
 
 Run with `python tests/benchmarks/bench_recording.py [--repetitions 9]`.
 """
@@ -44,11 +44,11 @@ LANES = {
     "sweep": {"body.displacement_start": {"start": 0.2, "stop": 0.9, "points": 64}},
 }
 LENGTHS = (200, 2200)
-"""Recorded periods of the two runs whose difference is taken."""
+"""Recorded periods of the two runs; their difference gives the slope."""
 
 
 def scene_of(record: dict[str, Any]) -> Scene:
-    """Return the scene with a record."""
+    """Return the scene with the given record."""
     document = parse_toml((EXAMPLES / "single_run.toml").read_text(encoding="utf-8"))
     keys = {name: value for name, value in record.items() if name != "samples"}
     document["record"] = {"transient_periods": 10, "recorded_periods": PERIODS, **keys}
@@ -61,7 +61,7 @@ def scene_of(record: dict[str, Any]) -> Scene:
 
 
 def seconds_of_records(repetitions: int) -> dict[str, list[float]]:
-    """Run all records in turns; return the processor times of each, s."""
+    """Run all records in turns; return the processor times of each record, s."""
     runners = {name: open_runner(scene_of(record), "fused") for name, record in RECORDS.items()}
     found: dict[str, list[float]] = {name: [] for name in runners}
     for runner in runners.values():
@@ -77,7 +77,7 @@ def seconds_of_records(repetitions: int) -> dict[str, list[float]]:
 
 
 def slopes_in_lanes(repetitions: int) -> dict[str, float]:
-    """Return the processor time of a recorded period of a point in lanes, us, of each set of records."""
+    """Return the processor time of a recorded period of a point in lanes, us, for each set of records."""
     sets = {name: record for name, record in RECORDS.items() if "samples" not in record}
     sets["strobe"] = {**RECORDS["nothing"], "strobe": True}
     found: dict[str, list[float]] = {name: [] for name in sets}
@@ -95,7 +95,7 @@ def slopes_in_lanes(repetitions: int) -> dict[str, float]:
 
 
 def counts_of(path: Path, folder: Path) -> tuple[int, int]:
-    """Return the calls of functions of FMUs, and the bytes of the dataset, of one point of a scene."""
+    """Return the calls of FMU functions and the bytes of the dataset for one point of a scene."""
     scene = load_scene(path).with_sweep({})
     counter = CallCounter()
     runner = open_runner(scene, scene.execution.how, wrap=lambda name: counter.wrap)

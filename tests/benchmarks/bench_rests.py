@@ -1,9 +1,10 @@
-"""What a long rest costs: on one stop and on several, held and pressed, however damped, with energies and without.
+"""Cost of a long rest: on one stop or several, held or pressed, any damping, with and without energies.
 
-Four masses of 1 kg between springs of 1 N/m, pressed outwards to stops at both ends for 100 s under a slow force; stops
-that yield have 1e8 N/m, whose rate is 10^4 rad/s: 10^6 radians of it. Each rest by its exact flow and by series.
+Four masses of 1 kg between springs of 1 N/m are pressed outwards to stops at both ends for 100 s under a slow force.
+Compliant stops have 1e8 N/m, a rate of 10^4 rad/s: the rest lasts 10^6 radians of it. Each rest is computed by its
+exact flow and by series.
 
-Processor time, and the smallest of several repetitions of the exact flow; the series are run once.
+Times are processor times: the smallest of several repetitions of the exact flow, and one run of the series.
 Run with `python tests/benchmarks/bench_rests.py [--repetitions 5] [--output results/bench_rests]`.
 """
 
@@ -45,7 +46,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Figure:
-    """One line of the table, times in ms; `apart`: the largest difference of the two ends."""
+    """One line of the table, times in ms; `apart`: the largest difference between the end states of both runs."""
 
     name: str
     exact: float
@@ -53,7 +54,7 @@ class Figure:
     apart: float
 
     def sentence(self) -> str:
-        """Return it in words."""
+        """Return the line in words."""
         return f"{self.name:42} {self.exact:9.3f} ms {self.series:10.1f} ms by series, ends {self.apart:.0e} apart"
 
 
@@ -64,7 +65,7 @@ def yielding(shape: np.ndarray, side: str) -> Stop:
 
 
 def cases() -> list[Case]:
-    """Return the rests."""
+    """Return the cases of rest."""
     first, last = yielding(SHAPES[0], "lower"), yielding(SHAPES[-1], "upper")
     held = Stop(SHAPES[-1], 0.0, restitution=0.3)
     damper = 0.05 * SPRINGS + np.diag([0.0, 0.4, 0.0, 0.0])
@@ -84,7 +85,7 @@ def cases() -> list[Case]:
 
 
 def followed(case: Case, *, by_series: bool) -> tuple[float, np.ndarray]:
-    """Return the processor time of a rest, s, and its end."""
+    """Return the processor time of a rest, s, and its end state."""
     with Structure(case.modes, case.stops, energies=case.energies, by_series=by_series) as body:
         began = time.process_time()
         body.advance(DURATION, held=OUTWARDS)
@@ -93,14 +94,14 @@ def followed(case: Case, *, by_series: bool) -> tuple[float, np.ndarray]:
 
 
 def measured(case: Case, repetitions: int) -> Figure:
-    """Time a rest both ways."""
+    """Time a rest by its exact flow and by series."""
     exact, end = min((followed(case, by_series=False) for _ in range(repetitions)), key=lambda run: run[0])
     series, other = followed(case, by_series=True)
     return Figure(case.name, 1e3 * exact, 1e3 * series, float(np.abs(end - other).max()))
 
 
 def draw(figures: list[Figure], path: Path) -> None:
-    """Draw both costs of each rest."""
+    """Draw both times of each rest."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,14 +1,15 @@
 """The virtual rig by NI's unmodified client: its speed, its cost in real time, its lateness.
 
-Server and client are processes of their own on this machine.
+Server and client are separate processes on this machine.
 
-- Throughput: a stream reader of doubles empties a finite block that was acquired before, 3 channels, in blocks of 600,
-  6,000 and 60,000 samples per channel; over what 3 channels at 60 kS/s need (180,000 samples a second).
-- Cost: `examples/rig/oscillator.toml` in real time, its output driven, 3 inputs at 60 kS/s, an event and a read every
-  6,000 samples, for some seconds: processor time of the client and of the server, as a share of one core.
-- Lateness: the moment (monotonic clock) at which the program has heard of N samples, and has read them, against that
-  at which the sample clock is due to have taken the last of them. A client does not see when the clock starts: the
-  earliest of all events counts as on time, so that lateness is over the best case.
+- Throughput: a stream reader of doubles empties a finished acquisition of 3 channels, in blocks of 600, 6,000 and
+  60,000 samples per channel. The result is relative to the need of 3 channels at 60 kS/s (180,000 samples a second).
+- Cost: `examples/rig/oscillator.toml` runs in real time for some seconds, with its output driven and 3 inputs at
+  60 kS/s. Every 6,000 samples bring an event and a read. The results are the processor times of client and server, as
+  shares of one core.
+- Lateness: the program learns of N samples, and has read them, later than their due time by the sample clock. Both
+  delays are measured by the monotonic clock. A client does not see the clock start: the earliest of all events counts
+  as on time. So lateness is relative to the best case.
 
 Goals: 50 times, 25 % of a core. Run with `python tests/benchmarks/bench_rig.py [--runs 3] [--seconds 10]`.
 """
@@ -40,7 +41,7 @@ CHANNELS, RATE = 3, 60_000
 NEEDED = CHANNELS * RATE
 """Samples a second that a program reads in real time."""
 TIMES, SHARE = 50.0, 0.25
-"""Goals: throughput over `NEEDED`, processor time of client and server over that of a core."""
+"""Goals: least throughput over `NEEDED`; most processor time of client and server over that of a core."""
 BLOCKS = (600, 6_000, 60_000)
 EVERY = 6_000
 
@@ -74,7 +75,7 @@ def inputs(channel: object, mode: constants.AcquisitionType, samples: int) -> ni
 
 
 def throughput(channel: object, block: int) -> float:
-    """Return the samples a second that a stream reader takes of a block that is there."""
+    """Return the rate at which a stream reader reads an acquired block, samples per second."""
     count = max(600_000 // block, 1) * block
     with inputs(channel, constants.AcquisitionType.FINITE, count) as task:
         task.start()
@@ -99,7 +100,7 @@ class RealTime:
 
 
 def in_real_time(address: str, server: psutil.Process, seconds: float) -> RealTime:
-    """Drive the rig and read it for some seconds; return what it cost and how late it was."""
+    """Drive the rig and read it for some seconds; return costs and lateness."""
     me = psutil.Process(os.getpid())
     with open_channel(address) as channel:
         RigControl(channel).pace(lockstep=False, speed=1.0)
@@ -111,25 +112,25 @@ def in_real_time(address: str, server: psutil.Process, seconds: float) -> RealTi
             drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
             drive.timing.cfg_samp_clk_timing(RATE, sample_mode=constants.AcquisitionType.CONTINUOUS)
             drive.write(3.0 * np.sin(2.0 * np.pi * np.arange(10_000) / 10_000))
-            heard: queue.SimpleQueue[float] = queue.SimpleQueue()
+            received: queue.SimpleQueue[float] = queue.SimpleQueue()
 
-            def hear(*_: object) -> int:
-                heard.put(time.monotonic())
+            def receive(*_: object) -> int:
+                received.put(time.monotonic())
                 return 0
 
-            task.register_every_n_samples_acquired_into_buffer_event(EVERY, hear)
+            task.register_every_n_samples_acquired_into_buffer_event(EVERY, receive)
             reader = stream_readers.AnalogMultiChannelReader(task.in_stream)
             reader.verify_array_shape = False
             data = np.zeros((CHANNELS, EVERY))
             drive.start()
             task.start()
-            heard.get(timeout=10.0)  # the first calls make the connection
+            received.get(timeout=10.0)  # the first calls make the connection
             reader.read_many_sample(data, EVERY)
             events, reads = [], []
             before = processor_time(me), processor_time(server)
             began = time.monotonic()
             for _ in range(round(seconds * RATE / EVERY)):
-                events.append(heard.get(timeout=10.0))
+                events.append(received.get(timeout=10.0))
                 reader.read_many_sample(data, EVERY)
                 reads.append(time.monotonic())
             passed = time.monotonic() - began

@@ -1,8 +1,8 @@
-"""Where a campaign saturates with many workers: 200 of them in one process, whose points sleep.
+"""Saturation of a campaign with many workers: up to 200 of them in one process, whose points sleep.
 
-Schedule, client and scheduler are those of a campaign; a worker sleeps for what its points would take, and writes no
-part. All share this process and its interpreter lock, as workers of other machines do not: the rates are lower bounds.
-The ideal is the number of workers over the seconds of a point.
+Schedule, client and scheduler are those of a campaign; a worker sleeps for the time of its points, and writes no part.
+All share this process and its interpreter lock, unlike workers on other machines: the rates are lower bounds. The ideal
+rate is the number of workers over the seconds of a point.
 
 Run with `python tests/benchmarks/bench_scale.py [--output results/benchmarks]`, on a quiet machine.
 """
@@ -36,10 +36,10 @@ matplotlib.use("Agg")
 WORKERS = (1, 2, 5, 10, 20, 50, 100, 200)
 POINT_MILLISECONDS = (1.0, 10.0, 100.0)
 SECONDS = 3.0
-"""Length of a measurement with ideal workers."""
+"""Duration of a measurement with ideal workers, s."""
 MOST_POINTS = 400_000
 SATURATED = 0.8
-"""Part of the ideal rate below which a campaign counts as saturated."""
+"""Share of the ideal rate below which a campaign counts as saturated."""
 SCENE = """
 [scene]
 units = "nondimensional"
@@ -64,7 +64,7 @@ Rate = tuple[float, int, float]
 
 
 class Sleeper:
-    """Stands in for `run_chunk`: takes the time of the points, up to where a chunk ends early."""
+    """Replaces `run_chunk`: sleeps for the time of the points, and ends a chunk early where a worker would."""
 
     def __init__(self, point_seconds: float) -> None:
         self._seconds = point_seconds
@@ -79,7 +79,7 @@ class Sleeper:
 
 @contextmanager
 def workers_of_this_process(number: int) -> Iterator[Cluster]:
-    """Open workers that are threads."""
+    """Open workers that are threads of this process."""
     with (
         LocalCluster(
             n_workers=number,
@@ -97,7 +97,7 @@ def workers_of_this_process(number: int) -> Iterator[Cluster]:
 
 
 def rate(number: int, point_seconds: float) -> float:
-    """Return how many points per second so many workers do."""
+    """Return the points per second of `number` workers."""
     points = min(int(SECONDS * number / point_seconds), MOST_POINTS)
     scene = parse_scene(SCENE.format(points=points), "scale.toml")
     done = 0
@@ -138,7 +138,7 @@ def draw(rates: Sequence[Rate], path: Path) -> None:
 
 
 def sentence(rates: Sequence[Rate]) -> str:
-    """Say how much of the ideal the most workers reach, and where each kind of point saturates."""
+    """Return the share of the ideal at the most workers, and the saturation of each kind of point, in words."""
     said = []
     for milliseconds in POINT_MILLISECONDS:
         of = [
@@ -157,7 +157,7 @@ def sentence(rates: Sequence[Rate]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print, leave a table and a figure."""
+    """Measure, print, write a table and a figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("results", "benchmarks"))
     options = parser.parse_args(arguments)

@@ -1,4 +1,4 @@
-"""How fast the service answers beside a running campaign: 50 clients that each ask once a second; its memory."""
+"""Response time of the service during a campaign: 50 clients that each ask once a second; and its memory."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from support.served import Served, sweep_text
 GOAL_MILLISECONDS = 100.0
 CLIENTS, SECONDS, REQUESTS = 50, 60.0, 10_000
 CAMPAIGN = 1_000_000, 20_000
-"""Points of the campaign beside which the clients ask, and periods of each: it outlasts them."""
+"""Points of the running campaign, and periods of each: it outlasts the clients."""
 GOAL_GROWTH = 0.05
-"""Of the memory of the service over all requests, relative."""
+"""Largest growth of the memory of the service over all requests, relative."""
 
 
 def ask(
     url: str, headers: dict[str, str], until: float, offset: float, waits: list[float], errors: list[str]
 ) -> None:
-    """Ask once a second until a time has come; note how long each answer took, s."""
+    """Ask once a second until a time; note the duration of each answer, s."""
     with httpx.Client(headers=headers, timeout=30.0) as client:
         time.sleep(offset)
         while time.monotonic() < until:
@@ -94,7 +94,7 @@ def main() -> int:
 
 
 def clients(url: str, headers: dict[str, str], seconds: float) -> tuple[list[float], list[str]]:
-    """Let all clients ask, spread over a second; return what each answer took, s, and what went wrong."""
+    """Run all clients, spread over a second; return the duration of each answer, s, and the errors."""
     waits: list[float] = []
     errors: list[str] = []
     until = time.monotonic() + seconds
@@ -110,7 +110,7 @@ def clients(url: str, headers: dict[str, str], seconds: float) -> tuple[list[flo
 
 
 def memory(served: Served, headers: dict[str, str], requests: int) -> tuple[float, float]:
-    """Return how much the memory of a service has grown over requests, relative, and how many it answers a second."""
+    """Return the relative growth of a service's memory over many requests, and its answers per second."""
     process = psutil.Process(served.process.pid)
     with httpx.Client(headers=headers, timeout=30.0, base_url=served.url) as client:
         for _ in range(requests // 10):

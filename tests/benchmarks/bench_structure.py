@@ -1,13 +1,17 @@
-"""What an impact of a beam costs: on a periodic orbit, over the number of modes, by law; a rest; a stop out of reach.
+"""Cost of an impact of a beam: periodic orbit, number of modes, contact law, rest, and a stop out of reach.
 
-Clamped-free beam in units of its first mode (natural frequencies (xi_j / xi_1)^2), driven at its tip with 0.9 of
-the first natural frequency, with a stop of r = .7 at the tip. Damping ratio .02 in every mode and a stop at .98 of the
-amplitude that the steady motion would have there: with 8 modes an orbit of one impact per period. The tip of a beam is
-lighter the more modes there are (m / 4N) and soon bounces many times per period; to compare the same kind of orbit, the
-cost over the number of modes is taken at damping ratio .3 with a stop so near to the amplitude (`GAPS`) that there is
-one impact per period for every number of modes.
+A clamped-free beam in units of its first mode (natural frequencies (xi_j / xi_1)^2) is driven at its tip with 0.9 of
+the first natural frequency. A stop with r = .7 is at the tip.
 
-Processor time, and the smallest of several repetitions: other work on the machine does not count.
+| motion | damping ratio | stop, over the amplitude of the steady motion without it |
+|---|---|---|
+| P(1,1) with 8 modes | .02 in every mode | .98 |
+| cost over the number of modes | .3 | `GAPS` |
+
+The tip of a beam is lighter the more modes there are (m / 4N) and soon bounces many times per period. High damping and
+the close stop of `GAPS` give one impact per period for every number of modes: the orbits are of one kind.
+
+Times are processor times, the smallest of several repetitions: other work on the machine does not count.
 Run with `python tests/benchmarks/bench_structure.py [--repetitions 5] [--output results/bench_structure]`.
 """
 
@@ -41,7 +45,7 @@ SETTLING, PERIODS = 400, 2000
 
 @dataclass(frozen=True)
 class Figure:
-    """One line of the table: what it costs, and on which motion."""
+    """One line of the table: a cost, and the motion to which it belongs."""
 
     name: str
     modes: int
@@ -51,7 +55,7 @@ class Figure:
     repeats_after: int
 
     def sentence(self) -> str:
-        """Return it in words."""
+        """Return the line in words."""
         orbit = f"repeats after {self.repeats_after}" if self.repeats_after else "not periodic"
         return (
             f"{self.name:46}{self.modes:4d} modes {self.microseconds:10.3f} us per {self.per}"
@@ -69,7 +73,7 @@ def beam(modes: int, damping: float = DAMPING) -> tuple[Modes, NDArray[np.float6
 
 
 def repeats_after(velocities: NDArray[np.float64]) -> int:
-    """Return after how many impacts the velocities repeat to 1e-9; 0: not within 12."""
+    """Return the number of impacts after which the velocities repeat to 1e-9; 0 where it is above 12."""
     for count in range(1, 13):
         if len(velocities) > 4 * count and np.allclose(velocities[count:], velocities[:-count], rtol=1e-9):
             return count
@@ -77,7 +81,7 @@ def repeats_after(velocities: NDArray[np.float64]) -> int:
 
 
 def timed(body: Structure, periods: int, repetitions: int) -> float:
-    """Return the smallest processor time of following the body for so many periods, s."""
+    """Return the smallest processor time of following the body for `periods` periods, s."""
     best = math.inf
     for _ in range(repetitions):
         began = time.process_time()
@@ -93,7 +97,7 @@ def impacts(
     make: Callable[[NDArray[np.float64], float], Stop],
     damping: float = DAMPING,
 ) -> Figure:
-    """Time a beam with one stop per impact."""
+    """Return the time per impact of a beam with one stop."""
     body_modes, tip, amplitude = beam(modes, damping)
     with Structure(body_modes, [make(tip, amplitude)]) as body:
         body.advance(SETTLING * PERIOD)
@@ -106,7 +110,7 @@ def impacts(
 
 
 def restitution(tip: NDArray[np.float64], amplitude: float) -> Stop:
-    """Return the stop of the P(1,1) orbit."""
+    """Return the stop of the P(1,1) motion."""
     return Stop(tip, GAP * amplitude, restitution=RESTITUTION)
 
 
@@ -136,7 +140,7 @@ def laws(modes: int, repetitions: int) -> list[Figure]:
 
 
 def sticking(modes: int, repetitions: int, *, by_series: bool = False) -> Figure:
-    """Time a beam that a slow drive presses to its stop for half of each period, long rests by series or not."""
+    """Time a beam that a slow drive presses to its stop for half of each period; series or the exact flow for rests."""
     found = beam_modes("clamped_free", modes)
     natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
     tip, slow = np.asarray(found.shapes([1.0]))[0], 0.2
@@ -174,7 +178,7 @@ def out_of_reach(modes: int, repetitions: int) -> tuple[Figure, Figure]:
 
 
 def empty_call(repetitions: int) -> float:
-    """Return what a call of the door costs by itself, us: a sample of one mode without a stop or a force."""
+    """Return the time of a bare call into the C library, us: a sample of one mode without a stop or a force."""
     best = math.inf
     with Structure(Modes([1.0])) as body:
         for _ in range(repetitions):

@@ -1,12 +1,12 @@
-"""What it costs that runs are watched and files are sealed: the step budget and the checksums.
+"""Cost of watched runs and sealed files: the step budget and the checksums.
 
-- Step budget: what the loops of the engine count and look at, so that a deadline is kept and Ctrl-C is heard within one
-  step. The core is compiled twice, as it is and with a `budget` that counts and stops nothing; the two follow the same
-  motions in turns: an oscillator on its orbit of one impact per period, and a clamped-free beam of 8 modes on its own.
-- Checksums: the chunks of a campaign are computed and written; then their parts are hashed as the campaign does it, in
-  memory when they are written, and as files when they are read.
+- Step budget: the loops of the engine count their steps, so that a deadline is kept and Ctrl-C is heard within one
+  step. The core is compiled twice, unchanged and with a `budget` that counts and stops nothing. Both follow the same
+  motions in turns: an oscillator and a clamped-free beam of 8 modes, each on its orbit of one impact per period.
+- Checksums: the chunks of a campaign are computed and written. Then their parts are hashed as by the campaign: in
+  memory when written, and as files when read.
 
-Processor time; medians of repetitions, and their range. Run with
+Times are processor times; medians of repetitions, and their range. Run with
 `python tests/benchmarks/bench_watching.py [--repetitions 15] [--points 4000]`.
 """
 
@@ -40,10 +40,10 @@ from support import structure
 from support.core_doors import compile_with_doors
 from support.structure import Structure
 
-#: The goal of each, %.
+#: Largest cost of the budget and of the checksums, %.
 MOST_PERCENT = 3.0
 OSCILLATOR_PERIODS, BEAM_PERIODS = 50_000, 4_000
-PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773  # of the orbit, as in bench_fused
+PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773  # values on the orbit, as in bench_fused
 
 UNWATCHED = {
     "budget->spent += evaluations;": "(void)budget, (void)evaluations;",
@@ -102,7 +102,7 @@ def beam_seconds() -> float:
 
 
 def in_turns(run: Callable[[], float], libraries: dict[str, CDLL], repetitions: int) -> list[float]:
-    """Return what the watched core costs more, %, of each repetition."""
+    """Return the additional cost of the watched core, %, in each repetition."""
     more = []
     for turn in range(repetitions):
         seconds = {}
@@ -119,13 +119,13 @@ def in_turns(run: Callable[[], float], libraries: dict[str, CDLL], repetitions: 
 
 
 def forget_libraries() -> None:
-    """Let the next call load its library anew."""
+    """Clear the caches, so that the next call loads its library anew."""
     oscillator._library.cache_clear()
     structure._library.cache_clear()
 
 
 def checksum_percent(points: int) -> float:
-    """Return the time that hashing takes of that of the chunks, %."""
+    """Return the time of hashing over the time of the chunks, %."""
     scene = parse_scene(SCENE.format(transient=300, points=points), "bench.toml")
     with tempfile.TemporaryDirectory() as folder:
         chunks = run_campaign(scene, Path(folder, "campaign"), workers=WORKERS).chunks
@@ -147,7 +147,7 @@ def checksum_percent(points: int) -> float:
 
 
 def main() -> int:
-    """Measure and print; return 1 where a goal is missed."""
+    """Measure and print; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repetitions", type=int, default=15)
     parser.add_argument("--points", type=int, default=4000)

@@ -1,4 +1,4 @@
-"""`make conformance NI_TESTS=path`: NI's own tests on the virtual rig, into docs/rig.md; exit code 1 where one fails.
+"""`make conformance NI_TESTS=path`: NI's own tests on the virtual rig, into docs/rig.md; exit code 1 if one fails.
 
 `python -m conformance PATH [pytest's arguments]` runs some of them, and writes nothing.
 """
@@ -51,7 +51,7 @@ WIRE = 'ai{place} = {{ signal = "sensor.displacement", amplification = {volts} }
 
 
 def main() -> int:
-    """Run NI's tests and say what became of them."""
+    """Run NI's tests and print their outcomes."""
     given = sys.argv[1] if len(sys.argv) > 1 else ""
     checkout = Path(given)
     if not given or not (checkout / "tests" / "component" / "conftest.py").is_file():
@@ -84,13 +84,13 @@ def _files(checkout: Path) -> list[str]:
 
 
 def _commit(checkout: Path) -> str:
-    asked = ["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"]
-    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    command = ["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stdout.strip() if done.returncode == 0 else "unknown"
 
 
 def rig_in(folder: Path) -> Path:
-    """Write the rig that NI's tests are run on into a folder; return its file."""
+    """Write the rig for NI's tests into a folder; return its file."""
     (folder / "still.toml").write_text(SCENE, encoding="utf-8")
     wires = "".join(WIRE.format(place=place, volts=place + 1.0) for place in range(8))
     file = folder / "rig.toml"

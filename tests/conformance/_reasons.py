@@ -1,4 +1,4 @@
-"""What of NI's tests does not apply to the virtual rig, and why."""
+"""Parts of NI's tests that do not apply to the virtual rig, and the reasons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NOT_RUN = {
     "*test_scale*.py": "custom scales: the rig has none",
     "*test_export_signals_properties.py": "exported signals: the rig has no terminals that drive a wire",
 }
-"""Files that are not run, by a pattern of their paths."""
+"""Files that are not run, by a pattern of their paths, and the reasons."""
 
 NOT_MET = {
     "*test_in_stream.py::*[[]3-*": "a simulated device of NI follows the range of a channel, the rig its plant: 3 V",
@@ -30,14 +30,14 @@ NOT_MET = {
     "*hardcoded_error_message*": "the words of an error are the rig's",
     "*add_global_channels*": "asks the driver of this machine whatever the client is told",
 }
-"""Tests that fail on the rig and may, by a pattern of their names."""
+"""Tests that are allowed to fail on the rig, by a pattern of their names, and the reasons."""
 
 
 def reason_not_run(path: str) -> str | None:
-    """Return why a file of tests is not run; None where it is."""
+    """Return the reason why a file of tests is not run; None if it runs."""
     return next((why for pattern, why in NOT_RUN.items() if fnmatchcase(path, pattern)), None)
 
 
 def reason_not_met(test: str) -> str | None:
-    """Return why a test may fail on the rig; None where it may not."""
+    """Return the reason why a test may fail on the rig; None if it may not."""
     return next((why for pattern, why in NOT_MET.items() if fnmatchcase(test, pattern)), None)

@@ -1,4 +1,4 @@
-"""The table of what became of NI's tests, file by file."""
+"""The table of the outcomes of NI's tests, file by file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ HEADING = "## NI's own tests"
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a test.
+    """Outcome of a test.
 
     Attributes
     ----------
     test : str
-        pytest's name of it, with the path of its file.
+        Name of the test for pytest, with the path of its file.
     outcome : str
-        `passed`, `failed`, `skipped` (by NI: it needs another device), or `refused`: the rig has no model of it.
+        `passed`, `failed`, `skipped` (by NI: it needs another device), or `refused` (the rig does not model it).
     said : str
         The first line of the error.
     """
@@ -32,12 +32,12 @@ class Outcome:
 
     @property
     def file(self) -> str:
-        """Its file, below the folder of component tests."""
+        """File of the test, below the folder of component tests."""
         return self.test.split("::")[0].removeprefix("tests/component/")
 
 
 def one_for_each(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Return the worst outcome of each test, of which set-up, call and end have one each."""
+    """Return the worst outcome of each test: set-up, call and end have one outcome each."""
     worst = ("failed", "refused", "skipped", "passed")
     found: dict[str, Outcome] = {}
     for outcome in outcomes:
@@ -48,7 +48,7 @@ def one_for_each(outcomes: Iterable[Outcome]) -> list[Outcome]:
 
 
 def failures(outcomes: Iterable[Outcome]) -> list[Outcome]:
-    """Return the tests that fail and may not."""
+    """Return the tests that fail without being allowed to."""
     return [each for each in outcomes if each.outcome == "failed" and reason_not_met(each.test) is None]
 
 
@@ -69,13 +69,18 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
         if why:
             reasons[why] += 1
     total = sum(numbers.values(), Counter())
-    head = (
-        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig,"
-        f"\nunmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}: "
-        f"{total['passed']} pass,\n{total['refused']} meet a refusal with -200452 (the rig has no model of what they "
-        f"want), {total['skipped']} are skipped by NI's own fixtures\n(they look for another device), "
-        f"{total['not met']} do not apply (below), {total['failed']} fail."
-    )
+    head = [
+        "`make conformance NI_TESTS=...` runs `tests/component` of a checkout of ni/nidaqmx-python on the virtual rig,",
+        f"unmodified, through NI's client. Last run: their commit {commit}, nidaqmx {client}.",
+        "",
+        "| outcome | tests |",
+        "|---|---|",
+        f"| pass | {total['passed']} |",
+        f"| refused with -200452 (the rig has no model of the call) | {total['refused']} |",
+        f"| skipped by NI's own fixtures (they look for another device) | {total['skipped']} |",
+        f"| do not apply (below) | {total['not met']} |",
+        f"| fail | {total['failed']} |",
+    ]
     columns = ("passed", "refused", "skipped", "not met", "failed")
     rows = [
         f"| `{file}` | " + " | ".join(str(count[name] or "") for name in columns) + " |"
@@ -88,12 +93,12 @@ def section(outcomes: Iterable[Outcome], client: str, commit: str) -> str:
     ]
     why = [f"- {count}: {reason}." for reason, count in sorted(reasons.items())]
     left_out = [f"- {reason}." for reason in dict.fromkeys(NOT_RUN.values())]
-    parts = [HEADING, "", head, "", *table, "", "Do not apply:", "", *why, "", "Files that are not run:", ""]
+    parts = [HEADING, "", *head, "", *table, "", "Do not apply:", "", *why, "", "Files that are not run:", ""]
     return "\n".join([*parts, *left_out]) + "\n"
 
 
 def write_section(page: Path, text: str) -> None:
-    """Put the section into a page, in the place of the one that is there."""
+    """Replace the section in a page."""
     whole = page.read_text(encoding="utf-8")
     before, there, rest = whole.partition(HEADING)
     _, following, after = rest.partition("\n## ")

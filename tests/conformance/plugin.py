@@ -1,7 +1,7 @@
 """A plugin for the pytest that runs NI's tests: their server and their devices are the virtual rig.
 
-Their files are read as they are. What they look for on the machine, NI's server and simulated devices by product, is
-replaced in their modules before the first test; a test that needs another device is skipped by them.
+NI's files stay unchanged. They look for NI's server and for simulated devices by product on the machine. The plugin
+replaces both in their modules before the first test. NI's tests skip themselves if they need another device.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NOT_MODELLED = DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT
 
 
 class _Rig:
-    """Stands where their fixture starts NI's server."""
+    """Replaces the fixture's start of NI's server."""
 
     def __init__(self) -> None:
         self.server_port = int(os.environ[ADDRESS])
@@ -45,7 +45,7 @@ def _rig_device(system: Any) -> Any:
 
 
 def pytest_sessionstart() -> None:
-    """Let their fixtures find the rig."""
+    """Redirect NI's fixtures to the rig."""
     theirs: Any = sys.modules["tests.conftest"]
     by_product = theirs._device_by_product_type
 
@@ -55,16 +55,16 @@ def pytest_sessionstart() -> None:
         return by_product(product_type, device_type, system)
 
     channel = open_channel(f"localhost:{os.environ[ADDRESS]}")
-    # modules ask for the version of the driver when they are read
+    # modules read the version of the driver at import
     System.local = staticmethod(lambda: System.remote(nidaqmx.GrpcSessionOptions(channel, "")))
     theirs.GrpcServerProcess = _Rig
     theirs._device_by_product_type = device_by_product_type
-    # a board whose outputs they read back: the rig does, though it is simulated
+    # a board whose outputs can be read back: the rig can, although it is simulated
     theirs._x_series_device = lambda device_type, system, *_, **__: _rig_device(system)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what they run on the driver."""
+    """Deselect the tests that need the driver."""
     library = [item for item in items if "library_init_kwargs" in item.name]
     config.hook.pytest_deselected(items=library)
     items[:] = [item for item in items if item not in library]
@@ -72,7 +72,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[Any]) -> Iterator[None]:
-    """Note what became of a test, and whether it was the rig that refused what it has no model of."""
+    """Record the outcome of a test, and whether the rig refused it for lack of a model."""
     report = yield
     if report.when != "call" and report.passed:
         return report

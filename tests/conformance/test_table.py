@@ -1,4 +1,4 @@
-"""The table of NI's tests: what counts as what."""
+"""The table of NI's tests: the category of each outcome."""
 
 from __future__ import annotations
 

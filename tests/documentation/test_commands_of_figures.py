@@ -1,4 +1,4 @@
-"""Every command of the pages of orbits and of the thesis's figures is run; what it says and draws is counted."""
+"""Every command of the pages of orbits and of the thesis's figures runs; its output and its figure are counted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SECOND = "--second forcing.amplitude --second-from 0.02 --second-to 1.2 --doubli
 
 
 class Shown(NamedTuple):
-    """What a command says, and how many points the artists of its figure have that have most."""
+    """Output of a command, and the largest numbers of points of the artists of its figure."""
 
     says: tuple[str, ...]
     draws: tuple[int, ...] = ()
@@ -100,7 +100,7 @@ MAP = """[sweep]
 
 
 def commands_of(page: str) -> list[str]:
-    """Return the commands of a page, in its blocks and its sentences, but for those with a word for any file."""
+    """Return the commands in the blocks and sentences of a page, except commands with a word for any file."""
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     spans = re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
@@ -117,7 +117,7 @@ def test_every_command_of_the_pages_is_run() -> None:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory, cluster: str) -> Callable[[str], tuple[str, list[int]]]:
-    """Return a function that runs a command, and before it those that make its files, once each."""
+    """Return a function that runs a command after the commands that make its files, once each."""
     folder = tmp_path_factory.mktemp("pages")
     (folder / "examples").symlink_to(EXAMPLES)
     # a campaign of any scene, and a map of both numbers
@@ -145,7 +145,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, cluster: str) -> Callable[[str
 
 
 def _ran(folder: Path, *words: str) -> tuple[str, list[int]]:
-    """Run a command; return what it says, and the numbers of points of what it draws, the largest first."""
+    """Run a command; return its output, and the numbers of points of its artists, the largest first."""
     figures: list[Figure] = []
     save = Figure.savefig
 

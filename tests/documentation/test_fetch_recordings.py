@@ -1,4 +1,4 @@
-"""examples/recordings/fetch.py gets what the pages name, whole or not at all, from a server on this machine."""
+"""examples/recordings/fetch.py gets the files of the pages, whole or not at all, from a server on this machine."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ import pytest
 from support.places import ROOT
 
 CONTENT = b"0.0 1.0\n0.1 2.0\n"
-ASKED = "/somebody/rig/0123abcd/data/set #1/hit 1.txt"
+REQUESTED = "/somebody/rig/0123abcd/data/set #1/hit 1.txt"
 
 
 @pytest.fixture
 def fetch(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Return the script, which knows one recording of one file."""
+    """Return the script with a single recording of a single file."""
     spec = importlib.util.spec_from_file_location("fetch", ROOT / "examples" / "recordings" / "fetch.py")
     assert spec is not None
     assert spec.loader is not None
@@ -39,18 +39,18 @@ def one_file(fetch: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Server(HTTPServer):
-    """Serves one file; remembers what it was asked for."""
+    """Serves one file; stores the requests."""
 
     content = CONTENT
-    asked: list[str]
+    requests: list[str]
 
 
 class Handler(BaseHTTPRequestHandler):
     server: Server
 
     def do_GET(self) -> None:
-        self.server.asked.append(unquote(self.path))
-        found = unquote(self.path) == ASKED
+        self.server.requests.append(unquote(self.path))
+        found = unquote(self.path) == REQUESTED
         self.send_response(200 if found else 404)
         self.send_header("Content-Length", str(len(self.server.content) if found else 0))
         self.end_headers()
@@ -58,13 +58,13 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(self.server.content)
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Say nothing."""
+        """Write no log."""
 
 
 @pytest.fixture
 def server() -> Iterator[Server]:
     with Server(("127.0.0.1", 0), Handler) as served:
-        served.asked = []
+        served.requests = []
         thread = threading.Thread(target=served.serve_forever)
         thread.start()
         yield served
@@ -83,7 +83,7 @@ def test_a_recording_is_fetched_once_with_its_licence_said(
     for _ in range(2):
         assert fetch.main(["hit", "-o", str(tmp_path), "--server", address(server)]) == 0
     assert (tmp_path / "hit.txt").read_bytes() == CONTENT
-    assert server.asked == [ASKED]
+    assert server.requests == [REQUESTED]
     said = capsys.readouterr().out
     assert said.count("hit: hit.txt\n    MIT, github.com/somebody/rig at 0123abcd") == 2
 
@@ -122,7 +122,7 @@ def test_a_file_of_the_users_own_is_not_overwritten(
     (tmp_path / "hit.txt").write_text("mine")
     assert fetch.main(["hit", "-o", str(tmp_path), "--server", address(server)]) == 2
     assert (tmp_path / "hit.txt").read_text() == "mine"
-    assert server.asked == []
+    assert server.requests == []
     assert capsys.readouterr().err.endswith("got another. Move it away.\n")
 
 

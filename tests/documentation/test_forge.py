@@ -1,4 +1,4 @@
-"""What a forge and pre-commit read is valid, and names targets, programs and versions that are there."""
+"""Files for a forge and pre-commit are valid, and name existing targets, programs and versions."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ def test_the_workflow_calls_targets_of_the_makefile_and_extras_that_are_there() 
 
 def test_the_workflow_asks_for_pythons_that_the_package_allows_the_oldest_among_them() -> None:
     jobs = read(WORKFLOW)["jobs"]
-    asked = {step["with"]["python-version"] for step in steps() if "python-version" in step.get("with", {})}
-    asked |= set(jobs["linux"]["strategy"]["matrix"]["python"])
-    asked |= {one["python"] for one in jobs["untried"]["strategy"]["matrix"]["include"]}
-    versions = {tuple(map(int, version.split("."))) for version in asked if "{" not in version}
+    stated = {step["with"]["python-version"] for step in steps() if "python-version" in step.get("with", {})}
+    stated |= set(jobs["linux"]["strategy"]["matrix"]["python"])
+    stated |= {one["python"] for one in jobs["untried"]["strategy"]["matrix"]["include"]}
+    versions = {tuple(map(int, version.split("."))) for version in stated if "{" not in version}
     assert min(versions) == (3, 11)
     assert PROJECT["requires-python"] == ">=3.11"
-    assert {f"3.{minor}" for minor in range(11, 15)} <= asked
+    assert {f"3.{minor}" for minor in range(11, 15)} <= stated
     assert jobs["untried"]["continue-on-error"] is True
 
 
 def test_long_series_run_each_week_and_no_push_waits_for_them() -> None:
     workflow = read(WORKFLOW)
-    # YAML takes the word for a truth
+    # YAML reads the key `on` as true
     assert workflow[True]["schedule"] == [{"cron": "17 2 * * 6"}]
     assert workflow["jobs"]["soak"]["if"] == "github.event_name == 'schedule'"
     assert {"run": "make soak", "env": {"MINUTES": 240}} in workflow["jobs"]["soak"]["steps"]
@@ -68,12 +68,12 @@ def test_the_workflow_may_read_only() -> None:
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
 def test_an_issue_form_asks_questions_each_with_a_name_of_its_own(form: Path) -> None:
-    asked = read(form)
-    assert asked["name"]
-    assert asked["description"]
-    ids = [question["id"] for question in asked["body"]]
+    content = read(form)
+    assert content["name"]
+    assert content["description"]
+    ids = [question["id"] for question in content["body"]]
     assert len(set(ids)) == len(ids) > 2
-    assert all(question["attributes"]["label"] for question in asked["body"])
+    assert all(question["attributes"]["label"] for question in content["body"])
 
 
 @pytest.mark.parametrize("name", ["bug", "wrong_number"])

@@ -1,4 +1,4 @@
-"""Pages that lead somebody in are true: commands are understood, code runs, lists are whole."""
+"""Introductory pages are true: commands are accepted, code runs, lists are complete."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SCENES = sorted(
     path for folder in (".", "thesis", "recordings") for path in (EXAMPLES / folder).glob("*.toml")
 )
 INDEX = (EXAMPLES / "README.md").read_text(encoding="utf-8")
-#: Needs an FMU of somebody else, which is not shipped.
+#: Scenes that need a foreign FMU, which is not shipped.
 NOT_RUN = {"bouncing_ball"}
 PAGES = [*(ROOT / "docs" / f"{name}.md" for name in ("index", "tutorial", "howto")), EXAMPLES / "README.md"]
 
@@ -61,7 +61,7 @@ def command_line() -> Any:
 
 
 def understood(command: str) -> None:
-    """Let the command line parse a command; nothing is run."""
+    """Parse a command without running it."""
     chosen = command_line()
     words = shlex.split(command)
     context = chosen.context_class(chosen, info_name=words.pop(0))
@@ -109,7 +109,7 @@ def test_the_gallery_shows_every_kind_of_figure_by_commands_that_are_understood(
 
 
 def test_every_page_of_the_site_is_in_a_table_of_contents() -> None:
-    """Sphinx says so too, after minutes: a room that gets a README is most of what this finds."""
+    """Sphinx reports it too, after minutes; the usual case is a room with a new README."""
     entries: set[Path] = {ROOT / "docs" / "index.md"}
     for page in ROOT.glob("docs/**/*.md"):
         for block in re.findall(r"^```\{toctree\}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):

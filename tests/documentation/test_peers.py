@@ -1,4 +1,4 @@
-"""The page on other people's solvers says what was measured, and nothing else."""
+"""The page on other people's solvers has exactly the measured results."""
 
 from __future__ import annotations
 

@@ -15,14 +15,14 @@ TREE = re.compile(r"```\{toctree\}\n(?P<lines>.*?)```", re.S)
 
 
 def pages_of(name: str) -> list[str]:
-    """Return the pages below one, by the trees of its text."""
+    """Return the pages below a page, by the trees of contents in its text."""
     text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
     lines = [line for tree in TREE.finditer(text) for line in tree["lines"].splitlines()]
     return [line.strip() for line in lines if line.strip() and not line.startswith(":")]
 
 
 def setting(name: str) -> object:
-    """Return a setting of the site that is a literal."""
+    """Return a setting of the site with a literal value."""
     for statement in ast.parse((SITE / "conf.py").read_text(encoding="utf-8")).body:
         if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == name:
             return ast.literal_eval(statement.value)

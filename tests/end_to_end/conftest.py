@@ -1,4 +1,4 @@
-"""One service for all tests that do not kill it: starting one takes seconds."""
+"""One service for all tests that do not kill it: its start takes seconds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 @pytest.fixture(scope="session")
 def finished(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteJob]:
-    """Yield a short campaign that is done."""
+    """Yield a short finished campaign."""
     with served.client() as service:
         yield service.submit(scene_file(tmp_path_factory.mktemp("finished"), SHORT), workers=1).wait()
 

@@ -1,4 +1,4 @@
-"""Adaptive sweeps beside uniform ones: what these find is bracketed, with far fewer points, whatever disturbs it."""
+"""Adaptive sweeps against uniform ones: they bracket the same jumps with far fewer points, under any disturbance."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KEY = "forcing.angular_frequency"
 AXIS = {"start": 0.6, "stop": 1.6, "path": "up-down"}
 TOLERANCE = 1e-5
 UNIFORM = 2 * 100_001
-"""Points of a uniform sweep up and down whose steps are the tolerance."""
+"""Points of a uniform sweep up and down with the tolerance as its step."""
 SHORT = {"transient_periods": 200, "recorded_periods": 10, "impacts": False, "extrema": True, "strobe": True}
 
 
@@ -79,7 +79,7 @@ def test_every_jump_of_a_uniform_sweep_is_bracketed_between_the_same_two_motions
 
     def motion(jumps: xr.Dataset, place: int) -> tuple[object, ...]:
         one = jumps.isel(jump=place)
-        # counts of impacts beside an aperiodic motion hang on which window the steps of a path hit
+        # next to an aperiodic motion, counts of impacts depend on the window that the steps of a path hit
         return str(one.direction.values), *one.period.values.tolist()
 
     step = 1.0 / 400
@@ -99,10 +99,10 @@ def test_a_uniform_sweep_through_a_bracket_jumps_inside_it(figure: xr.Dataset, t
     (up,) = np.flatnonzero((jumps.direction == "up") & (jumps.below > 1.4))
     low, high = float(jumps.below[up]), float(jumps.above[up])
     values = {"start": low - 10 * TOLERANCE, "stop": high + 10 * TOLERANCE, "points": 22, "path": "up"}
-    begun = np.linspace(1.2, values["start"], 40)[:-1].tolist()
+    coarse = np.linspace(1.2, values["start"], 40)[:-1].tolist()
     fine = np.linspace(values["start"], values["stop"], 22).tolist()
     (found,) = jumps_of(
-        swept(tmp_path, {KEY: {"values": [*begun, *fine], "path": "up"}}), jump=0.2
+        swept(tmp_path, {KEY: {"values": [*coarse, *fine], "path": "up"}}), jump=0.2
     ).above.values
     assert low - TOLERANCE <= found <= high + TOLERANCE
 
@@ -149,7 +149,7 @@ def test_an_adaptive_campaign_is_the_same_bit_for_bit_with_any_workers_and_after
     text = load_scene(FIGURE).with_values({"record": SHORT}).with_sweep(axis).text
     (tmp_path / "scene.toml").write_text(text)
     serial = campaign_here(monkeypatch, text, tmp_path / "serial", runner=DEFAULT_RUNNER)
-    runner = "unhurried_lanes" if plane else "UnhurriedRunner"  # a path goes point by point
+    runner = "unhurried_lanes" if plane else "UnhurriedRunner"  # a path runs point by point
     killed = CampaignProcess(tmp_path / "scene.toml", tmp_path / "killed", "--workers", "2", runner=runner)
     killed.wait_for_parts(6)
     killed.process.kill()

@@ -1,4 +1,4 @@
-"""A contact law is added to a copy of the checkout as docs/contact_laws.md says, in two files, and bodies feel it."""
+"""A contact law is added to a copy of the checkout as in docs/contact_laws.md, in two files, and bodies feel it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ how = "{how}"
 """
 OSCILLATOR = "mass = 1.0\nstiffness = 1.0\ndamping = 0.0\ndisplacement_start = -2.0"
 CHAIN = "masses = [1.0]\nstiffnesses = [1.0]\ndampings = [0.0]\ndisplacement_start = [-2.0]"
-#: Largest of 200 samples a time unit, by scipy's DOP853 at 1e-12; the motion turns at 1.6910580, where its energy is 2.
+#: Largest of 200 samples a time unit, by scipy's DOP853 at 1e-12; the motion turns at 1.6910580, with an energy of 2.
 LARGEST_SAMPLE = 1.6910572632
 
 
@@ -94,7 +94,7 @@ def test_a_law_added_as_the_page_says_is_felt_by_every_body(tmp_path: Path) -> N
         assert ran.returncode == 0, ran.stderr
         with open_dataset(results) as dataset:
             largest = float(dataset.vibroimpact.samples().displacement.max())
-        # a coupled stop is followed in steps
+        # a coupled stop takes steps
         assert abs(largest - LARGEST_SAMPLE) < (1e-9 if how == "fused" else 1e-5)
     walk = ROOT / "tests" / "unit" / "fmus" / "core" / "test_contact_laws.py"
     walked = python("-m", "pytest", "-v", "-p", "no:cacheprovider", str(walk))

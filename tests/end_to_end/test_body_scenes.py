@@ -1,4 +1,4 @@
-"""Chains, beams and stops that yield, from the scene file to the dataset and its figure."""
+"""Chains, beams and compliant stops, from the scene file to the dataset and its figure."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_sampled_elements_have_names_units_and_words_in_the_dataset(
 @pytest.mark.parametrize("law", [RIGID, YIELDING], ids=["rigid", "yielding"])
 @pytest.mark.parametrize("kind", ["chain", "beam"])
 def test_two_halves_of_a_run_are_the_run(kind: str, law: str) -> None:
-    """The whole state is carried: equivalence of one run and two that share it, to 1e-12 of the state."""
+    """The whole state is carried over: one run and two halves of it agree to 1e-12 of the state."""
     whole = PointRunner(parse_scene(text_of(kind, law, 0, 20), "s.toml")).run({})
     runner = PointRunner(parse_scene(text_of(kind, law, 0, 10), "s.toml"))
     first = runner.run({})
@@ -171,7 +171,7 @@ def test_coupled_runs_are_fused_runs(kind: str, law: str) -> None:
     fused = PointRunner(scene, execution="fused").run({})
     coupled = PointRunner(scene, execution="coupled").run({})
     assert fused.impacts is not None
-    # a contact that is open at the end has no impulse and no duration
+    # a contact that is open at the end of the run has no impulse and no duration
     assert coupled.impacts == pytest.approx(fused.impacts, rel=1e-9, abs=1e-12, nan_ok=True)
     assert coupled.final_state == pytest.approx(fused.final_state, rel=1e-9, abs=1e-12)
 
@@ -187,7 +187,7 @@ def test_a_contact_with_a_stop_that_yields_is_one_impact_with_its_impulse_and_du
     with open_dataset(tmp_path / "run.nc") as ds:
         is_over = np.isfinite(ds.impact_duration.values)
         assert is_over[:-1].all()
-        # one of the recording before may be open where it begins, the last one where it ends
+        # a contact may be open at both ends of the recording: from before its start, and beyond its end
         begins, last = ds.impact_time.values[0], np.append(ds.impact_time.values[~is_over], np.inf)[0]
         own = (ds.time.values >= begins) & (ds.time.values < last)
         impulse = np.trapezoid(ds.contact_force.values[own], ds.time.values[own])
@@ -222,7 +222,7 @@ recorded_time = 60.0
     record = PointRunner(short).run({})
     assert record.sticks is not None
     assert np.isnan(record.sticks[-1, 1])
-    assert record.outcome is Outcome.ok  # it rests, but not yet for a period of the slowest mode
+    assert record.outcome is Outcome.ok  # the body rests, but not yet for a period of the slowest mode
 
 
 SWEEP = '[sweep]\n"forcing.angular_frequency" = { start = 0.85, stop = 0.95, points = 6, path = "up-down" }\n'
@@ -277,7 +277,7 @@ def test_a_campaign_over_a_beam_that_was_broken_off_resumes_with_the_same_rows(
     parts = sorted((tmp_path / "broken" / "parts").glob("*.nc"))
     kept = list_parts(tmp_path / "broken" / "parts", scene_hash(scene), print)
     assert kept[0].carried is None or len(kept[0].carried) == 8
-    parts[-1].unlink()  # as if the process had been killed before it was written
+    parts[-1].unlink()  # as if the process had been killed before it wrote this part
     report = run_campaign(scene, tmp_path / "broken", scheduler=cluster)
     assert report.runs == 8
     run_scene(scene, tmp_path / "whole.nc")

@@ -1,4 +1,4 @@
-"""Whatever happens to a campaign: one clear message, complete parts, no orphans, and it can be resumed."""
+"""Faults during a campaign: one clear message, complete parts, no orphans, and the campaign can be resumed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import run_campaign
 
 POINTS, MILLISECONDS = 600, 3.0
-"""Enough that half a second of work is left when four parts are there, on either path."""
+"""Points of a campaign, and duration of a point, ms: half a second of work is left after four parts, on either path."""
 TWO = ("--workers", "2")
 FINISHED_POINTS = 10
 independent = pytest.mark.parametrize("uninterrupted", ["independent"], indirect=True)
@@ -38,7 +38,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals a
 def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Path]:
-    """Return a scene whose path is the parameter, and the dataset of all its points from one process."""
+    """Return a scene with the path of the parameter, and the dataset of all its points from one process."""
     folder = tmp_path_factory.mktemp(request.param)
     scene, dataset = folder / "scene.toml", folder / "run.nc"
     points = POINTS if request.param == "independent" else POINTS // 2
@@ -49,7 +49,7 @@ def uninterrupted(
 
 @pytest.fixture(scope="module")
 def finished(cluster: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Return a scene and the dataset of its campaign that nothing disturbed."""
+    """Return a scene and the dataset of its undisturbed campaign."""
     folder = tmp_path_factory.mktemp("finished")
     scene = folder / "scene.toml"
     scene.write_text(frequency_text(FINISHED_POINTS))
@@ -164,7 +164,7 @@ def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(tmp_path: Path) ->
         time.sleep(delay)
         os.killpg(campaign.process.pid, signal.SIGINT)
         code, _, err = campaign.end()
-        # Before the command itself runs, Python answers the signal.
+        # Before the command itself runs, Python handles the signal.
         assert code in (130, -signal.SIGINT)
         if (tmp_path / "campaign").exists():
             assert "Traceback" not in err, (delay, err)
@@ -173,7 +173,7 @@ def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(tmp_path: Path) ->
 
 @pytest.fixture(scope="module")
 def killed(uninterrupted: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder that a campaign left which was killed; its processes have ended."""
+    """Return the folder of a killed campaign; its processes have ended."""
     scene, _ = uninterrupted
     campaign = CampaignProcess(scene, tmp_path_factory.mktemp("killed") / "campaign", *TWO)
     campaign.wait_for_parts(4)
@@ -215,7 +215,7 @@ def test_a_campaign_without_workers_that_is_ended_is_resumed_by_workers_and_the_
     second.assert_nothing_lives()
     code, out, err = run_campaign_process(scene, tmp_path / "campaign", runner="BusyRunner@here")
     assert code == 0, err
-    assert "in this process, " in out  # others were there
+    assert "in this process, " in out  # other parts were there
     assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
 
 
@@ -335,7 +335,7 @@ def test_two_campaigns_do_not_share_a_folder(tmp_path: Path) -> None:
     scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
     first = CampaignProcess(scene, folder, *TWO)
     first.wait_for_parts(1)
-    # stopped, it has not ended before the other begins, however long that takes to start
+    # a stopped campaign does not end before the other one starts, however long that start takes
     os.killpg(first.process.pid, signal.SIGSTOP)
     code, _, err = run_campaign_process(scene, folder, *TWO)
     os.killpg(first.process.pid, signal.SIGCONT)

@@ -1,4 +1,4 @@
-"""The command line as a person uses it: what it prints, where, and the exit code."""
+"""The command line for a user: its output, the streams, and the exit code."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ def small_sweep(path: str) -> str:
     return text.replace("transient_periods = 1000", "transient_periods = 100")
 
 
-def assert_misuse(done: subprocess.CompletedProcess[str], *told: str) -> None:
+def assert_misuse(done: subprocess.CompletedProcess[str], *expected: str) -> None:
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert not done.stdout
-    for words in told:
+    for words in expected:
         assert words in done.stderr
 
 
@@ -78,7 +78,7 @@ finally:
 
 
 def test_a_run_without_a_tolerance_loads_no_studies(tmp_path: Path) -> None:
-    # they bring scipy.stats and more, longer than the run takes
+    # studies load scipy.stats and more, which takes longer than the run
     program = f"""
 import sys
 from vibroimpact.orchestrator.commands.cli import main
@@ -221,8 +221,8 @@ def test_the_demo_reads_the_known_landmarks_within_two_steps(tmp_path: Path) -> 
     assert time.monotonic() - began < 60.0
     assert read_flat(tmp_path / "demo" / "dataset.nc").sizes["run"] == 802
     assert (tmp_path / "demo" / "bifurcation.png").stat().st_size > 10_000
-    for told in ("lower graze", "upper graze", "fold", "doubling", "0.936493", "1.516611", "dataset.nc"):
-        assert told in done.stdout
+    for expected in ("lower graze", "upper graze", "fold", "doubling", "0.936493", "1.516611", "dataset.nc"):
+        assert expected in done.stdout
     again = in_this_process("demo", "-o", tmp_path / "demo")
     assert again.returncode == 0
     assert "were there already" in again.stdout
@@ -235,7 +235,7 @@ def test_the_demo_runs_the_example() -> None:
 
 @app.command("fail-for-a-test", hidden=True)
 def fail_for_a_test() -> None:
-    """Fail as nobody foresaw."""
+    """Raise an unforeseen error."""
     raise TypeError("an unforeseen thing")
 
 
@@ -257,7 +257,7 @@ def test_a_defect_shows_its_place_with_debug(capsys: pytest.CaptureFixture[str])
 
 
 def fmu_from_oscillator(path: Path, change: Callable[[str, bytes], tuple[str, bytes]]) -> Path:
-    """Write the Oscillator's FMU with its members changed."""
+    """Write the Oscillator's FMU with changed members."""
     with zipfile.ZipFile(fmu_path("Oscillator")) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             target.writestr(*change(name, source.read(name)))
@@ -278,7 +278,7 @@ def that_escapes(name: str, data: bytes) -> tuple[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "expected"),
     [
         (for_another_machine, "riscv64-plan9"),
         (with_entities, "document type declaration"),
@@ -288,7 +288,7 @@ def that_escapes(name: str, data: bytes) -> tuple[str, bytes]:
 )
 @pytest.mark.parametrize("command", ["run", "campaign"])
 def test_a_bad_fmu_file_is_misuse_with_one_message(
-    command: str, change: Callable[[str, bytes], tuple[str, bytes]] | None, told: str, tmp_path: Path
+    command: str, change: Callable[[str, bytes], tuple[str, bytes]] | None, expected: str, tmp_path: Path
 ) -> None:
     fmu = tmp_path / "bad.fmu"
     if change is None:
@@ -301,9 +301,9 @@ def test_a_bad_fmu_file_is_misuse_with_one_message(
         'variables = ["body.displacement"]\nrate = 10\n'
     )
     output = "x.nc" if command == "run" else "folder"
-    # the workers of a campaign are children of a process of its own, as a person starts it
+    # the workers of a campaign need a process of their own as parent, as in a terminal
     start = in_this_process if command == "run" else vibroimpact
-    assert_misuse(start(command, scene, "-o", tmp_path / output), told)
+    assert_misuse(start(command, scene, "-o", tmp_path / output), expected)
     assert not (tmp_path / "x.nc").exists()
 
 

@@ -1,4 +1,4 @@
-"""Code that lies in the current folder is nobody's command: no process of a command imports it."""
+"""Code in the current folder is ignored: no process of a command imports it."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from scipy.io import savemat
 from support.fmu_factory import bouncing_ball
 from support.places import EXAMPLES
 
-#: What the processes of a command import first, or late: the interpreter's own modules and other people's.
+#: Early or late imports of a command's processes: the interpreter's own modules and other people's.
 TRAPS = (
     *("queue", "pickle", "struct", "signal", "threading", "multiprocessing", "subprocess", "json", "ctypes"),
     *(
@@ -49,7 +49,7 @@ units = "SI"
 
 @pytest.fixture
 def trapped(tmp_path: Path) -> Path:
-    """Return a folder full of modules that leave a mark when they are imported."""
+    """Return a folder full of modules that leave a mark when imported."""
     for name in TRAPS:
         (tmp_path / f"{name}.py").write_text(
             f"open({str(tmp_path / 'imported')!r}, 'a').write({name + chr(10)!r})\n"
@@ -59,7 +59,7 @@ def trapped(tmp_path: Path) -> Path:
 
 
 def checked(folder: Path, *arguments: str) -> str:
-    """Run the installed command in a folder, as a person does; return what it printed."""
+    """Run the installed command in a folder, as a user does; return its output."""
     command = Path(sys.executable).with_name("vibroimpact")
     done = subprocess.run([command, *arguments], cwd=folder, capture_output=True, text=True, timeout=120)
     marks = folder / "imported"

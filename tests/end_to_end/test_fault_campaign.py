@@ -1,4 +1,4 @@
-"""A small one of the fault campaigns of `make soak`; not every round of it fits into seconds."""
+"""A small version of the fault campaigns of `make soak`, without the rounds that take longer than seconds."""
 
 from __future__ import annotations
 

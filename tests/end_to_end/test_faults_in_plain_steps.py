@@ -1,4 +1,4 @@
-"""An FMU that hangs or crashes in steps that are made in C: the outcome names the call, as in any other step."""
+"""An FMU that hangs or crashes in steps made in C: the outcome names the call, as in any other step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
 
-#: Nothing is sampled or watched: the steps are plain.
+#: A scene without samples and events: all steps are plain.
 SCENE = """
 [scene]
 units = "SI"

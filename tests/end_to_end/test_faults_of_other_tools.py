@@ -1,4 +1,4 @@
-"""Faults that tools are known for, one by one: `run`, `check` and `fmu check` take each alike, with its numbers."""
+"""Known faults of other tools, one by one: `run`, `check` and `fmu check` accept each alike, with its numbers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ OFFSET = 'name="b" valueReference="4" causality="parameter"'
 
 @dataclass(frozen=True)
 class Fault:
-    """What a tool writes, and what is remarked on; empty where nothing is."""
+    """Changes of a description as a tool writes it, and the expected remark; empty without one."""
 
     changes: tuple[tuple[str, str], ...]
     remark: str = ""
@@ -70,13 +70,13 @@ FAULTS = {
 
 
 def commands_take(folder: Path, remark: str, *, by_loading: bool = False) -> None:
-    """Run, check and `fmu check` the FMU of a folder strictly; each has to take it, with its remark and its numbers."""
+    """Run, check and strictly `fmu check` the FMU of a folder; each has to accept it, with remark and numbers."""
     scene, fmu = folder / "s.toml", folder / "g.fmu"
     scene.write_text(GAIN_SCENE)
     done = in_this_process("run", scene, "-o", folder / "r.nc", "--strict")
     assert done.returncode == 0, done.stderr
-    told = "note: g.fmu: 1 remark on its description" in done.stderr
-    assert told == bool(remark and not by_loading)
+    has_note = "note: g.fmu: 1 remark on its description" in done.stderr
+    assert has_note == bool(remark and not by_loading)
     assert read_flat(folder / "r.nc").g_y.values.tolist() == pytest.approx([6.0] * 11)
     assert in_this_process("check", scene, "--strict").returncode == 0
     checked = in_this_process("fmu", "check", fmu, "--strict")

@@ -1,7 +1,7 @@
 """Scenes, datasets, recordings and campaign folders of version 0.1 keep working, or one line says what to do.
 
-`version_0_1.zip` was written by version 0.1: `done` is a finished campaign, `half` one that lost a part before it
-was compacted, `recording.nc` a decay at 9 rad/s and .3 1/s, `estimates.nc` what was found in it.
+Version 0.1 wrote `version_0_1.zip`. `done` is a finished campaign; `half` lost a part before it was compacted.
+`recording.nc` is a decay at 9 rad/s and .3 1/s, `estimates.nc` the estimates from it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def test_a_file_of_each_kind_has_its_figure(old: Path, name: str) -> None:
     assert (old / "figure.png").stat().st_size > 5_000
 
 
-# the beam meets a Hertz stop: each contact has an error of 1e-10 of its own, which later impacts amplify
+# the beam meets a Hertz stop: each contact has an own error of 1e-10, and later impacts amplify it
 @pytest.mark.parametrize(("name", "tolerance"), [("run", SEQUENCE), ("beam", 1e-6)])
 def test_a_scene_gives_the_motion_that_it_gave(old: Path, name: str, tolerance: float) -> None:
     done = in_this_process("run", old / f"{name}.toml", "-o", old / "now.nc")
@@ -66,20 +66,20 @@ def test_a_finished_campaign_has_nothing_left_to_do(old: Path, cluster: str) -> 
 
 
 def components_of(campaign: Path) -> dict[str, Any]:
-    """Return what a campaign's folder says of itself."""
+    """Return the content of a campaign's manifest."""
     content: dict[str, Any] = json.loads((campaign / "campaign.json").read_text())
     return content
 
 
 def half_of_this_engine(old: Path, **more: Any) -> Path:
-    """Return the half-done campaign, its manifest rewritten: begun with the engine of now, and `more`."""
+    """Return the half-done campaign with a manifest of the current engine, and `more` changes."""
     half = old / "half"
     (half / "campaign.json").write_text(json.dumps(components_of(half) | {"engine": ENGINE} | more))
     return half
 
 
 def refused_with_its_parts_kept(half: Path, old: Path, cluster: str) -> str:
-    """Return the one line with which a half-done campaign is refused, which changes nothing in its folder."""
+    """Return the one-line refusal of a half-done campaign, after checking that its folder is unchanged."""
     manifest = (half / "campaign.json").read_bytes()
     parts = {path: path.read_bytes() for path in (half / "parts").iterdir()}
     done = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
@@ -105,7 +105,7 @@ def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equa
     old: Path, cluster: str
 ) -> None:
     half = half_of_this_engine(old)
-    # as it was begun: in lanes, which "auto" chooses for a new one, last bits are others
+    # fused, like the old run: "auto" now chooses lanes, whose last bits differ
     done = vibroimpact("run", old / "half.toml", "--set", "execution.how=fused", "-o", old / "now.nc")
     assert done.returncode == 0, done.stderr
     [part] = (half / "parts").iterdir()
@@ -138,5 +138,5 @@ def test_a_recording_is_estimated_as_it_was(old: Path) -> None:
     assert done.returncode == 0, done.stderr
     with xr.open_dataset(old / "now.nc") as now, xr.open_dataset(old / "estimates.nc") as before:
         assert "angular_frequency" in before.quantity
-        # what is 0 but for rounding, an offset of 4e-9 say, depends on the versions of numpy and scipy
+        # values of pure rounding, an offset of 4e-9 for example, depend on the versions of numpy and scipy
         np.testing.assert_allclose(now.estimate, before.estimate, rtol=1e-6, atol=1e-12, equal_nan=True)

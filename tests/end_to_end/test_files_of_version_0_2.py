@@ -1,8 +1,7 @@
 """Datasets, folders, journals and services of version 0.2 keep working.
 
-`version_0_2.zip` was written by version 0.2: `done` is a finished campaign, `half` one that was killed after three of
-its twelve points, `service` one that was killed with a job done and another running, `rig.journal` what was measured
-until its program died.
+Version 0.2 wrote `version_0_2.zip`. `done` is a finished campaign; `half` was killed after three of its twelve points.
+`service` was killed with a job done and another running. `rig.journal` has the samples of a program up to its death.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ def old(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def only_read(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the files for the tests that change none of them."""
+    """Return the files for tests that only read them."""
     folder = tmp_path_factory.mktemp("version_0_2")
     with zipfile.ZipFile(FILES) as archive:
         archive.extractall(folder)

@@ -1,4 +1,4 @@
-"""What an FMU does to points that are not to blame, and what it leaves behind: nothing is lost, nothing stays alive."""
+"""Effects of an FMU on innocent points, and its remains: nothing is lost, and nothing stays alive."""
 
 import os
 import signal
@@ -38,7 +38,7 @@ macro_step = 0.1
 deadline = {deadline}
 """
 MARK = "VIBROIMPACT_TEST_MARK"
-"""A variable in the environment by which a test knows the processes that descend from it."""
+"""Variable of the environment that marks the descendants of a process for a test."""
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def runner_of(folder: Path) -> Iterator[Callable[..., Runner]]:
 
 
 def marked(value: str) -> list[psutil.Process]:
-    """Return the living processes that have a mark in their environment, but this one."""
+    """Return the living processes with a mark in their environment, except this one."""
     found = []
     for process in psutil.process_iter():
         try:
@@ -74,7 +74,7 @@ def marked(value: str) -> list[psutil.Process]:
             if own and process.status() != psutil.STATUS_ZOMBIE:
                 found.append(process)
         except psutil.Error:
-            # it has ended meanwhile
+            # it has ended in the meantime
             continue
     return found
 
@@ -93,7 +93,7 @@ def wait_until(condition: Callable[[], bool], seconds: float = 20.0) -> bool:
     return met
 
 
-# ---- points that are not to blame ----
+# ---- innocent points ----
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
@@ -119,7 +119,7 @@ def test_a_crash_that_points_before_have_caused_costs_no_point(
         remarks += [record.message] if record.message else []
     assert bool(remarks) == (place != "free")
     assert all(r.startswith("repeated in a new process, where it went well; in the first: ") for r in remarks)
-    assert all("culprit: fmi" in r for r in remarks[1:])  # from the first crash on every call is noted
+    assert all("culprit: fmi" in r for r in remarks[1:])  # every call after the first crash is recorded
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
@@ -136,22 +136,22 @@ def test_a_component_that_cannot_be_reset_is_instantiated_anew(
 
 
 @pytest.mark.parametrize(
-    # a process that stops itself can no longer say which call it is at
-    ("fault", "told"),
+    # a process that stops itself can no longer name its current call
+    ("fault", "named"),
     [("hang", "culprit: fmi3Reset"), ("stop_process", "no answer within")],
 )
 def test_a_reset_that_does_not_come_back_is_left_behind_with_its_process(
-    runner_of: Callable[..., Runner], fault: str, told: str
+    runner_of: Callable[..., Runner], fault: str, named: str
 ) -> None:
     runner = runner_of(fault, "reset", deadline=0.3)
     for k in range(1, 4):
         record = runner.run({"culprit.u": float(k)})
         assert record.outcome is Outcome.ok
-        assert (told in record.message) == (k > 1)
+        assert (named in record.message) == (k > 1)
 
 
 def test_a_point_that_crashes_in_a_fresh_process_too_is_lost(runner_of: Callable[..., Runner]) -> None:
-    runner = runner_of("segfault", after=12)  # steps: two points and a half
+    runner = runner_of("segfault", after=12)  # 12 steps are two and a half points
     outcomes = [runner.run({"culprit.u": 1.0}).outcome for _ in range(3)]
     assert outcomes == [Outcome.ok] * 3
     guilty = runner_of("segfault")
@@ -161,7 +161,7 @@ def test_a_point_that_crashes_in_a_fresh_process_too_is_lost(runner_of: Callable
         assert record.message.startswith("culprit: fmi3DoStep at time 0: the process was ended by SIGSEGV")
 
 
-# ---- what is left behind ----
+# ---- remains ----
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems know the process group only")
@@ -180,7 +180,7 @@ def test_processes_that_a_component_starts_end_with_the_run(
 def test_processes_of_a_component_that_then_crashes_end_with_it(
     runner_of: Callable[..., Runner], mark: str
 ) -> None:
-    others = psutil.Process().children()  # of tests before, in this process
+    others = psutil.Process().children()  # children of this process from earlier tests
     runner = runner_of("fork_away", "exit_initialization")
     assert runner.run({"culprit.u": 1.0}).outcome is Outcome.ok
     assert marked(mark)
@@ -214,14 +214,14 @@ def test_nothing_of_a_component_outlives_a_parent_that_is_killed(folder: Path, m
     path.write_text(
         SCENE.format(major="3", fault=fault, place="step", after=0, deadline=600.0), encoding="utf-8"
     )
-    # marked by its environment, which a copy has not been started with
+    # the environment carries the mark; a warm copy was started without it
     parent = warm.start(PARENT, path, cold=True)
     assert parent.stdout is not None
     assert parent.stdout.readline() == "ready\n"
     if fault == "fork_away":
         assert parent.stdout.readline() == "run\n"
     else:
-        time.sleep(0.3)  # in its first step, for ever
+        time.sleep(0.3)  # it hangs for ever in its first step
     assert len(marked(mark)) >= 3
     os.kill(parent.pid, signal.SIGKILL)
     parent.communicate(timeout=20)

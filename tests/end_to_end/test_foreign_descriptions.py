@@ -1,4 +1,4 @@
-"""Descriptions with the faults of other tools, in `run` and `fmu check` alike: refused, doubted or remarked on."""
+"""Descriptions with the faults of other tools, in `run` and `fmu check` alike: refused, warned about or remarked on."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from support.fmu_factory import GAIN_SCENE, redescribed
 from vibroimpact.analysis.dataset import read_flat
 
 REMARK = ('causality="parameter" variability="tunable" initial="exact"', 'causality="parameter"')
-DOUBT = ('<Unknown index="2" dependencies="1"/>', '<Unknown index="2" dependencies="7"/>')
+DANGLING = ('<Unknown index="2" dependencies="1"/>', '<Unknown index="2" dependencies="7"/>')
 REFUSED = ('name="b"', 'name="k"')
 
 
@@ -35,14 +35,14 @@ def test_a_remark_changes_no_number_and_is_counted_by_a_run(tmp_path: Path) -> N
 
 
 def test_a_doubt_is_said_and_strict_refuses_it(tmp_path: Path) -> None:
-    scene = scene_with(tmp_path, DOUBT)
-    doubt = "may run wrong: {}variable y: expected dependencies in Outputs/Unknown that are there"
+    scene = scene_with(tmp_path, DANGLING)
+    warning = "may run wrong: {}variable y: expected dependencies in Outputs/Unknown that are there"
     done = in_this_process("run", scene, "-o", tmp_path / "r.nc")
     assert done.returncode == 0, done.stderr
-    assert f"note: {doubt.format('g.fmu: ')}" in done.stderr
+    assert f"note: {warning.format('g.fmu: ')}" in done.stderr
     checked = in_this_process("fmu", "check", tmp_path / "g.fmu")
     assert checked.returncode == 0, checked.stderr
-    assert doubt.format("") in checked.stdout
+    assert warning.format("") in checked.stdout
     for command in (
         ("run", scene, "-o", tmp_path / "other.nc"),
         ("check", scene),

@@ -1,4 +1,4 @@
-"""The shipped scenes of several FMUs run from the command line; those that need an FMU get one first."""
+"""The shipped scenes of several FMUs run from the command line; some of them need an FMU to be written first."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus.core.measuring import exciter_force, gaussian, sensor_reading
 
 SECONDS = ("point_seconds",)
-"""Variables that no two runs have in common."""
+"""Variables that differ between any two runs."""
 
 
 def ran(folder: Path, name: str) -> Path:
@@ -29,7 +29,7 @@ def ran(folder: Path, name: str) -> Path:
 
 
 def comes_back(folder: Path, name: str, *options: str) -> None:
-    """Send an example through an SSP archive and compare the dataset of the scene that comes back with its own."""
+    """Compare the dataset of an example with the dataset of its copy that went through an SSP archive."""
     system, back = folder / f"{name}.ssp", folder / f"{name}_back.toml"
     for command in (
         ("ssp", "export", folder / f"{name}.toml", "-o", system, *options),
@@ -110,7 +110,7 @@ def test_the_instruments_of_a_rig_say_what_their_equations_say(tmp_path: Path) -
     impulse = dataset.body_contact_1_total_impulse.values[-1]
     assert dataset.body_contact_1_total_impulse.values[0] == 0.0
     shown = np.trapezoid(dataset.cell_output.values - 0.02, time) / 0.01
-    assert shown == pytest.approx(impulse, rel=0.02)  # five samples a half sine
+    assert shown == pytest.approx(impulse, rel=0.02)  # a half sine has five samples
     comes_back(tmp_path, "measuring_chain")
 
 

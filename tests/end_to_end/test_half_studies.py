@@ -1,4 +1,4 @@
-"""Every study keeps what it found when Ctrl-C or a failure ends it half way: printed, written, and said."""
+"""Every study saves its results when Ctrl-C or a failure ends it half way: printed, written, and announced."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CASES = {
     "sensitivity": ("sensitivity", 1),
     "transients": ("transients", 3),
 }
-"""Of each study: a kind of dataset that it makes, and the rows after which it ends."""
+"""For each study: a kind of dataset that it makes, and the number of rows after which it ends."""
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> KindsOfDataset:
 
 @pytest.fixture
 def ends_after(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int, BaseException], None]:
-    """Return what lets a study end by an exception after some rows."""
+    """Return a function that ends a study by an exception after some rows."""
 
     def ends(words: str, many: int, end: BaseException) -> None:
         kind = STUDIES[words]
@@ -123,15 +123,15 @@ def test_a_study_that_is_interrupted_before_its_first_row_says_so_and_writes_not
 def test_the_slowest_studies_hear_ctrl_c(
     words: str, stream: str, kinds: KindsOfDataset, tmp_path: Path
 ) -> None:
-    """The signal comes when two rows are told; the study ends by itself, with what it has."""
+    """The signal comes once two rows are reported; the study ends by itself, with its results so far."""
     name, *rest = words.split()
     scene = kinds.arguments("effects")[1]
     given = [str(scene) if word == "forced.toml" else word for word in rest]
     output = tmp_path / "half.nc"
     command = [sys.executable, "-c", ENTRY, name, *given, "-o", str(output)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        told = getattr(process, stream)
-        while not all(told.readline() for _ in range(2)):
+        lines = getattr(process, stream)
+        while not all(lines.readline() for _ in range(2)):
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)

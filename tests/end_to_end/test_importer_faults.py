@@ -1,4 +1,4 @@
-"""Whatever an FMU does to its process: the point has an outcome, a message that says where, and the next one runs."""
+"""Faults of an FMU in its process: the point has an outcome and a message with the place, and the next point runs."""
 
 import os
 import signal
@@ -23,14 +23,14 @@ from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
 
-#: By number, as in the model descriptions.
+#: Names of faults; the index is the number in the model descriptions.
 FAULTS = (
     "none", "error", "fatal", "discard", "hang", "log_flood", "print_flood", "segfault", "abort", "exit",
     "not_a_number", "terminate", "stall", "endless_events", "refuse",
 )  # fmt: skip
 ENDLESS_LOG = 30
 PATIENCE, IMPATIENCE = 30.0, 0.4
-"""Deadlines, s: of points that end by themselves, and of those that do not."""
+"""Deadlines, s: of points that end by themselves, and of points that do not."""
 FAULT_TIME, STEP = 0.35, 0.1
 
 SCENE = """
@@ -58,7 +58,7 @@ macro_step = 0.1
 guard = true
 deadline = {deadline}
 """
-#: What the message of each fault says; none: the point goes well.
+#: Message of each fault; points with other faults end well.
 SAID = {
     "error": "culprit: {fmi}DoStep returned error at time 0.30000000000000004: broken 1 0.4",
     "fatal": "culprit: {fmi}DoStep returned fatal at time 0.30000000000000004: broken 2 0.4",
@@ -99,7 +99,7 @@ def scene_text(
 
 @pytest.fixture(scope="module")
 def runner_of(folder: Path) -> Iterator[Callable[[str, float], GuardedRunner]]:
-    """Return runners that are used for all faults of their kind: each must leave them able to run."""
+    """Return runners for all faults of their kind: after each fault they must be able to run again."""
     made: dict[tuple[str, float], GuardedRunner] = {}
 
     def runner(fmi: str, deadline: float) -> GuardedRunner:
@@ -167,7 +167,7 @@ def test_a_fault_is_an_outcome_or_an_error_that_says_who_where_and_when(
 
 
 def test_a_crash_after_log_lines_tells_the_last_ones_and_none_of_another_point(folder: Path) -> None:
-    # the flood happens from .1 on in every step; then another point crashes without a word
+    # the flood comes in every step from .1 on; then another point crashes without a message
     scene = parse_scene(scene_text("3.0"), str(folder / "faults.toml"))
     runner = open_scene(scene)
     try:
@@ -182,7 +182,7 @@ def test_a_crash_after_log_lines_tells_the_last_ones_and_none_of_another_point(f
 
 
 def test_what_a_component_logged_before_it_hung_is_told(folder: Path) -> None:
-    # a deadline that passes inside a flood without end: the lines up to then are there
+    # the deadline passes inside an endless flood: the lines until then are there
     runner = open_scene(parse_scene(scene_text("2.0", 2.0), str(folder / "f.toml")))
     try:
         record = runner.run({"culprit.fault": float(ENDLESS_LOG)})
@@ -194,7 +194,7 @@ def test_what_a_component_logged_before_it_hung_is_told(folder: Path) -> None:
 
 
 def test_a_hundred_failing_points_do_not_confuse_what_is_told_of_the_next_one(folder: Path) -> None:
-    # every failing point makes the components anew: the notes must not run out of room
+    # every failing point creates the components anew: the space for notes must suffice
     runner = open_scene(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:
         for _ in range(100):
@@ -299,7 +299,7 @@ def test_a_hanging_component_does_not_outlive_its_parent(folder: Path, how: sign
 
 
 def hanging(parent: psutil.Process) -> list[psutil.Process]:
-    """Wait until a point hangs; return its process and the one that watches it."""
+    """Wait until a point hangs; return its process and the process that watches it."""
     (supervisor,) = parent.children()
     wait_until(lambda: any(each.cpu_times().user > 0.5 for each in supervisor.children()))
     (point,) = supervisor.children()
@@ -368,9 +368,7 @@ def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
     resumed = campaign(path, tmp_path / "out", "--scheduler", cluster)
     assert resumed.returncode == 0, resumed.stderr
     again = read_flat(tmp_path / "out" / "dataset.nc")
-    np.testing.assert_array_equal(
-        again["outcome"].values, outcomes
-    )  # points that crash are not run once more
+    np.testing.assert_array_equal(again["outcome"].values, outcomes)  # crashed points do not run again
     np.testing.assert_array_equal(again["point_seconds"].values, dataset["point_seconds"].values)
 
 

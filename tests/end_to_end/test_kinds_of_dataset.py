@@ -1,9 +1,9 @@
-"""Files of each kind have the variables and attributes that users' programs know: `datasets.txt` has them."""
+"""Files of each kind have the variables and attributes that users' programs rely on, as listed in `datasets.txt`."""
 
 from __future__ import annotations
 
 import pytest
-from support.dataset_kinds import DEAR, KINDS, KindsOfDataset, kept
+from support.dataset_kinds import KINDS, SLOW, KindsOfDataset, kept
 from support.public_names import DATASETS
 
 
@@ -18,7 +18,7 @@ def texts() -> dict[str, str]:
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.long if kind in DEAR else ()) for kind in KINDS]
+    "kind", [pytest.param(kind, marks=pytest.mark.long if kind in SLOW else ()) for kind in KINDS]
 )
 def test_a_kind_of_file_has_the_variables_and_attributes_of_the_list(
     kind: str, kinds: KindsOfDataset, texts: dict[str, str]

@@ -1,4 +1,4 @@
-"""A simulated dataset with a measuring chain is analysed as a recording is: what was put in comes back."""
+"""A simulated dataset with a measuring chain is analysed like a recording: the estimates agree with the parameters."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_replay_that_is_driven_in_volts_finds_damping_and_exciter(measured: Pa
     assert vibroimpact("replay", tmp_path / "replay.toml", measured, "-o", output, *fit) == 0
     with xr.open_dataset(output) as found:
         assert float(found.variance_accounted_for.squeeze()) > 99.99
-        # 4 standard errors: they know the noise of the sensor, not that the drive was rounded to 16 bits
+        # 4 standard errors: they include the noise of the sensor, but not the rounding of the drive to 16 bits
         off = np.abs(found.fitted_value.values - [1.0, 5.0]) / found.standard_error.values
         assert (off < 4.0).all()
         assert (found.standard_error.values < 1e-3).all()

@@ -1,4 +1,4 @@
-"""A message names an argument as it was given: `start` where Python was called, `--from` where a command was typed."""
+"""A message names an argument as the user gave it: `start` for a call in Python, `--from` for a command."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ IS_TIME = "the first column has no heading and ascends: it is taken as the insta
 
 @pytest.fixture
 def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the current folder, with scenes, runs and recordings."""
+    """Return the current folder with scenes, runs and recordings."""
     monkeypatch.chdir(tmp_path)
     Path("one.toml").write_text(SCENE)
     Path("swept.toml").write_text(SCENE + SWEEP)
@@ -90,7 +90,7 @@ def decay(files: Path) -> Path:
 
 
 def refusals(call: Callable[[], Any], *words: str | Path) -> tuple[str, str]:
-    """Return what Python's error and the command's standard error say of one misuse."""
+    """Return the messages of one misuse: Python's error and the command's standard error."""
     with pytest.raises(VibroimpactError) as raised:
         call()
     done = in_this_process(*words)
@@ -307,12 +307,12 @@ def test_clocks_that_differ_are_hinted_at_with_the_argument_that_lets_them(files
 
 
 def served(process: str, *arguments: str | Path) -> list[str]:
-    """Return the lines that a process of the service says."""
+    """Return the lines printed by a process of the service."""
     command = [sys.executable, "-m", f"vibroimpact.service.{process}", *map(str, arguments)]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=True) as started:
         assert started.stdout is not None
-        return started.stdout.read().splitlines()  # its input stays open: it ends when that does
+        return started.stdout.read().splitlines()  # the process would end with its input, which stays open
 
 
 def test_processes_of_the_service_name_arguments_as_python_does(files: Path, decay: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a command is to write is looked at before it computes: names, what is there already, and how large it gets."""
+"""A command checks its outputs before it computes: their names, existing files, and their size."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def misuse(done: subprocess.CompletedProcess[str], told: str) -> None:
+def misuse(done: subprocess.CompletedProcess[str], expected: str) -> None:
     assert done.returncode == 2, done.stderr
     assert len(done.stderr.splitlines()) == 1
-    assert told in done.stderr
+    assert expected in done.stderr
 
 
 @pytest.mark.parametrize("name", ["x.csv", "x", "x.png", "x.NC", "x.nc.txt", ".nc"])
@@ -86,7 +86,7 @@ def test_a_name_too_long_for_a_file_is_one_line_from_every_command(
 
 
 FOREIGN_NAME = os.fsdecode(b"caf\xe9")
-"""A name as a system with Latin-1 has written it."""
+"""A file name written by a system with Latin-1."""
 
 
 @pytest.fixture
@@ -220,13 +220,13 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
     if "[forcing]" in more:
         text = text.replace("recorded_time = 5.0", "transient_periods = 0\nrecorded_periods = 100000000")
     scene.write_text(text + more)
-    # /proc counts the memory of this program alone; getrusage begins with that of the process which started it
+    # /proc counts the memory of this program alone; getrusage includes that of the parent process
     status = "pathlib.Path('/proc/self/status').read_text()"
-    told_at_the_end = f"import atexit, pathlib; atexit.register(lambda: print({status}))"
+    prints_status = f"import atexit, pathlib; atexit.register(lambda: print({status}))"
     command = [
         sys.executable,
         "-c",
-        f"{told_at_the_end}\n{ENTRY}",
+        f"{prints_status}\n{ENTRY}",
         "run",
         str(scene),
         "-o",
@@ -236,7 +236,7 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
     misuse(done, "expected results of at most 1.0 GB")
     assert todo in done.stderr
     (peak,) = (int(line.split()[1]) for line in done.stdout.splitlines() if line.startswith("VmHWM:"))
-    # kB: what any command takes, not what 10^8 points would
+    # kB: enough for any command, but not for 10^8 points
     assert peak < 600_000
     assert not (tmp_path / "x.nc").exists()
 
@@ -245,7 +245,7 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
 def test_a_command_whose_reader_has_gone_writes_what_it_computed(
     command: str, scene: Path, tmp_path: Path
 ) -> None:
-    """As behind `| head`: the tables come before the dataset."""
+    """As with `| head`: the tables come before the dataset."""
     written = ["time,force"] + [f"{k / 1000:.3f},{np.sin(k / 9.0) ** 40:.6f}" for k in range(2000)]
     table, recording, output = (tmp_path / name for name in ("table.csv", "recording.nc", "output.nc"))
     table.write_text("\n".join(written))
@@ -256,8 +256,8 @@ def test_a_command_whose_reader_has_gone_writes_what_it_computed(
         assert process.stdout is not None
         process.stdout.close()
         assert process.stderr is not None
-        told = process.stderr.read()
-    assert (process.returncode, told) == (0, "")
+        errors = process.stderr.read()
+    assert (process.returncode, errors) == (0, "")
     with xr.open_dataset(output) as dataset:
         assert dataset.sizes
 

@@ -1,4 +1,4 @@
-"""The page of the service as a person has it: in Chromium, on a service in a process of its own."""
+"""The page of the service as a user sees it: in Chromium, on a service in a process of its own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LONG = sweep_text(400, 1_000_000)
 MAP = sweep_text(6, 20) + (
     '"stop[1].position" = { values = [0.0, 0.5, 1.0] }\n[execution]\nimpact_limit = 30\n'
 )
-"""18 points, of which 4 have too many impacts: of the stop that is at 0."""
+"""A scene of 18 points; 4 of its points with the stop at 0 have too many impacts."""
 POINT = re.compile("^Point [0-9]+$")
 CLASS_NAME = re.compile(r"P\(|chaos|unknown|no impacts")
 WRONG = "[body]\nstiffness = 1\nmass = -1\n[record]\nrecorded_time = 5\n"
@@ -36,7 +36,7 @@ DROP = """([selector, files]) => {
 
 @dataclass(frozen=True, slots=True)
 class Jobs:
-    """Jobs that a service was given before its page is looked at."""
+    """Jobs of a service, submitted before its page is opened."""
 
     map: RemoteJob
     fit: RemoteJob
@@ -57,7 +57,7 @@ def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @pytest.fixture(scope="module", autouse=True)
 def jobs(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Jobs]:
-    """Submit what the tests look at, first of all: it is computed while they begin."""
+    """Submit all jobs of the tests first: they are computed while the tests start."""
     folder = tmp_path_factory.mktemp("scenes")
     with served.client() as service:
         recording = service.upload_recording(hit(folder))
@@ -75,7 +75,7 @@ def seen(chromium: Any, served: Served) -> Iterator[PageSession]:
 
 
 def drawn(page: Any) -> int:
-    """Return how many points the diagram of a page has, once it has some."""
+    """Return the number of points in the diagram of a page, once it has some."""
     canvas = page.locator("canvas[data-points]").first
     canvas.wait_for()
     return int(canvas.get_attribute("data-points"))
@@ -158,14 +158,14 @@ def test_a_map_of_classes_names_them_and_a_point_shows_its_stop(seen: PageSessio
     assert violations(page) == []
     canvas = page.locator("canvas").first
     canvas.focus()
-    # the first point did not come to its end
+    # the first point was not completed
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert CLASS_NAME.search(page.locator(".tip").first.inner_text())
     page.keyboard.press("Enter")
     portrait = page.get_by_role("region", name="Phase portrait")
     portrait.locator(".legend").get_by_text("stop").wait_for()
-    # a line has a gap before the first sample from an impact on
+    # a line has a gap between an impact and the next sample
     gaps = """async () => (await import('/page/layers.js')).withGaps([[5, 6, 7]], [0, 1, 2], [0.5, 0.7, 2.5, -1])"""
     assert page.evaluate(gaps) == [[5, None, 6, 7]]
 
@@ -245,7 +245,7 @@ def test_a_fit_shows_its_figure_and_what_it_said_and_gives_its_scene(seen: PageS
 
 
 def see_results(page: Any, said: str) -> None:
-    """Wait for the figure of a job and for what it said."""
+    """Wait for the figure of a job and for its messages."""
     picture = page.get_by_role("img", name="Figure of")
     picture.wait_for()
     page.wait_for_function("(one) => one.complete && one.naturalWidth > 100", arg=picture.element_handle())
@@ -268,7 +268,7 @@ def test_every_view_is_accessible_and_fits(
         "campaign/none": "h1",
         "new/none": "p.problem",
     }
-    # half way through a change of colours a button has neither contrast
+    # half way through a change of colours a button has no contrast
     looks = {"color_scheme": colours, "reduced_motion": "reduce"}
     with PageSession(chromium, served, **looks, viewport={"width": width, "height": 844}) as seen:
         seen.sign_in()

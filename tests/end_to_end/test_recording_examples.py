@@ -1,7 +1,7 @@
-"""The pages of recordings, their scenes and their import settings say what the program understands.
+"""The pages of recordings, their scenes and their import settings contain only what the program understands.
 
-References: the files themselves. A command of a page is parsed by the command line's own parser, not run. Only imports
-are done for real, where the recordings are beside the checkout.
+References: the files themselves. The command line's own parser parses the commands of a page without running them.
+Only imports are run, if the recordings are next to the checkout.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def command_line() -> Any:
 
 
 def parsed(command: str) -> Any:
-    """Let the command line parse a command; nothing is run."""
+    """Parse a command without running it."""
     group = command_line()
     _, name, *arguments = shlex.split(command)
     while hasattr(group.commands[name], "commands"):

@@ -1,4 +1,4 @@
-"""`vibroimpact replay` as a person uses it, on a recording that the test makes itself."""
+"""`vibroimpact replay` as a user calls it, on a recording made by the test itself."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIME = 2e-5 * np.arange(900)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A scene, and two recordings of a board that rings at 812 Hz: pulses of two sizes."""
+    """Return a folder with a scene and two recordings of a board that rings at 812 Hz: pulses of two sizes."""
     home = tmp_path_factory.mktemp("replay")
     (home / "board.toml").write_text(BOARD)
     for name, size in (("one", 4000.0), ("two", 2500.0)):
@@ -90,7 +90,7 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (("one.nc",), "--output: expected a dataset"),
         (("-o", "x.nc"), "expected a recording to replay, got none"),
@@ -104,12 +104,12 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(
     ],
 )
 def test_misuse_is_one_line_exit_code_2_and_no_file(
-    folder: Path, arguments: tuple[str, ...], told: str
+    folder: Path, arguments: tuple[str, ...], expected: str
 ) -> None:
     given = [folder / text if text.endswith(".nc") else text for text in arguments]
     done = in_this_process("replay", folder / "board.toml", *given)
     assert done.returncode == 2
-    assert told in done.stderr
+    assert expected in done.stderr
     assert "Traceback" not in done.stderr
     assert not (folder / "x.nc").exists()
 

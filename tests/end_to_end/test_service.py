@@ -1,4 +1,4 @@
-"""The service as its clients see it: real processes, killed, cancelled, asked wrongly."""
+"""The service for its clients: real processes, killed, cancelled, with wrong requests."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ impact_limit = 1000000000000
 
 
 def processes_of(folder: Path) -> list[psutil.Process]:
-    """Return the processes that name a folder in their command, and what these have started."""
+    """Return the processes with a folder in their command, and their children."""
     found: list[psutil.Process] = []
     for process in psutil.process_iter():
         try:
@@ -115,7 +115,7 @@ def test_cancel_takes_effect_within_a_second_in_a_step_that_never_ends(
         until(job, "running")
         while not processes_of(served.folder):
             time.sleep(0.05)
-        time.sleep(3.0)  # well within its step
+        time.sleep(3.0)  # long before its step ends
         began = time.monotonic()
         job.cancel()
         until(job, "cancelled")

@@ -1,4 +1,4 @@
-"""What happens to the service from outside: connections that are cut, disks that are full, schedulers that are gone."""
+"""Faults around the service: connections are cut, disks are full, schedulers disappear."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONG = sweep_text(120, 100_000)
 
 
 class Cutter:
-    """A way to a service on which each connection is cut after a random number of bytes of its answers."""
+    """A proxy of a service that cuts each connection after a random number of bytes of its answers."""
 
     def __init__(self, url: str, seed: int) -> None:
         target = httpx.URL(url)
@@ -71,7 +71,7 @@ def test_no_event_is_lost_or_doubled_where_connections_are_cut_at_random_bytes(
     try:
         with served.client() as service, Service(cutter.url, token) as cut:
             job = service.submit(scene_file(tmp_path, LONG), workers=1)
-            # asked for without the cuts: only streams are taken up again
+            # this request goes without cuts: only streams are resumed
             while_it_runs = list(RemoteJob(cut, job.status).events())
             seen = list(job.events())
             assert while_it_runs == seen
@@ -99,7 +99,7 @@ def test_any_number_of_silent_connections_stops_neither_answers_nor_jobs(
 
 @contextmanager
 def full(service: Served) -> Iterator[None]:
-    """Let no process of a service write any byte into a file, as on a full disk; again afterwards."""
+    """Prevent all processes of a service from writing into a file, as on a full disk, for the duration of the block."""
     resource = pytest.importorskip("resource", reason="limits of files are those of POSIX")
     if not hasattr(resource, "prlimit"):
         pytest.skip("only Linux changes the limits of a process from outside")

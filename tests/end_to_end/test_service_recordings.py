@@ -1,4 +1,4 @@
-"""Recordings of the service: uploaded, replayed, fitted, estimated; and what is no recording."""
+"""Recordings of the service: uploaded, replayed, fitted, estimated; and files that are no recording."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.together("service")
 COUPLED = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8").replace("70.0", "2.0")
 
 
-# of the session, as the service is: workers that take tests from others set up a module's fixtures again
+# for the whole session, like the service: workers that take over tests set up a module's fixtures again
 @pytest.fixture(scope="session")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return hit(tmp_path_factory.mktemp("hit"))
@@ -82,7 +82,7 @@ def test_a_fit_of_the_service_is_that_of_the_command_line(
     expected = vi.replay(scene, file, fit="body.frequency")
     assert found.fitted_value.equals(expected.fitted_value)
     assert found.variance_accounted_for.equals(expected.variance_accounted_for)
-    # its folder is one that the command line goes on with
+    # the command line can continue in this folder
     folder = served.folder / "jobs" / fitted.id
     again = in_this_process("replay", str(folder / "fitted.toml"), "-o", str(tmp_path / "again.nc"))
     assert again.returncode == 0, again.stderr
@@ -126,7 +126,7 @@ def test_what_is_no_recording_is_refused_and_leaves_nothing(
     before = sorted((served.folder / "recordings").iterdir())
     try:
         answer = raw.post("/recordings", params={"name": name}, content=content)
-    except httpx.InvalidURL:  # the client itself refuses a name so long
+    except httpx.InvalidURL:  # the client itself refuses a name of this length
         return
     assert answer.status_code == status, answer.text[:300]
     assert str(served.folder) not in answer.text
@@ -148,8 +148,8 @@ def test_a_recording_whose_file_somebody_has_removed_is_named_and_can_be_deleted
         found = service.upload_recording(hit(tmp_path, seed=3), name="removed.nc")
     (served.folder / "recordings" / f"{found.id}.nc").unlink()
     decay = {"recording": found.name, "estimate": {"kind": "decay"}}
-    asked = [raw.get(f"/recordings/removed.nc/{what}") for what in ("file", "figure")]
-    for answer in (*asked, raw.post("/estimates", json=decay)):
+    answers = [raw.get(f"/recordings/removed.nc/{what}") for what in ("file", "figure")]
+    for answer in (*answers, raw.post("/estimates", json=decay)):
         assert (answer.status_code, "somebody has removed it" in answer.text) == (409, True)
         assert str(served.folder) not in answer.text
     replayed = raw.post("/campaigns", json={"scene": BOARD, "recordings": ["removed.nc"]})

@@ -1,4 +1,4 @@
-"""`vibroimpact accuracy` and `effects`: tables, datasets, figures, a tuned scene; and what they refuse."""
+"""`vibroimpact accuracy` and `effects`: tables, datasets, figures, a tuned scene; and their refusals."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_effects_leave_a_table_a_dataset_and_a_figure(scene: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "expected"),
     [
         (["--tolerance", "1e-20"], "--tolerance: expected a relative error of 1.4e-14 or more, as double"),
         (["--tolerance", "3e-14"], "or more, to which the reference is known, got 3e-14"),
@@ -79,12 +79,12 @@ def test_effects_leave_a_table_a_dataset_and_a_figure(scene: Path, monkeypatch: 
     ],
 )
 def test_misuse_of_accuracy_is_one_line(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], told: str
+    scene: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], expected: str
 ) -> None:
     monkeypatch.chdir(scene.parent)
     done = in_this_process("accuracy", str(scene), *options)
     assert done.returncode == 2
-    assert told in done.stderr
+    assert expected in done.stderr
     assert sorted(path.name for path in scene.parent.iterdir()) == ["free.toml"]
 
 

@@ -1,4 +1,4 @@
-"""Where the surroundings lack something, a command works, or it says one true line and ends with exit code 2."""
+"""A command with a missing facility around it works, or prints one true line and ends with exit code 2."""
 
 import os
 import signal
@@ -20,11 +20,11 @@ resource = pytest.importorskip("resource")
 COMMAND = str(Path(sys.executable).with_name("vibroimpact"))
 SCENE = EXAMPLES / "bifurcation.toml"
 PATIENCE = 300.0
-"""Many times what a command of this module takes, s: the machine may be busy."""
+"""Many times the duration of a command of this module, s: the machine may be busy."""
 
 
 def command(*words: str | Path, before: Callable[[], None] | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the installed command as a person does."""
+    """Run the installed command as a user does."""
     return subprocess.run(
         [COMMAND, *map(str, words)], preexec_fn=before, capture_output=True, text=True, timeout=PATIENCE
     )
@@ -32,7 +32,7 @@ def command(*words: str | Path, before: Callable[[], None] | None = None) -> sub
 
 @pytest.fixture
 def removed(tmp_path: Path) -> Callable[[], None]:
-    """Return what lets a process stand in a folder that is removed then."""
+    """Return a function that puts a process into a folder and then removes the folder."""
     folder = tmp_path / "removed"
     folder.mkdir()
 
@@ -95,7 +95,7 @@ def recording_of_a_rig(target: Path) -> tuple[str | Path, ...]:
 def test_what_needs_loopback_says_so_before_it_starts_anything(
     words: tuple[str | Path, ...], purpose: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # an address of the documentation (RFC 5737) is no address of any machine
+    # an address reserved for documentation (RFC 5737) belongs to no machine
     monkeypatch.setattr(surroundings, "LOOPBACK", "192.0.2.1")
     monkeypatch.chdir(tmp_path)
     done = in_this_process(*words)
@@ -105,7 +105,7 @@ def test_what_needs_loopback_says_so_before_it_starts_anything(
 
 
 def test_a_virtual_rig_with_few_descriptors_says_so(tmp_path: Path) -> None:
-    """gRPC said "Error in service handler!" of 12 descriptors, and aborted with 6."""
+    """gRPC said "Error in service handler!" with 12 descriptors, and aborted with 6."""
     done = command(
         *recording_of_a_rig(tmp_path / "record.nc"),
         before=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (12, 12)),
@@ -124,7 +124,7 @@ def test_a_rig_records_to_an_absolute_path_without_a_current_folder(
 
 
 def test_a_process_of_its_own_finds_the_folder_that_it_is_started_in(removed: Callable[[], None]) -> None:
-    """`accuracy` showed a traceback: the folder was gone before the process that measures memory came to it."""
+    """`accuracy` showed a traceback: the folder was gone before the process that measures memory started in it."""
     program = "from vibroimpact.fmus.processes.call import call_alone; print(call_alone(abs, -3))"
     done = subprocess.run(
         [sys.executable, "-P", "-c", program],
@@ -181,5 +181,5 @@ def test_a_warning_of_a_library_is_shown_to_nobody_who_did_not_ask_for_it(
         with cli._no_library_warns():
             warnings.warn("ks_2samp: Exact calculation unsuccessful", RuntimeWarning, stacklevel=1)
     assert capsys.readouterr().err == ""
-    with cli._no_library_warns(), pytest.raises(RuntimeWarning):  # tests make errors of warnings
+    with cli._no_library_warns(), pytest.raises(RuntimeWarning):  # in tests, warnings are errors
         warnings.warn("ks_2samp: Exact calculation unsuccessful", RuntimeWarning, stacklevel=1)

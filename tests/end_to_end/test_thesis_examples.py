@@ -1,7 +1,7 @@
-"""Each scene of examples/thesis runs and shows what the figure of the thesis is said to show.
+"""Each scene of examples/thesis runs and reproduces the described features of its figure in the thesis.
 
-Numbers are those of the thesis's text and captions, or their corrections in closed form (tests/reference); where these
-differ, docs/thesis_figures.md says so.
+Numbers come from the thesis's text and captions, or from their corrections in closed form (tests/reference).
+docs/thesis_figures.md lists the differences.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def along(dataset: xr.Dataset, direction: str) -> dict[float, tuple[float, int] 
 
 
 def distinct(phases: np.ndarray) -> int:
-    """Return how many impact phases differ by more than 1e-4."""
+    """Return the number of impact phases that differ by more than 1e-4."""
     return len(np.unique(phases.round(4)))
 
 
@@ -114,7 +114,7 @@ def test_the_motion_of_figure_2_8_is_not_periodic_and_its_impacts_in_figure_2_11
     hits = long.vibroimpact.impacts()
     assert hits.sizes["impact"] > 10_000
     assert distinct(hits.impact_phase.values) > 9_000
-    # an attractor of fractal dimension below 2: finer boxes hold ever fewer of the points that they could
+    # an attractor of fractal dimension below 2 fills an ever smaller share of ever finer boxes
     plane = np.stack([hits.impact_phase.values / (2.0 * math.pi), hits.impact_velocity.values])
     filled = [len(np.unique((plane * boxes).astype(int), axis=1).T) for boxes in (25, 100)]
     assert filled[1] / filled[0] < 4.0**1.6
@@ -148,7 +148,7 @@ def test_the_chain_chatters_and_sticks_once_in_each_slow_period(run, name: str) 
     sticks = dataset.vibroimpact.sticks()
     period = 2.0 * math.pi / {"figure_6_5a": 0.1, "figure_6_5b": 0.2}[name]
     assert motion(dataset) is not None
-    # two periods meet three sticks; the first of these begins before them, and is no event of theirs
+    # two periods meet three sticks; the first one begins before them, and is none of their events
     assert sticks.sizes["stick"] == 2
     assert np.diff(sticks.stick_start.values) == pytest.approx(
         [period] * (sticks.sizes["stick"] - 1), abs=1e-7
@@ -219,14 +219,14 @@ def test_the_energies_of_figure_6_15_are_those_of_the_closed_form_and_near_the_p
     modal = np.stack([samples.modal_energy_1.values, samples.modal_energy_2.values])
     total = samples.energy_kinetic.values + samples.energy_potential.values
     assert np.abs(modal.sum(axis=0) - total).max() < 1e-13
-    # from one impact to the next, with the values at its two ends extrapolated over less than a sample
+    # between two impacts, with the values at both ends extrapolated over less than a sample
     first, last = hits.impact_time.values
     inside = (samples.time.values > first) & (samples.time.values < last)
     flight = CubicSpline(samples.time.values[inside], modal[:, inside], axis=1)
     after, before = flight(first), flight(last)
     assert after == pytest.approx((orbit.p**2 + (body.natural * orbit.q) ** 2) / 2.0, abs=1e-7)
     assert before.sum() - after.sum() == pytest.approx(0.158204452755, abs=1e-6)
-    # the thesis: mode 1 loses .3247, mode 2 gains .1668, read off a figure
+    # thesis, from a figure: mode 1 loses .3247, mode 2 gains .1668
     assert before - after == pytest.approx([0.3247, -0.1668], abs=1e-3)
 
 

@@ -1,7 +1,7 @@
-"""From a rig to numbers by the commands alone: what was put into the plant of a virtual rig comes back.
+"""From a rig to numbers by commands alone: the estimates agree with the parameters of a virtual rig's plant.
 
-References: the tables of examples/rig/oscillator_with_load_cell_scene.toml, and their motion simulated without a
-measuring chain: 3.125 Hz and 4 V, three impacts in each period. The rig goes in lockstep.
+References: the tables of examples/rig/oscillator_with_load_cell_scene.toml, and their simulated motion without a
+measuring chain: 3.125 Hz and 4 V, three impacts in each period. The rig runs in lockstep.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MASS, RESTITUTION = PLANT["body"]["mass"], PLANT["stop"][0]["restitution"]
 
 
 def vibroimpact(*arguments: str | Path | float) -> str:
-    """Run a command that has to succeed; return what it prints."""
+    """Run a command that has to succeed; return its output."""
     done = in_this_process(*arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -40,7 +40,7 @@ def vibroimpact(*arguments: str | Path | float) -> str:
 
 @contextmanager
 def driven(bench: Bench, volts: np.ndarray, rate: float, mode: constants.AcquisitionType) -> Iterator[None]:
-    """Put voltages out."""
+    """Drive the output with voltages."""
     with bench.outputs("Dev1/ao0", rate, sample_mode=mode, samps_per_chan=len(volts)) as task:
         task.write(volts)
         task.start()
@@ -90,7 +90,7 @@ def spikes(recordings: Path) -> xr.Dataset:
 
 
 def in_turn(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the true value of each impact: those of a period, from the one that the record begins with."""
+    """Return the true value of each impact: the values of a period, rotated to the first impact of the record."""
     turns = [np.resize(np.roll(true, -k), len(found)) for k in range(len(true))]
     return min(turns, key=lambda each: float(np.abs(found - each).sum()))
 
@@ -117,7 +117,7 @@ def test_no_impact_is_missed_and_impulses_and_velocities_are_true_within_their_e
 
 
 def test_the_contact_time_measure_is_that_of_the_half_sines(spikes: xr.Dataset, truth: xr.Dataset) -> None:
-    # equations.md 8.4: of a half sine of peak A, (1 - (2/pi) arcsin(H/A)) is above H
+    # equations.md 8.4: a half sine of peak A is above H for the share 1 - (2/pi) arcsin(H/A)
     impulses = in_turn(spikes.spike_impulse.values, truth.impact_impulse.values)
     peaks = 0.5 * np.pi * impulses / CONTACT
     above = CONTACT * (1.0 - 2.0 / np.pi * np.arcsin(float(spikes.threshold) / peaks))

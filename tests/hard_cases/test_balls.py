@@ -1,4 +1,4 @@
-"""Bodies without a spring, whose impacts are known in closed form: a ball that falls, a ball between walls."""
+"""Bodies without a spring, with impacts in closed form: a ball that falls, a ball between walls."""
 
 import math
 
@@ -40,28 +40,28 @@ def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(
     impacts = rows[rows[:, 0] == 1.0]
     n = np.arange(len(impacts))
     times = first + 2.0 * first * r * (1.0 - r**n) / (1.0 - r)
-    # the position of a floor far away is known to fewer digits
+    # the position of a distant floor has fewer digits
     scale = (1.0 + abs(floor)) * (1.0 + times[-1])
     assert np.abs(impacts[:, 1] - times).max() <= SEQUENCE * scale
     assert np.abs(impacts[:, 3] - speed * r**n).max() <= SEQUENCE * scale
     assert abs(start - first * (1.0 + r) / (1.0 - r)) <= SEQUENCE * scale
     assert stuck
     assert force == GRAVITY
-    # momentum: the speed of the first impact, and gravity up to the rest; the summed tail has 1e-4 of it
+    # momentum: the speed of the first impact, and gravity until the rest; the summed tail has 1e-4 of it
     assert impulse == pytest.approx(speed * (1.0 + r) / (1.0 - r), rel=SEQUENCE * scale)
     assert len(impacts) >= math.log(1e-3) / math.log(r)
 
 
 @pytest.mark.parametrize("slow", [1e-6, 1e-9])
 def test_slowly_varying_gravity_is_gravity(slow: float) -> None:
-    # a force cos(slow t), flights of a second: the steady response is 1e12 times higher than the bounce
+    # a force cos(slow t), flights of a second: the steady response is 1e12 times as high as the bounce
     parameters = ball(1.0, 0.0, 0.9)
     parameters["forcing.angular_frequency"] = slow
     with OscillatorFmu(parameters) as o, OscillatorFmu(ball(1.0, 0.0, 0.9)) as constant:
         o.step(40.0)
         constant.step(40.0)
         assert o.contact("count") == constant.contact("count")
-        # gravity is less by (slow t)^2 / 2
+        # gravity is smaller by (slow t)^2 / 2
         assert (
             abs(o.contact("stick_start")[0] - constant.contact("stick_start")[0])
             <= 20 * (20 * slow) ** 2 + SEQUENCE
@@ -141,7 +141,7 @@ def test_a_peak_over_the_stop_by_no_more_than_rounding_is_a_graze(roundings: int
 @pytest.mark.parametrize("k", [3.0, 7.0, 0.7, 1.3])
 @pytest.mark.parametrize("position", [0.3, 0.1, 0.7, -0.3])
 def test_a_dead_stop_at_the_equilibrium_holds_the_mass_without_pressing_it(k: float, position: float) -> None:
-    # neither pressed nor lifted: an endless loop of contacts without rebound, if nothing ends it
+    # neither pressed nor lifted: without a rule this is an endless loop of contacts without rebound
     parameters = {"mass": 1.1, "damping": 0.1, "stiffness": k, "force": k * position}
     with OscillatorFmu({**parameters, "displacement_start": position - 1.0, **stop(position, 0.0)}) as o:
         o.step(100.0)
@@ -163,7 +163,7 @@ def test_contact_tolerance_bounds_the_speed_after_one_contact_and_errors_add_up(
             "execution": {"contact_tolerance": tolerance, "how": "fused"},
         }
     )
-    # nothing is lost: each touch-down has the speed of the first
+    # energy is conserved: each touch-down has the speed of the first
     speeds = run(scene, progress=False).impact_velocity.values
     assert speeds[0] == pytest.approx(math.sqrt(2.0), rel=ROUNDING)
     assert len(speeds) == 14

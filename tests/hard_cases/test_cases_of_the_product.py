@@ -7,7 +7,7 @@ import pytest
 from vibroimpact.orchestrator.hard_cases import CASES, measured_cases
 
 LONG = {"many-modes"}
-"""Takes seconds; `test_structures_extremes.py` has bodies of 64 modes too."""
+"""Cases that take seconds; `test_structures_extremes.py` has bodies of 64 modes too."""
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ FORCE, W = 1.0, 0.2
 
 
 def exact_accumulation(zeta: float, r: float, start: float) -> mpf:
-    """Return when the chatter that begins on the stop at 0 with velocity -start, t = 0, ends: bounce by bounce."""
+    """Return the end of the chatter that starts on the stop at 0 with velocity -start, t = 0, bounce by bounce."""
     body = Exact(1.0, 2.0 * zeta, 1.0, FORCE, W)
     with mp.workdps(40):
         time, velocity = mpf(0), mpf(start)
@@ -60,13 +60,13 @@ def test_every_restitution_stays_on_its_side_and_comes_to_its_end(
     ("position", "damping"),
     [
         *(pytest.param(position, 0.2, marks=pytest.mark.long) for position in (0.0, 0.3)),
-        (0.3, 200.0),  # bounces that no double resolves come before four million that are low
+        (0.3, 200.0),  # bounces too short for doubles come before four million low ones
     ],
 )
 def test_an_elastic_stop_on_a_damped_and_pressed_mass_does_not_bounce_for_ever(
     version: str, position: float, damping: float
 ) -> None:
-    # velocity falls like exp(-2 zeta t / 3), with ever more impacts: there is no accumulation to sum to
+    # velocity falls like exp(-2 zeta t / 3), with ever more impacts: the sum has no accumulation point
     parameters = {
         **{"damping": damping, "force": 1.0 + position, "displacement_start": -1.0},
         **stop(position, 1.0),
@@ -82,7 +82,7 @@ def test_an_elastic_stop_on_a_damped_and_pressed_mass_does_not_bounce_for_ever(
 @pytest.mark.parametrize("height", [1e-9, 1e-20, 1e-60, 1e-300])
 @pytest.mark.parametrize("position", [0.0, 0.3])
 def test_elastic_bounces_too_low_to_matter_come_to_rest(height: float, position: float) -> None:
-    # undamped, pressed, r = 1: 2e-30 s from bounce to bounce, for ever, if nothing ends it
+    # undamped, pressed, r = 1: without a rule the bounces go on for ever, 2e-30 s apart
     parameters = {"force": 1.0 + position, "displacement_start": position - height}
     with OscillatorFmu({**parameters, **stop(position, 1.0)}) as o:
         o.step(100.0)
@@ -152,7 +152,7 @@ def test_changing_the_force_on_a_resting_mass_holds_it_or_lets_it_go_at_once() -
 
 
 def test_a_mass_lifted_before_its_chatter_has_ended_has_no_stick_in_the_future() -> None:
-    # r so near 1 that the summed tail lasts long; the force is turned away in the middle of it
+    # with r near 1 the summed tail lasts long; the force reverses in the middle of it
     parameters = {"stiffness": 0.0, "force": 1.0, "velocity_start": -1.0, "record.impacts": True}
     with OscillatorFmu({**parameters, **stop(0.0, 0.999)}, early_return=True) as o:
         o.advance(1990.0)
@@ -172,7 +172,7 @@ def test_a_mass_started_at_rest_on_the_stop_rests_if_pressed_and_leaves_if_not(p
     parameters = {**forced(1.0, 0.5, 0.05), "forcing.phase": phase, **stop(0.0)}
     with OscillatorFmu(parameters) as o:
         o.step(1e-3)
-        # at 3 pi / 2 the force rises through zero, at pi / 2 it falls: pressed from there on, or not at all
+        # at 3 pi / 2 the force rises through zero, at pi / 2 it falls: from there on the body is pressed, or free
         pressed = math.cos(phase + 0.25e-3) > 0.0
         assert o.contact("stuck")[0] == pressed
         assert (o.get("displacement") < 0.0) != pressed

@@ -1,4 +1,4 @@
-"""Stops that yield, as FMUs of their own, where it is hard: stiff, slow, pressed, stateless, sampled, saved in contact.
+"""Compliant stops in FMUs of their own, in hard cases: stiff, slow, pressed, stateless, sampled, saved in contact.
 
 References: the closed forms of equations.md 6.9 and 6.10, static equilibrium, and conservation of energy.
 """
@@ -39,7 +39,7 @@ SAME_VERSIONS = [(v, v) for v in VERSIONS]
 
 @pytest.mark.parametrize(("stiffness", "tolerance"), [(1e-2, 1e-12), (1e6, 1e-11), (1e9, 1e-9), (1e15, 1e-6)])
 def test_a_spring_of_any_stiffness_gives_the_energy_back(stiffness: float, tolerance: float) -> None:
-    # a contact at time 1 that takes w^-1: its times are rounded by 1e-16 of 1, so energies by about w 1e-16
+    # a contact at time 1 that lasts about 1 / w: rounding of its times is 1e-16, so that of energies is about w 1e-16
     run = coupled("kelvin_voigt", {"stiffness": stiffness})
     run.importer.advance(2.0 + math.pi / math.sqrt(stiffness))
     assert abs(run.values("velocity")[0] + 1.0) <= tolerance
@@ -59,7 +59,7 @@ def test_a_ball_at_any_speed_takes_the_same_number_of_steps(speed: float) -> Non
 
 @pytest.mark.parametrize(("mass", "tolerance"), [(1e-9, 1e-8), (1e9, 1e-11)])
 def test_light_and_heavy_masses_are_turned_round(mass: float, tolerance: float) -> None:
-    # the light one goes 3e-7 m into a stop at 1 m, where a displacement is rounded by 1e-16: 3e-10 of the depth a step
+    # the light mass goes 3e-7 m into a stop at 1 m; rounding of a displacement, 1e-16, is 3e-10 of the depth per step
     run = coupled("kelvin_voigt", {"stiffness": 1e4}, {**FREE, "mass": mass})
     run.importer.advance(2.0 + 4.0 * math.sqrt(mass / 1e4))
     assert abs(run.values("velocity")[0] + 1.0) <= tolerance
@@ -91,7 +91,7 @@ def test_a_mass_put_on_the_surface_at_rest_is_held_where_the_force_is(
 
 @pytest.mark.parametrize("law", ["hertz", "hunt_crossley"])
 def test_a_stop_at_zero_is_met_within_a_rounding_of_the_flight(law: str) -> None:
-    # it is met at -1e-34 m, which is no rounding of its position: the step after would be made without its force
+    # the contact is at -1e-34 m, less than rounding of its position: the next step would lack its force
     scene = (
         "[body]\nmass = 0.2\nstiffness = 0.5\ndamping = 0.05\ndisplacement_start = -0.02\nvelocity_start = -0.5\n"
         f'[[stop]]\nlaw = "{law}"\nposition = 0.0\nstiffness = 17722.0\n'
@@ -123,7 +123,7 @@ def test_a_mass_on_the_surface_that_is_drawn_away_leaves_at_once() -> None:
 
 @pytest.mark.parametrize("excess", [-1e-9, 1e-4, 1e-8, 1e-12])
 def test_a_peak_over_the_surface_by_next_to_nothing_changes_next_to_nothing(excess: float) -> None:
-    # x = (1 + excess) sin t, from its start upwards; a soft stop takes of it at most the work of the stop's depth
+    # x = (1 + excess) sin t, from its start upwards; a soft stop takes at most the work of the stop's depth
     for law, parameters in LAWS.items():
         run = coupled(law, parameters, {"velocity_start": 1.0 + excess})
         run.importer.advance(math.pi)
@@ -177,11 +177,11 @@ def test_a_rigid_stop_and_one_that_yields_meet_the_same_body() -> None:
     importer.free()
 
 
-# ---- a stop of other people's, without slopes and without states ----
+# ---- a foreign stop, without slopes and without states ----
 
 
 def test_a_contact_that_begins_a_rounding_inside_does_not_let_go_at_once() -> None:
-    # the tip of this beam is found 1e-308 m in the stop at its third touch-down
+    # at its third touch-down the tip of this beam is 1e-308 m inside the stop
     scene = """
     [body]
     kind = "beam"
@@ -210,7 +210,7 @@ def test_a_contact_that_begins_a_rounding_inside_does_not_let_go_at_once() -> No
 
 
 def test_a_stateless_spring_is_off_at_its_first_contact_by_the_first_step_alone(tmp_path: Path) -> None:
-    # force = 1e4 (x - 1), FMI 2.0, no states: no step can be repeated; the slopes are those of the step before
+    # force = 1e4 (x - 1), FMI 2.0, no states: no step can be repeated; the slopes come from the previous step
     steps, w = 30, 100.0
     importer = Importer(
         [body("b", {**FREE, **follows(1.0)}), part("g", fmu_factory.gain(tmp_path), k=w * w, b=-w * w)],
@@ -220,12 +220,12 @@ def test_a_stateless_spring_is_off_at_its_first_contact_by_the_first_step_alone(
     importer.begin()
     importer.advance(1.5)
     velocity = float(importer.components["b"].group("Float64", ["velocity"]).get()[0])
-    # a first step h' <= h through the stop without force: the energy (w h')^2 / 2 of the impact is given back in full
+    # a first step h' <= h goes into the stop without force: later the stop returns (w h')^2 / 2 that it never took
     assert 0.0 <= velocity**2 - 1.0 <= (math.pi / steps) ** 2
     importer.free()
 
 
-# ---- looked at, saved ----
+# ---- sampled, saved ----
 
 
 @pytest.mark.parametrize("versions", SAME_VERSIONS, ids="+".join)
@@ -279,7 +279,7 @@ def test_a_state_saved_in_the_middle_of_a_contact_goes_on_bit_for_bit(law: str, 
             instance.step(1.004 + i * 1e-3, 1e-3)
         ends.append(tuple(motion.get()))
     assert ends[0] == ends[1] == ends[2]
-    assert ends[0][2] == 0.0  # it has left
+    assert ends[0][2] == 0.0  # it has separated
     importer.free()
 
 

@@ -1,4 +1,4 @@
-"""Scenes whose single steps are long, endless or beyond the numbers: the deadline is kept, signals are heard."""
+"""Scenes whose single steps are long, endless or beyond the numbers: the deadline and signals still work."""
 
 import os
 import re
@@ -26,7 +26,7 @@ STIFF_AND_PLASTIC = (
     "thesis/figure_6_5d",
     {"dampings": "[1e5, 0.1]", "restitution": "1e-3", "angular_frequency": "0.5"},
 )
-#: With its energies it is followed by series while it rests.
+#: With energies, its rest is computed by series.
 LIGHT_BEAM = (
     "thesis/figure_7_10",
     {
@@ -49,7 +49,7 @@ BEYOND_NUMBERS = {
 
 
 def changed(name: str, values: dict[str, str], execution: str) -> Scene:
-    """Return an example scene with other values, run as `execution` says."""
+    """Return an example scene with other values and the keys of `execution`."""
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
     for key, value in values.items():
         text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, count=1, flags=re.M)
@@ -58,7 +58,7 @@ def changed(name: str, values: dict[str, str], execution: str) -> Scene:
 
 
 def ran(scene: Scene, how: str = "auto") -> RunRecord:
-    """Run the one point of a scene."""
+    """Run the single point of a scene."""
     runner = PointRunner(scene, execution=how)
     try:
         return runner.run({})
@@ -148,12 +148,12 @@ def test_the_impact_limit_holds_for_the_point_and_not_for_each_sample() -> None:
 
 
 class Heard(Exception):
-    """Raised where a signal is."""
+    """Raised by the handler of a signal."""
 
 
 @contextmanager
 def alarm() -> Iterator[None]:
-    """Send a signal after a moment, as Ctrl-C is one; only here, so that it never ends what runs the tests."""
+    """Send a signal after a moment, like Ctrl-C; its handler is restored, so that no signal ends the test runner."""
 
     def hear(number: int, frame: object) -> None:
         raise Heard

@@ -1,4 +1,4 @@
-"""Bodies that hit each other while another component drives them: the force over a step depends on where it ends."""
+"""Bodies that hit each other, driven by another component: the force over a step depends on the end of the step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_bodies_that_are_driven_touch_where_they_hit_each_other(
     run.importer.on_event = note
     run.at(3.0)
     assert gaps
-    # a body moves at up to 12 m/s, and an impact is located to 2e-13 s; the iteration agrees to 1e-10
+    # a body moves at up to 12 m/s, and an impact is located to 2e-13 s; the iteration converges to 1e-10
     assert gaps == pytest.approx([0.0] * len(gaps), abs=2e-10)
     assert values(run.importer, "driver", "displacement")[0] == pytest.approx(math.sin(3.0 * RATE), abs=1e-9)
     run.importer.free()

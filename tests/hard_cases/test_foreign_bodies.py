@@ -1,6 +1,6 @@
-"""Bodies of other tools, which hold a force over a step, in contact with stops that yield.
+"""Bodies of other tools, whose force is constant over a step, in contact with compliant stops.
 
-References: energy, closed forms of equations.md 6.9 and 6.10, static equilibrium, and the same run otherwise coupled.
+References: energy, closed forms of equations.md 6.9 and 6.10, static equilibrium, and the same run coupled otherwise.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from vibroimpact.orchestrator.importer.specification import StopContactSpec
 
 ELASTIC = {"kelvin_voigt": {"stiffness": 1e4}, "hertz": {"stiffness": 1e6}}
 ROLLS = {"v": 1.0}
-"""A free unit mass that comes to a stop at 1 m after 1 s, at 1 m/s."""
+"""A free unit mass that reaches a stop at 1 m after 1 s, at 1 m/s."""
 
 
 # ---- energy ----
@@ -63,7 +63,7 @@ def test_any_lossless_contact_keeps_the_energy_of_any_mass_that_can_go_back(
     spring: float,
     steps: float,
 ) -> None:
-    # it comes to a stop at a tenth of its way, with a spring of its own or without
+    # it reaches a stop at a tenth of its way, with a spring of its own or without
     stiffness, own, way = mass * frequency**2, spring * mass, 0.1 * speed
     run = held(
         tmp_path_factory.getbasetemp(),
@@ -111,7 +111,7 @@ def test_a_mass_pressed_between_two_stops_at_once_keeps_its_energy(tmp_path: Pat
 def test_the_residual_of_a_mass_that_cannot_go_back_is_the_energy_that_it_has_gained(
     tmp_path: Path, macro_step: float
 ) -> None:
-    # a spring of its own: its accelerations in a step are foreseen, and the true ones differ
+    # with a spring of its own the accelerations in a step are predicted, and the true ones differ
     stop = yielding_stop("s", "hertz", ELASTIC["hertz"], 0.1)
     run = held(tmp_path, [stop], {"v": 2.0, "k": 100.0}, states=False, macro_step=macro_step)
     displacement, velocity = run.motion(2.0)
@@ -277,7 +277,7 @@ def test_a_run_sampled_in_contact_is_the_run_bit_for_bit(tmp_path: Path) -> None
             rows = np.array(sampler.rows)
             inside = rows[:, 1] > 1.0 + 1e-3
             assert np.count_nonzero(inside) > 200
-            # a held force is the mean of the step's
+            # a held force is the mean over the step
             np.testing.assert_allclose(rows[inside, 2], -1e4 * (rows[inside, 1] - 1.0), atol=6.0)
         run.importer.free()
     assert ends[0] == ends[1]
@@ -292,7 +292,7 @@ def test_a_run_begun_again_is_the_same_run(tmp_path: Path) -> None:
 
 
 def test_a_body_of_ours_may_be_a_foreign_one(tmp_path: Path) -> None:
-    # of FMI 3.0 with event mode; its spring turns it round after the contact
+    # the body is an FMU of FMI 3.0 with event mode; its spring turns it round after the contact
     start = {"stiffness": 4.0, "velocity_start": 3.0}
     contact = StopContactSpec("b", "displacement", "velocity", "force", "s")
     importer = Importer(
@@ -328,7 +328,7 @@ def test_a_body_that_starts_pressed_in_takes_the_energy_of_the_spring_with_it(tm
     ],
 )
 def test_a_body_that_fails_in_a_contact_says_where(tmp_path: Path, fault: str, said: str) -> None:
-    # y' = u is displacement and velocity at once: pressed from the start
+    # y of y' = u serves as displacement and velocity at once: pressed from the start
     faulty = part("b", fmu_factory.faulty(tmp_path), fault=fault, fault_time=0.05)
     stop = yielding_stop("s", "kelvin_voigt", {"stiffness": 100.0, "damping": 0.1}, -0.5)
     contact = StopContactSpec("b", "y", "y", "u", "s", 1.0)

@@ -1,4 +1,4 @@
-"""Bodies of other tools that hit each other, or one of ours, by laws that yield: momentum and energy."""
+"""Bodies of other tools that hit each other, or a body of this package, by compliant laws: momentum and energy."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_body_of_ours_and_one_of_another_tool_throw_each_other_back(
 
 
 def test_a_foreign_body_between_a_stop_and_another_body_has_the_sum_of_both_forces(tmp_path: Path) -> None:
-    # a mass at rest between two springs that both press it: it stays
+    # a mass at rest stays between two springs that both press it
     fmu = fmu_factory.mass(tmp_path, "3.0")
     bodies = [part(name, fmu, m=1.0, k=100.0, x=x) for name, x in (("a", 0.1), ("b", 0.0), ("c", -0.1))]
     pairs = [

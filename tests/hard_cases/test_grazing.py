@@ -1,4 +1,4 @@
-"""No impact is lost at a graze: a steady motion whose peak exceeds the stop ever less, from eight phases."""
+"""No impact is lost at a graze: the peak of a steady motion exceeds the stop by ever less, from eight phases."""
 
 import math
 
@@ -60,7 +60,7 @@ def test_a_peak_over_the_stop_is_an_impact_in_a_scene_from_every_phase(excess: f
             record = runner.run({})
         finally:
             runner.close()
-        # the part period before the first forcing phase 0 is not recorded: the second peak is there for all
+        # the part of a period before the first forcing phase 0 is not recorded: all runs have the second peak
         assert record.impacts is not None
         found += len(record.impacts) > 0
     assert found == 8
@@ -108,7 +108,7 @@ def test_a_peak_below_the_stop_is_no_impact(excess: float) -> None:
 
 
 def test_a_touch_at_rest_neither_stops_nor_drives_an_undamped_mass() -> None:
-    # amplitude exactly the stop's distance: a touch in every period, V = 0 but for rounding
+    # the amplitude equals the stop's distance: a touch in every period, V = 0 up to rounding
     for start in ({"displacement_start": 1.0}, {"displacement_start": -1.0}, {"velocity_start": 1.0}):
         with OscillatorFmu({**start, **stop(1.0, 0.3)}) as o:
             o.step(200 * 2.0 * math.pi)

@@ -1,6 +1,6 @@
 """No impact is lost at a graze in lanes: the ladders of one mode and of many, and ripples over a stop.
 
-What rounding would decide the lanes leave for the scalar engine; all else they have to see themselves.
+The lanes leave decisions within rounding to the scalar engine; they have to detect all other impacts themselves.
 """
 
 import math
@@ -16,7 +16,7 @@ LEVELS = [10.0**-n for n in (2, 3, 4, 5, 6, 7, 8, 9, 10)]
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
-    # a steady motion whose peak exceeds the stop ever less, from eight phases; and one that stays below it
+    # the peak of a steady motion exceeds the stop by ever less, or stays below it, from eight phases
     zeta, w = 0.05, 0.8
     size, lag = math.hypot(1.0 - w * w, 2.0 * zeta * w), math.atan2(2.0 * zeta * w, 1.0 - w * w)
     excess, phase = (each.ravel() for each in np.meshgrid(LEVELS, TURN * np.arange(8) / 8 + 0.1))
@@ -38,7 +38,7 @@ def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
     found = run(points)
     impacts = np.array([np.count_nonzero(rows[:, 0] == IMPACT) for rows in found.rows])
     if sign > 0.0:
-        assert np.all((impacts > 0) | ~found.has_run)  # what rounding would decide is left
+        assert np.all((impacts > 0) | ~found.has_run)  # the scalar engine decides within rounding
     else:
         assert np.all(impacts == 0)
     assert np.count_nonzero(found.has_run) >= 0.9 * len(excess)
@@ -47,7 +47,7 @@ def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
 def undamped(
     natural: np.ndarray, shape: np.ndarray, start: np.ndarray, position: list[float], end: float
 ) -> Columns:
-    """Return bodies without losses or force that are let go, each between its modes' far side and its own stop."""
+    """Return bodies without losses or force, released between the far side of their modes and their own stop."""
     count, modes = len(position), len(natural)
     points = oscillators(
         count, 0, 1, angular_frequency=TURN / end, force=0.0, restitution=0.6, position=position
@@ -85,7 +85,7 @@ def test_a_peak_of_many_modes_over_the_stop_is_an_impact_however_little_it_is(
 def test_the_ripples_of_a_fast_mode_over_the_stop_are_those_that_the_scalar_engine_finds(
     ripple: float, fast: float
 ) -> None:
-    # a slow heavy mode carries a light fast one to the stop: a sampler with 100 points per slow period sees none of it
+    # a slow heavy mode carries a light fast one to the stop: 100 samples per slow period show none of its ripples
     natural, shape, start = np.array([1.0, fast]), np.array([0.02, 1.0]), np.array([-50.0, ripple])
     over = np.linspace(0.1, 0.9, 8)
     points = undamped(natural, shape, start, (1.0 + over * ripple).tolist(), 4.0)

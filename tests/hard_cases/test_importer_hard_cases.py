@@ -1,4 +1,4 @@
-"""Events of several components in one step, at one instant, at the ends of a run, and of FMUs that know of none."""
+"""Events of several components in one step, at one instant, at the ends of a run, and of FMUs without events."""
 
 import math
 import runpy
@@ -35,7 +35,7 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 
 LANDINGS = ("zero", "kept", "above")
 BOUNCE = 1e-10
-"""What the issue promises for bounce times of a black box."""
+"""Largest error of the bounce times of a black box, s, from the issue."""
 MIXED = [("3.0", "3.0"), ("2.0", "2.0"), ("3.0", "2.0"), ("2.0", "3.0")]
 
 
@@ -51,7 +51,7 @@ def ball(folder: Path) -> Path:
 
 # ---- several bodies with stops ----
 
-#: Incommensurate periodic motions, so that their events come in ever other orders.
+#: Incommensurate periodic motions, whose events come in changing orders.
 BODIES: list[dict[str, Value]] = [
     {**P11, **external(1.0)},
     {"damping": 0.1, "forcing.amplitude": 0.5, "forcing.angular_frequency": 0.85, **external(1.0)},
@@ -62,7 +62,7 @@ BODIES: list[dict[str, Value]] = [
 def scene(
     bodies: list[dict[str, Value]], versions: list[str]
 ) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
-    """Return bodies b0, b1, ... each with a stop of its own."""
+    """Return bodies b0, b1, ... with one stop each."""
     parts, links = [], []
     for i, (parameters, version) in enumerate(zip(bodies, versions, strict=True)):
         parts += [body(f"b{i}", parameters, version), stop(f"s{i}", 0.7, version)]
@@ -106,7 +106,7 @@ def test_the_earliest_event_of_a_step_wins_and_the_others_are_met_later(
 def test_events_of_two_bodies_at_one_instant_are_both_resolved(
     versions: tuple[str, str], macro_step: float
 ) -> None:
-    # the same motion twice, one of them mirrored: every contact is a contact of both
+    # the same motion twice, one of them mirrored: every contact happens in both at once
     mirrored = {**P11, "forcing.amplitude": -0.5, **external(-1.0, "lower")}
     (one, other), events, _ = impacts(
         [BODIES[0], mirrored], list(versions), macro_step, "gauss_seidel", 100.0
@@ -122,7 +122,7 @@ def test_events_of_two_bodies_at_one_instant_are_both_resolved(
 
 @pytest.mark.parametrize("versions", MIXED, ids="+".join)
 def test_both_stops_of_one_body_answer_their_own_contact(versions: tuple[str, str]) -> None:
-    # a free mass between walls 0 and 1 that answer .5 and .25: the speed says whose answer it was
+    # a free mass between walls 0 and 1 with restitution .5 and .25: its speed shows which wall answered
     parameters = {
         "stiffness": 0.0,
         "displacement_start": 0.5,
@@ -162,14 +162,14 @@ def test_a_stop_is_asked_about_the_contact_and_not_about_the_step_before(
         exchange=exchange,  # type: ignore[arg-type]
     )
     log = ImpactLog(importer, "b")
-    asked: list[float] = []
-    importer.on_event = lambda event: asked.append(values(importer, "s", "velocity")[0])
+    stop_velocities: list[float] = []
+    importer.on_event = lambda event: stop_velocities.append(values(importer, "s", "velocity")[0])
     importer.begin()
     importer.advance(60.0)
     if versions[0] == "2.0":
-        # its own event ends the step, so the stop has stepped to it; a body of FMI 3.0 asks after that, in event mode
-        assert asked == [impact.velocity for impact in log.take()]
-    assert len(log.take()) == len(asked) == 9
+        # its own event ends the step, so the stop has stepped to it; a body of FMI 3.0 asks later, in event mode
+        assert stop_velocities == [impact.velocity for impact in log.take()]
+    assert len(log.take()) == len(stop_velocities) == 9
     assert (
         largest_difference(log.take(), impacts([BODIES[0]], ["3.0"], math.inf, "gauss_seidel", 60.0)[0][0])
         <= SEQUENCE
@@ -182,7 +182,7 @@ def test_a_stop_is_asked_about_the_contact_and_not_about_the_step_before(
 def test_bodies_with_stops_and_a_spring_between_them_meet_events_that_the_iteration_moves(
     version: str, macro_step: float
 ) -> None:
-    # inputs over a step change the contact they are iterated to; reference: the same, ever finer
+    # iterated inputs over a step move the contact; the reference has ever finer steps
     def first_impacts(step: float) -> list[float]:
         soft = {"stiffness": 1.1, "damping": 0.02}
         importer = Importer(
@@ -224,9 +224,9 @@ def test_a_contact_at_the_first_instant_is_resolved_there(
     start = {**P11, **external(1.0), "displacement_start": 1.0, "velocity_start": 0.5}
     parts = [body("b", start, versions[0]), stop("s", 0.7, versions[1])]
     bystander = {"displacement_start": 0.5}
-    if others:  # stepped before it
+    if others:  # it steps before the body
         parts.insert(0, body("before", bystander, versions[0]))
-    if others > 1:  # and another one that meets its stop at once
+    if others > 1:  # a second body that meets its stop at once
         parts += [body("b2", start, versions[0]), stop("s2", 0.7, versions[1])]
     links = contact("b", "s") + (contact("b2", "s2") if others > 1 else [])
     importer = Importer(parts, links, macro_step=0.5, exchange=exchange)  # type: ignore[arg-type]
@@ -288,7 +288,7 @@ def test_chatter_and_sticking_do_not_depend_on_the_macro_step(version: str, macr
     start = values(importer, "b", "contact[1].stick_start")[0]
     importer.advance(9.0)
     (end,) = values(importer, "b", "contact[1].stick_end")
-    assert end == pytest.approx(math.pi / 0.4, abs=SEQUENCE)  # where the force changes its sign
+    assert end == pytest.approx(math.pi / 0.4, abs=SEQUENCE)  # the force changes its sign there
     # the same chatter in one FMU
     own: dict[str, Value] = {"contact[1].law": "restitution", "contact[1].restitution": 0.7}
     fused = Importer([body("b", {**slow, **external(0.0), **own})])
@@ -342,7 +342,7 @@ def test_bounces_that_accumulate_end_the_search_and_not_the_run(ball: Path, rest
     accumulation = bounce_times(1)[0] * (1.0 + restitution) / (1.0 - restitution)
     assert watch.last_time == pytest.approx(accumulation, rel=1e-7)
     found = np.array([event.time for event in events])
-    # each bounce's rounding stays with the ones after it, and flights get short
+    # each bounce passes its rounding on to the next ones, and flights get short
     assert np.abs(found - bounce_times(len(found), restitution)).max() <= 1e-9 * len(found)
     importer.free()
 
@@ -388,7 +388,7 @@ def test_a_crossing_is_an_event_in_its_direction_only(ball: Path, direction: str
         importer.begin()
         importer.advance(1.1)
         found = [event.time for event in events]
-        if macro_step < second - first:  # a watch sees no more than the ends of a step
+        if macro_step < second - first:  # a watched value is seen only at the ends of steps
             assert found == pytest.approx(expected, abs=1e-12)
         importer.free()
 
@@ -397,7 +397,7 @@ def test_a_crossing_is_an_event_in_its_direction_only(ball: Path, direction: str
 def test_a_component_without_states_follows_a_ball_it_cannot_go_back_with(
     folder: Path, ball: Path, exchange: str
 ) -> None:
-    # the strict gain FMU refuses any step that does not begin where it is
+    # the strict gain FMU refuses any step that does not begin at its own time
     importer = Importer(
         [part("gain", fmu_factory.gain(folder), k=-2.0), part("ball", ball)],
         [link("ball.h", "gain.u")],
@@ -482,7 +482,7 @@ def test_samples_inside_a_step_are_those_of_the_exact_motion() -> None:
     importer.free()
 
 
-# ---- a law of the user's ----
+# ---- a user's contact law ----
 
 LAW = """\
 def contact_law(displacement, velocity):

@@ -1,4 +1,4 @@
-"""Long rests, held or pressed, by their exact flow: the same motion as by series, released at the zero of the force."""
+"""Long rests, held or pressed, by their exact flow: the same motion as by series, with release at the force's zero."""
 
 import math
 import time
@@ -22,7 +22,7 @@ PERIOD = 2.0 * math.pi / SLOW
 
 
 def released_at(damping_ratio: float, stiffness: float, damping: float) -> float:
-    """Return when the force of a pressed mass of 1 falls to zero, started on its response; 30 digits."""
+    """Return the time at which the force of a pressed mass of 1 falls to zero, started on its response; 30 digits."""
     with mp.workdps(30):
         k, c = 1 + mp.mpf(stiffness), 2 * mp.mpf(damping_ratio) + mp.mpf(damping)
         response = mp.mpf(FORCE) / (k - mp.mpf(SLOW) ** 2 + 1j * c * mp.mpf(SLOW))
@@ -48,13 +48,13 @@ def test_a_mass_at_rest_on_a_stiff_stop_is_released_at_the_zero_of_its_force(
         # by series a stop of 1e12 N/m takes 6 s
         assert time.process_time() - began < 1.0
         end = body.impacts[0, 1] + body.impacts[0, 7]
-        # released earlier by its ringing, which is rounding of what it starts from
+        # its ringing, which is due to rounding of the start, releases it earlier
         assert end == pytest.approx(released_at(0.05, stiffness, damping), rel=1e-11)
 
 
 @pytest.mark.parametrize("stiffness", [1e9, 1e12, 1e15])
 def test_what_a_stiff_stop_carries_is_the_load_on_it(stiffness: float) -> None:
-    # a ball of 1 kg that lies on a stop, under its weight and a force that never lifts it
+    # a ball of 1 kg on a stop, under its weight and a force that never lifts it
     stop = Stop([1.0], 0.0, law="kelvin_voigt", stiffness=stiffness, damping=0.2 * math.sqrt(stiffness))
     with Structure(Modes([0.0], 0.0, [1.0], 3.0), [stop], 11.0 / stiffness, 0.0) as body:
         assert body.advance(20.0, held=[10.0]) == DONE
@@ -62,7 +62,7 @@ def test_what_a_stiff_stop_carries_is_the_load_on_it(stiffness: float) -> None:
         assert body.forces[0] == pytest.approx(10.0 + math.cos(60.0), rel=1e-6)
 
 
-#: Three masses of 1 kg, springs of 1 N/m to each other and to the ground; a damper to the ground at the middle one.
+#: Three masses of 1 kg, springs of 1 N/m to each other and to the ground; the middle mass has a damper to the ground.
 SPRINGS = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
 DAMPER = 0.4
 
@@ -86,7 +86,7 @@ def between_stiff_stops(stiffness: float, damping: float) -> tuple[mp.matrix, mp
 def test_a_chain_between_two_stiff_stops_is_released_at_the_zero_of_its_force(
     stiffness: float, ratio: float
 ) -> None:
-    # the two stops' own modes are equal but for what the chain couples them by; energies are recorded
+    # the two stops' own modes are equal except for their coupling by the chain; energies are recorded
     damping = 2.0 * ratio * math.sqrt(stiffness)
     response, still = between_stiff_stops(stiffness, damping)
     square, shapes = np.linalg.eigh(SPRINGS)
@@ -125,12 +125,12 @@ def test_a_chain_between_two_stiff_stops_is_released_at_the_zero_of_its_force(
         # by series a stop of 1e12 N/m takes 60 s
         assert time.process_time() - began < 1.0
         end = body.impacts[0, 1] + body.impacts[0, 7]
-        # what its displacements, of order 1, can tell of the way that it presses a stop in
+        # displacements of order 1 determine the depth in a stop only up to their rounding
         assert end == pytest.approx(float(released), abs=1e-11 + 4e-15 * stiffness)
 
 
 def clamped_beam(modes: int) -> tuple[Modes, Array]:
-    """Return a clamped-free beam in units of its first mode, pressed and lifted at its tip; its tip's shape."""
+    """Return a clamped-free beam in units of its first mode, pressed and lifted at its tip; and the tip's shape."""
     found = beam_modes("clamped_free", modes)
     natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
     tip = np.asarray(found.shapes([1.0]))[0]
@@ -146,7 +146,7 @@ def test_a_rest_of_many_modes_costs_like_a_flight() -> None:
             assert body.advance(16.0 * math.pi if not by_series else 8.0 * math.pi) == DONE
             seconds.append(time.process_time() - began)
             ends.append(body.sticks)
-    # twice as long; 2 ms and 0.8 s on one machine
+    # the exact flow covers twice the time; 2 ms and 0.8 s on one machine
     assert seconds[0] < 0.1 * seconds[1]
     early = ends[0][: len(ends[1])]
     # three chatters, each of which multiplies rounding
@@ -172,7 +172,7 @@ def test_a_rest_that_is_cut_keeps_its_energy() -> None:
 
 @st.composite
 def rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
-    """Bodies that are pressed to a rigid or a Kelvin-Voigt stop, their loads, and how long they are followed."""
+    """Draw bodies pressed to a rigid or a Kelvin-Voigt stop, their loads, and the duration of their run."""
     n = draw(st.integers(1, 10))
     numbers = st.lists(st.floats(0.1, 1.0), min_size=n, max_size=n).map(np.array)
     natural = 0.3 + np.cumsum(draw(numbers)) * draw(st.sampled_from([1.0, 3.0]))
@@ -187,7 +187,7 @@ def rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
         damping = draw(st.sampled_from([0.0, 0.1, 1.0, 3.0])) * 2.0 * math.sqrt(stiffness / mobility)
         stop = Stop(shape, stop.position, law="kelvin_voigt", stiffness=stiffness, damping=damping)
     stops = [stop]
-    if draw(st.booleans()):  # which others may meet
+    if draw(st.booleans()):  # further stops that may be met
         stops.append(Stop(draw(numbers), 1.0 + draw(st.floats(0.0, 2.0)), restitution=0.5))
     force = 0.3 * draw(st.floats(0.0, 1.0)) * shape
     return Modes(natural, ratio, force, frequency), stops, 1.5 * shape, draw(st.floats(0.5, 2.0)) / frequency
@@ -195,7 +195,7 @@ def rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
 
 @st.composite
 def coupled_rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
-    """Bodies that are pressed to one to four stops, damped at single points, strongly, or by their modes."""
+    """Draw bodies pressed to one to four stops, damped at single points, strongly, or by their modes."""
     n = draw(st.integers(1, 7))
     numbers = st.lists(st.floats(0.1, 1.0), min_size=n, max_size=n).map(np.array)
     signs = st.lists(st.sampled_from([-1.0, 1.0]), min_size=n, max_size=n).map(np.array)
@@ -243,10 +243,10 @@ def test_a_rest_is_the_same_motion_as_by_series(
             end += [body.forcing_work, body.damping_loss, body.contact_loss]
             runs.append((body.time, body.statuses, np.array(end), body.impacts, body.sticks))
     (at, statuses, end, impacts, sticks), (_, by, last, hits, rested) = runs
-    # what rounding has grown to after so many impacts
+    # possible growth of rounding after this number of impacts
     allowed = 1e-11 * 1.3 ** min(len(hits), 60)
     if at < duration * (1.0 - 1e-9):
-        return  # as many impacts as were allowed
+        return  # the impact limit ended the run
     assert statuses == by
     assert np.abs(end - last).max() <= allowed * (1.0 + np.abs(last).max())
     assert impacts.shape == hits.shape

@@ -1,4 +1,4 @@
-"""How often a motion is looked at does not change it by more than rounding."""
+"""The output rate changes a motion by no more than rounding."""
 
 import itertools
 import math
@@ -27,7 +27,7 @@ STOP = "[[stop]]\nposition = 1.5\nrestitution = 0.7\n"
 
 
 def sampled(text: str, rate: int) -> tuple[float, float]:
-    """Displacement and velocity after so many periods of 2 pi, seen `rate` times in each."""
+    """Return displacement and velocity after PERIODS periods of 2 pi, with `rate` outputs in each."""
     with Session(parse_scene(text, "free.toml")) as session:
         session.begin()
         for period, part in itertools.product(range(PERIODS), range(1, rate + 1)):

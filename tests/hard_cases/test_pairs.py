@@ -1,4 +1,4 @@
-"""Bodies that hit each other: momentum, energy, the order of impacts, rest, laws that yield.
+"""Bodies that hit each other: momentum, energy, the order of impacts, rest, compliant laws.
 
 References: the closed forms of equations.md 3.5, exact motion of one mass, the same run in other steps.
 """
@@ -137,7 +137,7 @@ def test_two_that_meet_a_third_at_once_are_resolved_by_the_rule() -> None:
         hit("c", velocity_start=-2.0, **ROLLS),
     ]
     run = run_of(bodies, [pair("a", "b", clearance=1.0), pair("b", "c", clearance=2.0)]).at(1.5)
-    # equal masses exchange velocities: b and c first, being faster; then a with b, which comes back at 2 m/s; then c
+    # equal masses exchange velocities: first b and c, the faster pair; then a with b, which returns at 2 m/s; then c
     assert [event.component for event in run.events] == ["b", "a", "b"]
     assert [run.motion(name)[1] for name in "abc"] == pytest.approx([-2.0, 0.0, 1.0], abs=1e-14)
     run.importer.free()
@@ -155,7 +155,7 @@ def test_impulses_that_never_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -
 
 
 def struck_beam(restitution: float) -> tuple[PairRun, float]:
-    """Return a ball that has fallen on the tip of a beam, and its speed before."""
+    """Return a ball that has fallen on the tip of a beam, and the speed of the fall."""
     tip = {
         "length": 1.0,
         "flexural_rigidity": 50.0,
@@ -219,7 +219,7 @@ def test_dead_bodies_move_as_one_until_they_part(version: str) -> None:
     assert run.motion("a")[0] == pytest.approx(math.sin(0.5 * rate) / (3.0 * rate), abs=1e-5)
     assert run.motion("b")[0] == pytest.approx(run.motion("a")[0], abs=1e-5)
     run.at(QUARTER + 2.0)
-    parted = 2.0 - math.pi / rate  # both springs are relaxed then: nothing presses
+    parted = 2.0 - math.pi / rate  # both springs are relaxed then: no force presses
     assert run.motion("a")[0] == pytest.approx(-math.sin(parted) / 3.0, abs=1e-5)
     assert run.motion("b")[0] == pytest.approx(
         -math.sin(math.sqrt(4.5) * parted) / math.sqrt(4.5) / 3.0, abs=1e-5
@@ -229,7 +229,7 @@ def test_dead_bodies_move_as_one_until_they_part(version: str) -> None:
 
 
 def test_bounces_accumulate_to_rest_where_they_must() -> None:
-    # a weight on a spring so soft that it is constant: flights shrink by r, their sum is 2 v r / (1 - r) / g
+    # a weight on a spring so soft that its force is constant: flights shrink by r, their sum is 2 v r / (1 - r) / g
     bodies = [
         hit("floor", mass=1e12, **ROLLS),
         hit("ball", forcing__amplitude=-10.0, displacement_start=1.0, **ROLLS),
@@ -252,7 +252,7 @@ def test_elastic_bodies_that_are_pressed_together_are_an_error_with_a_way_out() 
     run.importer.free()
 
 
-# ---- laws that yield ----
+# ---- compliant laws ----
 
 
 @given(
@@ -291,7 +291,7 @@ def test_a_dashpot_between_two_bodies_takes_what_its_closed_form_says() -> None:
         run = run_of(bodies, [spec], contact_steps=steps).at(1.0)
         root = math.sqrt(1.0 - ratio**2)
         angle = math.pi - math.atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio**2)
-        exact = math.exp(-ratio * angle / root)  # equations.md 6.9: it lets go where the force falls to 0
+        exact = math.exp(-ratio * angle / root)  # equations.md 6.9: separation where the force falls to 0
         errors.append(abs(run.motion("b")[1] - run.motion("a")[1] - exact))
         run.importer.free()
     assert errors[1] < 2e-3

@@ -1,4 +1,4 @@
-"""Rigid impacts of bodies of other tools, which take forces only: an impulse is a force over one very short step.
+"""Rigid impacts of bodies of other tools, which take only forces: an impulse is a force over one very short step.
 
 References: momentum and restitution of the closed form (equations.md 3.5), thrown balls, statics.
 """
@@ -131,7 +131,7 @@ def test_neither_the_exchange_nor_a_late_hour_makes_a_difference(
 
 
 def test_bounces_of_a_foreign_ball_end_in_rest_on_a_foreign_plate(tmp_path: Path) -> None:
-    # a ball of 1 kg falls 1 m to a plate of 1000 kg: bounces end after t0 (1 + r)/(1 - r), then both fall as one
+    # a ball of 1 kg falls 1 m to a plate of 1000 kg: bounces end at t0 (1 + r)/(1 - r). Then both fall together
     fmu = fmu_factory.mass(tmp_path, "3.0")
     bodies = [part("plate", fmu, m=1000.0), part("ball", fmu, x=1.0, load=-10.0)]
     importer = run_of(bodies, PairSpec(point("plate", 1000.0), point("ball"), restitution=0.5))
@@ -149,7 +149,7 @@ def test_bounces_of_a_foreign_ball_end_in_rest_on_a_foreign_plate(tmp_path: Path
 def test_a_foreign_mass_between_a_rigid_impact_and_a_stop_that_yields_keeps_the_energy(
     tmp_path: Path,
 ) -> None:
-    # it starts in contact with the other one, which throws it at a Hertz stop again and again
+    # it starts in contact with the other mass, which throws it at a Hertz stop again and again
     fmu = fmu_factory.mass(tmp_path, "3.0")
     bodies = [part("a", fmu, v=1.0, k=1.0, m=2.0), part("b", fmu, k=1.0)]
     stop = yielding_stop("s", "hertz", {"stiffness": 1e6}, 0.3)
@@ -234,7 +234,7 @@ def test_a_stop_whose_restitution_falls_with_the_speed_is_asked_at_each_impact(t
     run.importer.free()
 
 
-# ---- what is refused, and the mass ----
+# ---- refusals, and the mass ----
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_a_mass_that_is_given_wrong_is_one_error_that_names_both(tmp_path: Path,
     near = PairSpec(point("a", 1.03), point("b"), 0.5, law, stiffness=1e4)  # type: ignore[arg-type]
     importer = run_of(bodies, near)
     importer.advance(1.5)
-    assert values(importer, "b", "v") == [pytest.approx(1.0, rel=1e-9)]  # by the mass that was measured
+    assert values(importer, "b", "v") == [pytest.approx(1.0, rel=1e-9)]  # by the measured mass
     importer.free()
 
 
@@ -287,7 +287,7 @@ def test_the_mass_of_a_contact_with_a_stop_is_compared_with_a_trial_step(tmp_pat
     ):
         run.motion(0.5)
     run = held(tmp_path, [stop], {"v": 1.0}, contacts=[foreign_contact(mass=1000.0)], states=False)
-    run.motion(0.5)  # taken on trust: nothing can be tried
+    run.motion(0.5)  # the given mass is used: no step can be tried
     run.importer.free()
 
 

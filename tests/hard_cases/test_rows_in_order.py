@@ -1,4 +1,4 @@
-"""What begins first is the first row, whatever ends first: contacts and rests within others."""
+"""Rows are in the order of their beginnings, whatever ends first: contacts and rests within others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
-# Two masses that know nothing of each other: the first is in a long contact when the second meets its stop.
+# Two uncoupled masses: the first is in a long contact when the second meets its stop.
 TWO_MASSES = """
 [scene]
 units = "nondimensional"
@@ -42,7 +42,7 @@ SWEEP = '[sweep]\n"stop[2].position" = { values = [0.6, 0.7, 5.9] }\n'
 
 
 def assert_ordered(path: Path, runs: int) -> None:
-    """Assert that all runs are there, ended well and have impacts and rests in the order of their beginning."""
+    """Assert that all runs ended well, with their impacts and rests in the order of their beginning."""
     dataset = read_flat(path)
     assert dataset.sizes["run"] == runs
     assert set(dataset.outcome.values) <= {Outcome.ok, Outcome.stuck}
@@ -62,7 +62,7 @@ def test_an_impact_within_a_longer_contact_comes_after_its_touch_down(
     run_scene(parse_scene(TWO_MASSES.format(second=second, how=how), "order.toml"), tmp_path / "runs.nc")
     assert_ordered(tmp_path / "runs.nc", 1)
     dataset = read_flat(tmp_path / "runs.nc")
-    # touch-down where the free flights of the two masses meet their stops: at pi / 4 and at 1.2
+    # touch-downs of the free flights of the two masses: at pi / 4 and at 1.2
     assert dataset.impact_contact.values[:2].tolist() == [1, 2]
     assert dataset.impact_time.values[:2] == pytest.approx([np.pi / 4.0, 1.2], abs=1e-12)
 

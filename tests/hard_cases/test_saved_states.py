@@ -1,4 +1,4 @@
-"""A saved state goes on in another process, and a thousand lives of a component leave nothing behind."""
+"""A saved state continues in another process, and a thousand lives of a component leave nothing behind."""
 
 import json
 import subprocess
@@ -34,7 +34,7 @@ OUTPUTS = (
 END = 40.0
 MEGABYTE = 1 << 20
 
-# the other process: the same components, put into each of the saved states, go on to the end
+# the other process: the same components, restored to each of the saved states, run to the end
 GO_ON = """
 import json, sys
 sys.path[:0] = [{tests!r}, {here!r}]
@@ -67,7 +67,7 @@ def coupled(version: str) -> Importer:
 
 
 def saved(importer: Importer) -> list[bytes]:
-    """Return the serialized present states of all components."""
+    """Return the serialized current states of all components."""
     states = []
     for component in importer.components.values():
         slot = c_void_p()
@@ -165,4 +165,6 @@ def test_lives_leave_no_memory_behind(lives: int) -> None:
     ]
     grown = [process.communicate(timeout=100)[0] for process in processes]
     assert [process.returncode for process in processes] == [0, 0]
-    assert max(map(int, grown)) < MEGABYTE  # 1000 lives tell a kilobyte that each leaves, 300 lives 3.5
+    assert (
+        max(map(int, grown)) < MEGABYTE
+    )  # a leak shows from 1 kilobyte a life in 1000 lives, from 3.5 in 300

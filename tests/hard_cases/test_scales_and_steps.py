@@ -20,11 +20,11 @@ PHASE = 0.3665212101960540571  # of the P(1,1) motion, see tests/reference
 @pytest.mark.parametrize("w", [1e-6, 0.7, 1.0 + 1e-9, 1e3])
 def test_contacts_are_found_in_every_damping_regime_at_slow_and_fast_forcing(zeta: float, w: float) -> None:
     body = (1.0, 2.0 * zeta, 1.0, 0.8, w)
-    state = (0.2, 2.0 + 10.0 * zeta)  # enough to come to .5
+    state = (0.2, 2.0 + 10.0 * zeta)  # enough to reach .5
     contact = next_contact(Oscillator(*body), state, 0.5, 100.0, phase=0.3)
     assert contact is not None
     time, velocity = exact_next_contact(Exact(*body), state, 0.5, 0.3, contact.time)
-    # a time is a displacement's rounding over the velocity
+    # the error of a time is a displacement's rounding over the velocity
     assert abs(contact.time - float(time)) <= FLOW / float(velocity) + FLOW * contact.time
     assert abs(contact.velocity - float(velocity)) <= FLOW * (10.0 + w) * max(1.0, 2.0 * zeta)
     for part in np.linspace(0.02, 0.98, 25):

@@ -1,6 +1,6 @@
-"""Bodies that stops leave next to no room, and events that rounding alone would repeat for ever.
+"""Bodies with next to no room between stops, and events that rounding alone would repeat for ever.
 
-Soaks of random bodies have found most of these; `bodies` keeps their scenes by number.
+Soaks of random bodies have found most of these; `bodies` gives their scenes by number.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from support.tolerance import ROUNDING
 
 
 def test_a_body_at_rest_on_a_stop_that_is_pulled_off_does_not_meet_it_again() -> None:
-    # its clearance and its speed are 0 but for the rounding of four modes, either way
+    # its clearance and its speed are 0 up to the rounding of four modes
     natural, force = np.array([1.0, 6.27, 17.5, 34.4]), [0.8, 4.2, -5.6, 2.1]
     q, shape = np.array([0.09, 0.01, 0.24, -0.02]), np.array([1.21, 0.57, -1.3, 0.91])
     for ulps in range(-2, 3):
@@ -30,7 +30,7 @@ def test_a_body_at_rest_on_a_stop_that_is_pulled_off_does_not_meet_it_again() ->
 @pytest.mark.parametrize("speed", [0.0, 1e-18, 1e-17, 1e-14])
 @pytest.mark.parametrize("position", [0.0, 0.035])
 def test_a_hertz_stop_begins_to_press_at_any_speed_however_small(position: float, speed: float) -> None:
-    # a speed of rounding size once let its force act as that of a constant rate for a radian: .3 % off
+    # once a speed of rounding size gave it the force of a constant rate for a radian: .3 % error
     stop = Stop([1.0], position, law="hertz", stiffness=1e3)
     start = [position, speed]
 
@@ -44,7 +44,7 @@ def test_a_hertz_stop_begins_to_press_at_any_speed_however_small(position: float
 
 
 def test_a_body_that_rocks_between_two_dead_stops_comes_to_rest_on_both() -> None:
-    # each impact throws it against the other stop, with a share of its speed: infinitely many in a finite time
+    # each impact throws it against the other stop, with a share of its speed: infinitely many impacts in a finite time
     shapes, force = np.array([[1.08, 0.88], [0.31, 1.13]]), np.array([5.7, 7.2])
     stops = [Stop(shape, 0.0, restitution=0.0) for shape in shapes]
     with Structure(Modes([1.0, 6.3], 0.3, force), stops, 0.0, [-0.4, -0.7]) as body:
@@ -57,7 +57,7 @@ def test_a_body_that_rocks_between_two_dead_stops_comes_to_rest_on_both() -> Non
 def test_what_loses_a_share_of_its_speed_between_two_stops_comes_to_rest_before_it_has_no_digits_left() -> (
     None
 ):
-    # half of it each time, 3e4 times a second: 1e-308 m/s after a tenth of a second
+    # half of its speed at each impact, 3e4 times a second: 1e-308 m/s after a tenth of a second
     stops = [
         Stop([1.0], 0.0, law="kelvin_voigt", stiffness=1e10),
         Stop([1.0], 0.0, side="lower", restitution=0.5),
@@ -69,7 +69,7 @@ def test_what_loses_a_share_of_its_speed_between_two_stops_comes_to_rest_before_
 
 
 def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop() -> None:
-    # force 1 falls through 0 as mass 2 is turned round, which pulls mass 1 back to its stop
+    # the force of stop 1 falls through 0 when mass 2 rebounds, which pulls mass 1 back to its stop
     scene = bodies.case(1998013221)
     with scene.body() as body:
         for step in range(200):
@@ -126,7 +126,7 @@ def test_a_random_body_that_once_failed_does_no_more(seed: int, what: str) -> No
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_stop_beside_one_of_nearly_the_same_shape_changes_the_motion_by_as_little(seed: int) -> None:
-    # together they are as rigid as one, and what each of them takes is known the worse, the more they are alike
+    # together they are as rigid as one; the more alike they are, the less accurate is the share of each
     chance = np.random.default_rng(seed)
     modes = Modes(
         [chance.uniform(0.5, 2.0), chance.uniform(3.0, 12.0)],

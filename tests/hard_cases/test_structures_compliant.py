@@ -18,7 +18,7 @@ FORCE, SPEED = np.array([1.0, 0.2, 0.1, 0.05]), np.array([1.0, 0.3, 0.2, 0.1])
 
 
 def damping_for(e: float, stiffness: float, mass: float) -> float:
-    """Return the dashpot with which a Kelvin-Voigt stop rebounds with e (equations.md 6.9, F = 0)."""
+    """Return the dashpot of a Kelvin-Voigt stop with the restitution e (equations.md 6.9, F = 0)."""
 
     def excess(z: float) -> float:
         return math.exp(-2.0 * z * math.acos(z) / math.sqrt(1.0 - z * z)) - e
@@ -170,7 +170,7 @@ def test_a_surface_that_relaxes_faster_and_faster_is_the_surface_that_relaxes_at
 
 
 def relaxing_return(tau: float) -> tuple[float, float]:
-    """Return when and how deep a pushed free mass meets its relaxing surface again, by closed form and root search."""
+    """Return time and depth of a pushed free mass's return to its relaxing surface, by closed form and root search."""
     k, c, push = 100.0, 10.0, 1.0  # critical: half the dashpot is the mass's own rate 5 1/s
 
     def depth(t: float) -> tuple[float, float]:
@@ -246,7 +246,7 @@ def test_a_spring_stop_in_contact_is_the_stiffer_oscillator() -> None:
 @pytest.mark.parametrize("law", ["hertz", "hunt_crossley"])
 @pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e9])
 def test_every_touch_of_a_thousand_is_found_once_and_ends(law: str, stiffness: float) -> None:
-    # undamped stops at both ends of a free flight: each contact turns the mass round and takes its time
+    # undamped stops at both ends of a free flight: each contact turns the mass round and has its duration
     stops = [
         Stop([1.0], 1e-3, law=law, stiffness=stiffness),
         Stop([1.0], -1e-3, law=law, stiffness=stiffness, side="lower"),
@@ -261,7 +261,7 @@ def test_every_touch_of_a_thousand_is_found_once_and_ends(law: str, stiffness: f
 
 
 def test_a_compliant_stop_is_not_missed_where_a_rigid_one_on_the_other_side_touches_too() -> None:
-    # at rest on a rigid stop below and a spring stop above, and pushed up: the spring stop must take it
+    # at rest on a rigid stop below and a spring stop above, and pushed up: the spring stop must carry the push
     stops = [
         Stop([1.0], 0.0, law="hunt_crossley", stiffness=80.0, damping=5.0, exponent=2.0),
         Stop([1.0], 0.0, side="lower", restitution=0.999),
@@ -313,9 +313,9 @@ def test_a_load_presses_a_compliant_stop_beside_a_rigid_one_without_a_touch_of_r
         assert abs(balance) <= 1e-9
 
 
-#: Adversarial bodies (tests/soak) that once stood still, or were put on a stop that they were not at.
+#: Adversarial bodies (tests/soak) that once stood still, or were put on a stop away from them.
 DEGENERATE = (1032, 1111, 1113, 1118, 1194, 1195, 1235, 3007, 3019, 10123, 10350)
-#: Those whose power laws began without force, or turned below rounding; whose energies were rounding.
+#: Adversarial bodies with a power law that began without force or turned below rounding, or with energies of rounding.
 UNPRESSED = (
     116,
     2044,
@@ -341,7 +341,7 @@ def test_a_body_whose_stops_leave_it_no_room_or_no_choice_goes_on(seed: int) -> 
 
 
 def test_a_stop_whose_damping_lets_it_press_again_does_so_from_that_instant() -> None:
-    """It recedes too fast for any force until 1 + chi d' > 0; the same motion by scipy."""
+    """The body recedes too fast for any force until 1 + chi d' > 0; the reference is the same motion by scipy."""
     stiffness, chi, position = 1.0, 3.0, -0.5
     stop = Stop([1.0], position, side="upper", law="hunt_crossley", stiffness=stiffness, damping=chi)
 
@@ -358,7 +358,7 @@ def test_a_stop_whose_damping_lets_it_press_again_does_so_from_that_instant() ->
 
 @pytest.mark.parametrize("law", ["kelvin_voigt", "hertz", "hunt_crossley"])
 def test_an_oscillator_may_start_pressed_into_a_stop_that_yields(law: str) -> None:
-    # put where the stop's force, F = k d^n, balances a load it stays there; a rigid stop refuses such a start
+    # it stays where the stop's force, F = k d^n, balances a load; a rigid stop refuses such a start
     exponent = 1.0 if law == "kelvin_voigt" else 1.5
     depth = (1.0 / 1e4) ** (1.0 / exponent)
     tables = {

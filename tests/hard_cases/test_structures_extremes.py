@@ -34,7 +34,7 @@ def test_elastic_stops_keep_the_energy_of_a_body_over_its_impacts(name: str, imp
     with Structure(Modes(body_modes.natural), [Stop(shape, 0.02)], 0.0, start) as body:
         energy = body.energy
         assert body.advance(1e9, most_impacts=impacts) == IMPACT_LIMIT
-        # 1e-10 over 10^6 impacts: errors may not all go one way
+        # 1e-10 over 10^6 impacts: errors must not all have one sign
         assert abs(body.energy / energy - 1.0) <= 1e-10 * impacts / 1e6
 
 
@@ -48,7 +48,7 @@ def test_a_mass_pressed_to_a_stop_of_restitution_0999_comes_to_rest_when_its_fli
     with Structure(Modes([1.0]), [Stop([1.0], 0.0, restitution=r)], 0.0, -speed) as body:
         assert body.advance(1.01 * expected, held=[1.0]) == DONE
         assert body.statuses == ("held",)
-        assert body.advance(1.0, held=[-1.0]) == DONE  # lift it, to have the stick recorded
+        assert body.advance(1.0, held=[-1.0]) == DONE  # lift it, so that the stick is recorded
         assert body.sticks[0, 1] == pytest.approx(expected, rel=1e-10)
 
 
@@ -84,7 +84,7 @@ def test_one_step_of_a_million_periods_and_ten_million_periods_of_steps_end_on_t
         with Structure(modes, [Stop([1.0, 0.5], 5.0)], 1.0, 0.0) as body:
             for _ in range(steps):
                 assert body.advance(step * period) == DONE
-            # a time of 10^7 periods is itself a double: its rounding moves the phase by 1e-9
+            # rounding of a time of 10^7 periods moves the phase by 1e-9
             drift = 0.7 * body.time * 2.3e-16
             assert np.abs(body.displacement - orbit).max() <= LONG_PHASE + drift
             assert len(body.impacts) == 0
@@ -144,7 +144,7 @@ def against_reference(
 
 @pytest.mark.parametrize("kind", ["classical", "coupled"])
 def test_a_chain_that_chatters_sticks_and_is_hit_elsewhere_follows_dop853(kind: str) -> None:
-    # mass 3 comes to rest on its stop while mass 1 goes on hitting another: incomplete and complete chatter
+    # mass 3 comes to rest on its stop while mass 1 keeps hitting another: incomplete and complete chatter
     dampings = [0.1, 0.1, 0.1] if kind == "classical" else [0.3, 0.0, 0.05]
     body_modes = chain([1.0, 1.0, 1.0], [1.0, 1.0, 1.0], dampings)
     forcing = Forcing(body_modes.shapes.T @ np.array([0.6, 0.0, 0.9]), 0.25)

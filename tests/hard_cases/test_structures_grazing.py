@@ -1,7 +1,7 @@
 """Bodies of many modes that only just reach a stop, or ripple over it: no contact is lost, none is invented.
 
-The references are closed forms: undamped modes of odd frequencies 1, 3, 5, .. released from rest all reach their far
-side at the time pi, and a sum of cosines between impacts can be searched on any grid, however fine.
+The references are closed forms. Undamped modes of odd frequencies 1, 3, 5, .. released from rest all reach their far
+side at the time pi. A sum of cosines between impacts can be searched on any grid, however fine.
 """
 
 import math
@@ -25,7 +25,7 @@ def test_a_peak_over_the_stop_by_ever_less_is_an_impact_with_the_root_of_its_exc
     with Structure(Modes(natural), [Stop(shape, 1.0 - excess, restitution=0.6)], start) as body:
         assert body.advance(1.5 * math.pi, most_impacts=2) == DONE
         first = body.impacts[0]
-    # x = 1 - A u^2 / 2 + B u^4 / 24 about the peak: V^2 = 2 A excess (1 - B excess / (3 A^2) ..)
+    # x = 1 - A u^2 / 2 + B u^4 / 24 at the peak: V^2 = 2 A excess (1 - B excess / (3 A^2) ..)
     weights = -shape * start
     a, b = weights @ natural**2, weights @ natural**4
     noise = 4e-16 / excess  # the position of the stop is a double
@@ -83,7 +83,7 @@ def undamped_impacts(
 
 @pytest.mark.parametrize(("ripple", "fast"), [(1e-2, 211.0), (1e-3, 211.0), (1e-4, 2111.0), (1e-5, 2111.0)])
 def test_the_ripples_of_a_fast_mode_over_the_stop_are_found_one_by_one(ripple: float, fast: float) -> None:
-    # a slow heavy mode carries a light fast one to the stop: a sampler with 100 points per slow period sees none of it
+    # a slow heavy mode carries a light fast one to the stop: 100 samples per slow period show none of its ripples
     natural, shape = np.array([1.0, fast]), np.array([0.02, 1.0])
     q, position = np.array([-50.0, ripple]), 1.0 + 0.2 * ripple
     expected = undamped_impacts(natural, shape, position, 0.5, q, 4.0)
@@ -92,5 +92,5 @@ def test_the_ripples_of_a_fast_mode_over_the_stop_are_found_one_by_one(ripple: f
         found = body.impacts[:, [1, 3]]
     assert len(found) == len(expected) > 1
     assert np.diff(found[:, 0]).max() < 2.0 * math.pi / 100.0
-    # an error of rounding grows by the ratio of velocities at each impact: they are low here
+    # an error of rounding grows by the ratio of velocities at each impact: these are low here
     assert np.abs(found - np.array(expected)).max() <= 1e-11

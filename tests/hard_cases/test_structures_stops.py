@@ -15,7 +15,7 @@ MASS = CHAIN.shapes
 
 
 def at(displacements: list[float]) -> np.ndarray:
-    """Return the modal coordinates of physical ones of the chain."""
+    """Return the modal coordinates of physical displacements of the chain."""
     return np.linalg.solve(MASS, displacements)
 
 
@@ -37,7 +37,7 @@ def test_between_two_elastic_stops_a_free_mass_bounces_at_its_speed(gap: float) 
 def test_two_stops_without_room_between_them_hold_a_mass_as_a_clamp(
     position: float, restitution: float
 ) -> None:
-    # reference: the chain whose mass 2 does not move is a mass 1 and a mass 3 on their own
+    # reference: with mass 2 at rest the chain is two separate oscillators, mass 1 and mass 3
     stops = [
         Stop(MASS[1], position, restitution=restitution),
         Stop(MASS[1], position, side="lower", restitution=restitution),
@@ -79,7 +79,7 @@ def test_a_clamped_mass_answers_a_load_that_turns_round_slowly(above: int, below
             assert signs @ body.forces == pytest.approx(3.0 * math.cos(2.5 * body.time - 2.0), abs=1e-12)
             assert np.all(body.forces >= 0.0)
             assert abs(body.displacement[0]) <= 1e-15
-        assert len(body.sticks) >= 15  # as often as the load has turned round
+        assert len(body.sticks) >= 15  # one for each reversal of the load
 
 
 @pytest.mark.parametrize("law", ["hertz", "kelvin_voigt"])
@@ -112,7 +112,7 @@ def test_two_masses_that_hit_at_the_same_instant_leave_in_either_order_of_listin
             assert first[:, 3] == pytest.approx(first[0, 3], rel=1e-14)
             ends.append(twins.shapes @ body.displacement)
     assert np.abs(ends[0] - ends[1]).max() <= 1e-11
-    assert abs(ends[0][0] - ends[0][2]) <= 1e-11  # the mirror image of itself
+    assert abs(ends[0][0] - ends[0][2]) <= 1e-11  # its own mirror image
 
 
 @pytest.mark.parametrize("copies", [2, 3, 8])
@@ -182,7 +182,7 @@ def test_a_start_moving_into_the_stop_is_an_impact_at_time_0() -> None:
 def test_a_start_beyond_a_rigid_stop_is_refused_and_a_stop_below_rest_is_met_at_once() -> None:
     with pytest.raises(UsageError):
         Structure(Modes([1.0]), [Stop([1.0], -0.1)], 0.0, 0.0)
-    # stop distance negative: from rest at -0.5 a plastic stop at -0.2 holds; its force is that of the spring
+    # a negative stop position: from rest at -0.5 a plastic stop at -0.2 holds; its force is that of the spring
     with Structure(Modes([1.0]), [Stop([1.0], -0.2, restitution=0.0)], -0.5, 0.0) as body:
         body.advance(10.0)
         assert body.statuses == ("held",)
@@ -238,7 +238,7 @@ def test_a_beam_with_four_stops_and_uneven_damping_loses_what_its_balance_says()
 
 
 def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
-    # both forces fall through 0 where the cosine does; rounding tells the instants apart
+    # both forces fall through 0 with the cosine; rounding separates the instants
     stops = [Stop([1.0, 0.0], 0.1, restitution=0.0), Stop([0.0, 1.0], 0.4, restitution=0.0)]
     coupling = [[0.5, 0.0], [0.0, 0.0]]
     with Structure(Modes([0.0, 0.0], 0.0, [3.0, 1.0], 0.3, coupling=coupling), stops) as body:
@@ -250,7 +250,7 @@ def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
 @pytest.mark.parametrize("before", [0.0, 1e-1, 1e-5, 1e-6, 3e-7, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15])
 @pytest.mark.parametrize("law", ["restitution", "kelvin_voigt"])
 def test_stops_at_one_place_let_a_body_go_as_one_in_any_steps(before: float, law: str) -> None:
-    # shares of the force that are known to a millionth only say when the first of them lets go
+    # the first release depends on shares of the force, which are known only to a millionth
     yields = Stop([1.0], 0.0, law=law, stiffness=1e9)
     ends = []
     for stops in ([Stop([1.4], 0.0)], [Stop([1.4], 0.0), Stop([0.72], 0.0, restitution=0.9), yields]):
@@ -264,7 +264,7 @@ def test_stops_at_one_place_let_a_body_go_as_one_in_any_steps(before: float, law
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_of_two_stops_at_one_place_the_livelier_one_throws_the_body_off(order: int) -> None:
-    # the dead one has no impulse left to give, and does not hold a body that leaves it
+    # the plastic stop has no impulse left to give, and does not hold a body that leaves it
     stops = [Stop([1.0], 0.0, restitution=r) for r in (0.0, 0.3)[::order]]
     with Structure(Modes(1.0), stops, 0.0, 1.0) as body:
         assert body.advance(0.5) == DONE
@@ -273,7 +273,7 @@ def test_of_two_stops_at_one_place_the_livelier_one_throws_the_body_off(order: i
 
 
 def test_a_body_that_stops_hold_in_place_is_not_worked_on() -> None:
-    # two rigid stops whose shapes are nearly parallel: what they solve for is rounded forty times as coarsely
+    # two rigid stops with nearly parallel shapes: rounding of their forces is forty times as large
     near = np.array([[0.12774186, 0.60210998], [0.27296587, 1.05226582]])
     stops = [Stop(near[0], 0.0, side="lower", restitution=0.0), Stop(near[1], 0.0, restitution=0.5)]
     modes = Modes([1.0, 6.26689303], 0.02, [2.60725225, -0.97574072], 0.3)

@@ -1,4 +1,4 @@
-"""Shares of the tests: groups stay together where that costs no time, the dearest begin first."""
+"""Shares of the tests: groups stay together where that costs no time, and the most expensive ones start first."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from collections.abc import Collection, Mapping, Sequence
 class Shares:
     """Hands out numbers of tests to workers.
 
-    A worker follows one group to its end, so that what its tests share is made once, and then takes the dearest group
-    that nobody has begun. Where none is left it takes the second half of what the busiest worker still has.
+    A worker follows one group to its end, so that shared fixtures are made once. Then it takes the most expensive
+    group that no worker has started. Without such a group it takes the second half of the busiest worker's tests.
 
     Parameters
     ----------
     groups : sequence of str
         The group of each test, such as its module, in the order of collection.
     seconds : mapping of str to float
-        Wall time of a group, s, as far as it is known; others count as nothing.
+        Wall time of a group, s; a group without a known time counts as 0.
     workers : int
     whole : collection of str
-        Groups that one worker runs alone.
+        Groups that are not shared among workers.
     """
 
     def __init__(
@@ -38,14 +38,14 @@ class Shares:
         }
         self._groups, self._whole = groups, whole
         self._waiting = deque(sorted(numbers.values(), key=self._left, reverse=True))
-        self._begun: list[deque[int]] = [deque() for _ in range(workers)]
+        self._started: list[deque[int]] = [deque() for _ in range(workers)]
 
     def _left(self, group: deque[int]) -> float:
         return sum(self._each[number] for number in group)
 
     def next(self, worker: int) -> int | None:
-        """Return the test that a worker runs next; None if nothing is left for it."""
-        own = self._begun[worker]
+        """Return the next test of a worker; None if no test is left for it."""
+        own = self._started[worker]
         if not own and self._waiting:
             own.extend(self._waiting.popleft())
         if not own:
@@ -53,11 +53,11 @@ class Shares:
         return own.popleft() if own else None
 
     def _take_over(self, own: deque[int]) -> None:
-        shared = [group for group in self._begun if group and self._groups[group[0]] not in self._whole]
+        shared = [group for group in self._started if group and self._groups[group[0]] not in self._whole]
         busiest = max(shared, key=lambda group: (self._left(group), len(group)), default=own)
         for _ in range((len(busiest) + 1) // 2):
             own.appendleft(busiest.pop())
 
     def give_back(self, worker: int, number: int) -> None:
-        """Take back a test that a worker has not begun."""
-        self._begun[worker].appendleft(number)
+        """Take back a test that a worker has not started."""
+        self._started[worker].appendleft(number)

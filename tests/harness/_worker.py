@@ -1,4 +1,4 @@
-"""A forked copy of the process that has collected: it runs the tests that it is given and tells what came of them."""
+"""A forked copy of the collecting process: it runs the tests that it is given and reports their outcomes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ import pytest
 from _pytest._io import TerminalWriter
 
 
-class _Told:
-    """The plugin that passes on what the terminal would show."""
+class _Reporter:
+    """The plugin that passes on the terminal's events."""
 
     def __init__(self, config: pytest.Config, link: Connection) -> None:
         self._config, self._link = config, link
         self.listens = False
-        """Whether it has been told of the warnings before the fork, as every new plugin is."""
+        """Whether warnings are passed on; pytest replays earlier ones to every new plugin, before this is set."""
 
     def pytest_runtest_logstart(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
         self._link.send(("start", {"nodeid": nodeid, "location": location}))
@@ -43,24 +43,24 @@ class _Told:
     ) -> None:
         if not self.listens:
             return
-        # its class may be one that cannot be sent
-        told = f"{warning_message.category.__name__}: {warning_message.message}"
+        # the warning's own class may not be serializable
+        text = f"{warning_message.category.__name__}: {warning_message.message}"
         plain = warnings.WarningMessage(
-            Warning(told), Warning, warning_message.filename, warning_message.lineno
+            Warning(text), Warning, warning_message.filename, warning_message.lineno
         )
         given = {"warning_message": plain, "when": when, "nodeid": nodeid, "location": location}
         self._link.send(("warning", given))
 
 
 class _NoTerminal:
-    """What pytest asks how to colour its explanations, where nothing is shown."""
+    """Replaces the terminal reporter, which pytest asks for the colours of its explanations."""
 
     def __init__(self) -> None:
         self._tw = TerminalWriter(io.StringIO())
 
 
 def run_share(session: pytest.Session, link: Connection, folder: Path) -> NoReturn:
-    """Run tests until no number of one comes; then end this process, and nothing that its parent has begun."""
+    """Run tests until no more numbers come; then end this process without the parent's exit handlers."""
     code = 1
     try:
         _become_a_worker(session.config, link, folder)
@@ -74,7 +74,7 @@ def run_share(session: pytest.Session, link: Connection, folder: Path) -> NoRetu
         link.send(("end", merged))
         code = 0
     except (KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
-        code = 130  # the process that collected has heard it too, or has ended
+        code = 130  # the collecting process has received the signal too, or has ended
     except BaseException:
         traceback.print_exc(file=sys.__stderr__)
     finally:
@@ -87,11 +87,11 @@ def _become_a_worker(config: pytest.Config, link: Connection, folder: Path) -> N
     plugins: Any = config.pluginmanager
     plugins.unregister(name="terminalreporter")
     plugins.register(_NoTerminal(), "terminalreporter")
-    told = _Told(config, link)
-    plugins.register(told)
-    told.listens = True
+    reporter = _Reporter(config, link)
+    plugins.register(reporter)
+    reporter.listens = True
     capture = plugins.getplugin("capturemanager")
-    # the files into which output is captured are those of all copies
+    # all copies share the files of captured output
     capture.stop_global_capturing()
     capture.start_global_capturing()
     capture.suspend_global_capture()

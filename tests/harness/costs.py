@@ -1,7 +1,7 @@
-"""`--budget`: the processor time of all tests, against a kept figure; the dearest tests are listed.
+"""`--budget`: the processor time of all tests against a stored figure, and a list of the most expensive tests.
 
-Processor time of a machine that does other things too varies with it. So it is counted in yardsticks: a fixed piece of
-Python and C, which each worker runs now and then.
+The processor time of a busy machine varies. So it is counted in yardsticks: a fixed piece of Python and C that each
+worker runs now and then.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ import pytest
 from harness import kept_costs, warm
 
 KEPT = Path(__file__).with_name("budget.toml")
-DEAREST = 20
+LISTED = 20
 MAY_GROW = 0.1
-"""Share of the kept figure by which processor time may grow."""
-SHARED = "what tests share: services, clusters, folders"
-"""Named as a test among the dearest: the end of fixtures that a worker's last test did not make."""
+"""Share of the stored figure by which processor time may grow."""
+SHARED = "shared fixtures: services, clusters, folders"
+"""Entry among the most expensive tests for the end of fixtures that outlive a worker's last test."""
 EVERY = 20.0
 """Wall time between two yardsticks of a worker, s."""
 
 
 def processor_time() -> float:
-    """Return the processor time of this process and of its children that have ended, s."""
+    """Return the processor time of this process and of its ended children, s."""
     import resource  # not on Windows
 
     each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -52,7 +52,7 @@ def yardstick() -> float:
 
 
 class Costs:
-    """Costs of the tests of this process, and of its copies when they have ended."""
+    """Costs of the tests of this process, and of its copies once they have ended."""
 
     def __init__(self) -> None:
         self.tests: dict[str, float] = {}
@@ -63,7 +63,7 @@ class Costs:
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
-        """Measure the processor time of a test, its fixtures and the processes that it started and that have ended."""
+        """Measure the processor time of a test, its fixtures and its ended processes."""
         before, self._ends = _seconds_used(), 0.0
         try:
             return (yield)
@@ -75,7 +75,7 @@ class Costs:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_teardown(self, nextitem: pytest.Item | None) -> Any:
-        """Measure what ends with the last test of this worker, but is not of that test alone."""
+        """Measure the fixtures that end with the last test of this worker, but do not belong to that test alone."""
         before = _seconds_used()
         try:
             return (yield)
@@ -102,9 +102,9 @@ TOTAL = pytest.StashKey[tuple[float, float]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = "end in an error where the processor time of all tests is above the kept figure; list the dearest"
+    text = "fail if the processor time of all tests exceeds the stored figure; list the most expensive tests"
     parser.addoption("--budget", action="store_true", help=text)
-    text = f"write {kept_costs.FILE.name}: the order of modules, and what --fast leaves out"
+    text = f"write {kept_costs.FILE.name}: the order of modules, and the tests that --fast leaves out"
     parser.addoption("--keep-costs", action="store_true", help=text)
 
 
@@ -119,7 +119,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     config = session.config
     if COSTS not in config.stash:
         return
-    # now its children have been waited for, too
+    # afterwards this process has waited for all of its children
     warm.end_server()
     costs, seconds = config.stash[COSTS], processor_time()
     costs.yardsticks.append(yardstick())
@@ -132,7 +132,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def kept_yardsticks() -> float:
-    """Return the processor time that is kept for all tests, in yardsticks."""
+    """Return the stored processor time of all tests, in yardsticks."""
     return float(tomllib.loads(KEPT.read_text(encoding="utf-8"))["yardsticks"])
 
 
@@ -141,13 +141,13 @@ def _excess(config: pytest.Config) -> float:
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Write the dearest tests and the sum."""
+    """Write the most expensive tests and the sum."""
     if TOTAL not in config.stash:
         return
     costs, (seconds, yardsticks) = config.stash[COSTS], config.stash[TOTAL]
-    terminalreporter.section(f"processor time: the {DEAREST} dearest tests")
+    terminalreporter.section(f"processor time: the {LISTED} dearest tests")
     for name, took in sorted((costs.tests | {SHARED: costs.shared}).items(), key=lambda item: -item[1])[
-        :DEAREST
+        :LISTED
     ]:
         terminalreporter.line(f"{took:7.1f} s  {name}")
     each = statistics.mean(costs.yardsticks)

@@ -1,7 +1,7 @@
 """`--side-by-side N`: the tests are collected once, and N forked copies of this process run them.
 
-Each copy has what collection has imported, and shares its memory. A copy that dies fails the test that it ran, and
-another one goes on. Where a process cannot be forked, the tests run one after the other.
+Each copy has all imports of the collection, and shares its memory. A copy that dies fails its current test, and another
+copy continues. If a process cannot be forked, the tests run one after the other.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from harness._worker import run_share
 from vibroimpact.fmus.processes.python_child import ending
 
 FORKS = sys.platform == "linux"
-"""Elsewhere libraries of the system do not survive a fork, or there is none."""
+"""Whether this system can fork safely: elsewhere system libraries do not survive a fork, or there is none."""
 
 
 class Hooks:
-    """What a worker and the process that collected tell each other of their plugins."""
+    """Hooks by which a worker and the collecting process exchange data of their plugins."""
 
     @pytest.hookspec
     def pytest_handed_over(self, config: pytest.Config) -> dict[str, Any]:
-        """Return what a worker's plugin knows when its last test has ended."""
+        """Return the data of a worker's plugin after its last test."""
         raise NotImplementedError
 
     @pytest.hookspec
     def pytest_taken_over(self, config: pytest.Config, given: dict[str, Any]) -> None:
-        """Take what the plugins of a worker have handed over, all in one."""
+        """Take the data of all plugins of a worker, in one dictionary."""
 
 
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
@@ -44,30 +44,30 @@ def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    text = "run the tests in so many forked copies of this process, where it can be forked"
+    text = "number of forked copies of this process that run the tests, if it can be forked"
     parser.addoption("--side-by-side", type=int, default=0, metavar="N", help=text)
-    text = "beside --side-by-side: begin the modules in an order that is drawn, by this seed"
+    text = "with --side-by-side: start the modules in a random order, drawn with this seed"
     parser.addoption("--drawn-order", type=int, metavar="SEED", help=text)
-    text = "beside --side-by-side: start every program anew, and none as a copy of a warm process"
+    text = "with --side-by-side: start every program cold, and none as a copy of a warm process"
     parser.addoption("--cold", action="store_true", help=text)
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    if _is_wanted(session.config):
-        # nothing of it is garbage, and this process does little else
+    if _is_active(session.config):
+        # its objects are no garbage, and this process does little else
         gc.disable()
         if not session.config.option.cold:
             warm.start_server()
 
 
-def _is_wanted(config: pytest.Config) -> bool:
+def _is_active(config: pytest.Config) -> bool:
     option = config.option
     return FORKS and option.side_by_side > 0 and not (option.collectonly or option.usepdb)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    if not _is_wanted(session.config) or not session.items or session.testsfailed:
+    if not _is_active(session.config) or not session.items or session.testsfailed:
         return None
     warm.refuse_threads()
     warm.wait_for_server()
@@ -85,13 +85,13 @@ def _module(item: pytest.Item) -> str:
 
 
 def _group(item: pytest.Item) -> str:
-    """Return what one worker runs as a whole where it can: a module, or all that is marked `together`."""
+    """Return the group that one worker runs as a whole if possible: a module, or the tests marked `together`."""
     mark = item.get_closest_marker("together")
     return _module(item) if mark is None else str(mark.args[0])
 
 
 def _seconds(config: pytest.Config, groups: Mapping[str, Collection[str]]) -> dict[str, float]:
-    """Return how long each group of modules takes; with `--drawn-order` numbers by chance."""
+    """Return the time of each group of modules, s; with `--drawn-order` random numbers."""
     if config.option.drawn_order is None:
         kept = kept_costs.seconds_of_modules()
         return {name: sum(kept.get(module, 0.0) for module in modules) for name, modules in groups.items()}
@@ -100,7 +100,7 @@ def _seconds(config: pytest.Config, groups: Mapping[str, Collection[str]]) -> di
 
 
 class _Workers:
-    """The forked processes of a session, and what each of them is doing."""
+    """The forked processes of a session, and the current task of each."""
 
     def __init__(self, session: pytest.Session) -> None:
         count = min(session.config.option.side_by_side, len(session.items))
@@ -115,7 +115,7 @@ class _Workers:
         self._pids = [0] * count
         self._running: list[int | None] = [None] * count
         self._following: list[int | None] = [None] * count
-        # the workers' own temporary folders lie in it
+        # it contains the workers' own temporary folders
         self._folder: Path = session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
 
     def __enter__(self) -> _Workers:
@@ -144,7 +144,7 @@ class _Workers:
         here.send(self._following[worker])
 
     def run(self) -> None:
-        """Hand out the tests and pass on what comes back, until all have run or the session is to end."""
+        """Hand out the tests and pass on the reports, until all tests have run or the session has to end."""
         while living := {link: worker for worker, link in enumerate(self._links) if link is not None}:
             for link in wait(list(living)):
                 assert isinstance(link, Connection)
@@ -185,7 +185,7 @@ class _Workers:
         self._running[worker] = None
 
     def _ended(self, worker: int) -> None:
-        """Wait for a worker whose link is closed; where a test ended it, fail the test and start another worker."""
+        """Wait for a worker whose link is closed; if a test ended it, fail the test and start another worker."""
         link, number = self._links[worker], self._running[worker]
         assert link is not None
         link.close()
@@ -199,8 +199,8 @@ class _Workers:
             self._shares.give_back(worker, following)
             self._start(worker)
 
-    def _fail(self, item: pytest.Item, told: str) -> None:
-        words = f"{item.nodeid}: the worker that ran it {told}."
+    def _fail(self, item: pytest.Item, end: str) -> None:
+        words = f"{item.nodeid}: the worker that ran it {end}."
         hook = self._session.config.hook
         where = {"nodeid": item.nodeid, "location": item.location}
         report = pytest.TestReport(

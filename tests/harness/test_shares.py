@@ -1,4 +1,4 @@
-"""Whichever worker asks when: each test is handed out once."""
+"""Each test is handed out once, for any order of the workers' requests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Workers that are forked run what one process runs; none of them takes a test with it."""
+"""Forked workers run the same tests as one process; none of them loses a test when it dies."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_a_worker_that_dies_fails_its_test_and_all_others_are_run(suite: Path) -
 def test_the_first_failure_ends_the_session_where_that_is_asked(suite: Path) -> None:
     done = run(suite, "--side-by-side", "2", "-x")
     assert "1 failed" in counts(done) or "2 failed" in counts(done)
-    # the other worker's test may have failed meanwhile
+    # the other worker's test may have failed in the meantime
     assert re.search(r"stopping after [12] failures", done.stdout)
 
 

@@ -1,4 +1,4 @@
-"""A copy of the warm process is, to whoever started it, a Python that was started anew."""
+"""A copy of the warm process behaves like a newly started Python for the process that started it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_the_end_of_one_that_ends_at_once_is_not_lost(monkeypatch: pytest.Monkey
     line = warm.Copy._line
 
     def late(copy: warm.Copy) -> bytes:
-        # process number and end are both there when the first is read
+        # both process number and end have arrived before the first is read
         time.sleep(0.1)
         return line(copy)
 

@@ -1,6 +1,6 @@
-"""Python programs that tests start: copies of a warm process where there is one, which saves the imports.
+"""Python programs started by tests: copies of a warm process if there is one, which saves the imports.
 
-A test of what is imported, of memory, of variables that are read at imports or of the start itself starts cold.
+A test of imports, of memory, of variables that are read at import, or of the start itself starts cold.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TESTS = Path(__file__).resolve().parents[1]
 DEVNULL = subprocess.DEVNULL
 ENDED = "the warm process for commands has ended"
 WITHOUT_THREADS = {"OPENBLAS_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "background_thread:false"}
-"""Variables that keep numpy and pyarrow from starting threads, which a fork loses, when they are imported."""
+"""Variables that keep numpy and pyarrow from starting threads at import; a fork would lose the threads."""
 
 _server: tuple[subprocess.Popen[str], tempfile.TemporaryDirectory[str]] | None = None
 _ready = False
@@ -36,15 +36,15 @@ _lock = threading.Lock()
 
 
 def refuse_threads() -> None:
-    """Raise AssertionError where this process has a thread beside this one, of Python or of a library."""
+    """Raise AssertionError if this process has a second thread, of Python or of a library."""
     threads = [Path(f"/proc/self/task/{number}/comm").read_text() for number in os.listdir("/proc/self/task")]
     assert len(threads) == 1, f"expected one thread before a fork, got {threads}"
 
 
 def start_server() -> None:
-    """Start the warm process, which imports while the caller goes on; copies of the caller use it too."""
+    """Start the warm process, which imports while the caller continues; copies of the caller use it too."""
     global _server
-    # the name of a socket is short
+    # a socket's path has to be short
     folder = tempfile.TemporaryDirectory(prefix="warm-", dir="/tmp")
     path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
@@ -79,7 +79,7 @@ def end_server() -> None:
 
 
 def seconds_used() -> float:
-    """Return the processor time of all copies that this process has started and that have ended, s."""
+    """Return the processor time of all ended copies that this process has started, s."""
     return _seconds
 
 
@@ -94,7 +94,7 @@ def start(
     start_new_session: bool = False,
     cold: bool = False,
 ) -> Program:
-    """Start `python -u -c PROGRAM ARGUMENTS...`; what comes back is used as `subprocess.Popen` is, in text.
+    """Start `python -u -c PROGRAM ARGUMENTS...`; return an object like `subprocess.Popen` in text mode.
 
     Parameters
     ----------
@@ -103,13 +103,13 @@ def start(
     arguments : str or Path
     cwd : Path, optional
     env : mapping, optional
-        The whole environment; that of this process by default.
+        The whole environment; by default that of this process.
     stdin, stdout, stderr : int or file
-        As `subprocess.Popen` takes them.
+        As for `subprocess.Popen`.
     start_new_session : bool
-        Else it has a process group of its own alone.
+        False: the program has only a process group of its own.
     cold : bool
-        Start Python anew.
+        Start a new Python.
     """
     words = [*map(str, arguments)]
     if _server is not None and not cold:
@@ -130,7 +130,7 @@ def start(
 def run(
     program: str, *arguments: str | Path, timeout: float = 120.0, **options: Any
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end; return its exit code and what it wrote."""
+    """Run a program to its end; return its exit code and its output."""
     with start(program, *arguments, **options) as process:
         try:
             out, err = process.communicate(timeout=timeout)
@@ -142,14 +142,14 @@ def run(
 
 
 class Copy:
-    """A copy of the warm process that runs a program: the part of `subprocess.Popen` that tests use.
+    """A copy of the warm process that runs a program, with the part of `subprocess.Popen` that tests use.
 
     Attributes
     ----------
     pid : int
     returncode : int or None
     stdin, stdout, stderr : file or None
-        This end of a pipe.
+        Own end of a pipe.
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class Copy:
         self.returncode: int | None = None
         self._waiting = threading.Lock()
         self.args = arguments
-        asked = {
+        request = {
             "program": program,
             "arguments": arguments,
             "folder": os.fspath(cwd or Path.cwd()),
@@ -177,15 +177,15 @@ class Copy:
             (self.stdin, given), (self.stdout, out), (self.stderr, err) = ends
             self._connection = socket.socket(socket.AF_UNIX)
             self._connection.connect(str(Path(_server[1].name, "socket")))
-            data = json.dumps(asked).encode() + b"\n"
+            data = json.dumps(request).encode() + b"\n"
             sent = socket.send_fds(self._connection, [data], [given, out, err])
-            # a copy may have ended by now: to send nothing would be an error
+            # a copy may have ended by now: sending nothing to it is an error
             if sent < len(data):
                 self._connection.sendall(data[sent:])
             self.pid = int(self._line())
 
     def _line(self) -> bytes:
-        """Return the next line of the warm process, and take nothing behind it: `wait` looks whether there is more."""
+        """Return the next line of the warm process, without reading beyond it: `wait` checks for more."""
         line = b""
         while not line.endswith(b"\n"):
             byte = self._connection.recv(1)
@@ -194,13 +194,13 @@ class Copy:
         return line
 
     def poll(self) -> int | None:
-        """Return how it has ended; None while it runs."""
+        """Return the exit code; None while the program runs."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.wait(0.0)
         return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait for its end; return the exit code, or that of the signal with a minus."""
+        """Wait for the end; return the exit code, or the negative number of the signal."""
         global _seconds
         with self._waiting:
             if self.returncode is None:
@@ -211,21 +211,21 @@ class Copy:
                     raise subprocess.TimeoutExpired(self.args, timeout or 0.0) from None
                 assert ready, ENDED
                 self._connection.settimeout(None)
-                told = json.loads(self._line())
+                answer = json.loads(self._line())
                 self._connection.close()
-                self.returncode = int(told["code"])
+                self.returncode = int(answer["code"])
                 with _lock:
-                    _seconds += told["seconds"]
+                    _seconds += answer["seconds"]
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        """Return all that it writes, when it has ended."""
+        """Return the whole output and error output, after the end."""
         deadline = None if timeout is None else time.monotonic() + timeout
         streams = [stream for stream in (self.stdout, self.stderr) if stream and not stream.closed]
-        told: dict[IO[str] | None, str] = {None: "", **dict.fromkeys(streams, "")}
+        outputs: dict[IO[str] | None, str] = {None: "", **dict.fromkeys(streams, "")}
 
         def read(stream: IO[str]) -> None:
-            told[stream] = stream.read()
+            outputs[stream] = stream.read()
 
         readers = [threading.Thread(target=read, args=[stream], daemon=True) for stream in streams]
         for reader in readers:
@@ -237,20 +237,20 @@ class Copy:
         self.wait(None if deadline is None else max(0.001, deadline - time.monotonic()))
         for stream in streams:
             stream.close()
-        return told.get(self.stdout, ""), told.get(self.stderr, "")
+        return outputs.get(self.stdout, ""), outputs.get(self.stderr, "")
 
     def send_signal(self, number: int) -> None:
-        """Send a signal, unless it has ended, be it after it was asked."""
+        """Send a signal, unless the program has ended, even if its end was not noticed before."""
         if self.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, number)
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the program."""
         self.send_signal(signal.SIGKILL)
 
     def terminate(self) -> None:
-        """Ask it to end."""
+        """Send SIGTERM to the program."""
         self.send_signal(signal.SIGTERM)
 
     def __enter__(self) -> Copy:
@@ -266,21 +266,21 @@ class Copy:
 
 
 def _ends(
-    number: int, asked: int | IO[Any] | None, stack: contextlib.ExitStack
+    number: int, stream: int | IO[Any] | None, stack: contextlib.ExitStack
 ) -> tuple[IO[str] | None, int]:
-    """Return this end of a standard stream, if it is a pipe, and the file descriptor of the other end."""
+    """Return the own end of a standard stream, if it is a pipe, and the file descriptor of the other end."""
     mode = "r" if number else "w"
-    if asked == subprocess.PIPE:
+    if stream == subprocess.PIPE:
         pipe = os.pipe()
         mine, theirs = pipe if number else reversed(pipe)
         stack.callback(os.close, theirs)
         return open(mine, mode), theirs
-    if asked == subprocess.DEVNULL:
+    if stream == subprocess.DEVNULL:
         return None, stack.enter_context(open(os.devnull, "r+")).fileno()
-    if asked is None:
+    if stream is None:
         return None, number
-    return None, asked if isinstance(asked, int) else asked.fileno()
+    return None, stream if isinstance(stream, int) else stream.fileno()
 
 
 Program: TypeAlias = subprocess.Popen[str] | Copy
-"""A program that runs, however it was started."""
+"""A running program, whatever its start."""

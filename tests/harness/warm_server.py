@@ -1,7 +1,7 @@
 """A process that has imported the package and forks: each copy runs a program as `python -u -c` would.
 
-It has no threads. A copy has the folder, environment, streams and process group that were asked for, and goes on at the
-end of this file as a Python that has just started.
+It has no threads. A copy takes over folder, environment, streams and process group from the request. Then it continues
+at the end of this file, like a Python that has just started.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ import dask.config
 from harness.warm import refuse_threads
 
 MOST_BYTES = 1 << 20
-"""Longest request."""
+"""Longest request, bytes."""
 
 
 def import_all() -> None:
-    """Import every module of the package, and what its commands import late."""
+    """Import every module of the package, and the late imports of its commands."""
     import importlib
     import pkgutil
 
@@ -47,7 +47,7 @@ def import_all() -> None:
 
 
 PROGRAMS = ("vibroimpact.fmus.python",)
-"""Modules that run in processes of their own alone."""
+"""Modules that only run in processes of their own."""
 LATE = (
     "matplotlib.backends.backend_agg",
     "matplotlib.pyplot",
@@ -75,7 +75,7 @@ class _Server:
         signal.set_wakeup_fd(write)
         signal.signal(signal.SIGCHLD, lambda *_: None)
         self._selector.register(read, selectors.EVENT_READ)
-        # whoever started this process holds the other end of its standard input
+        # the starter of this process holds the other end of its standard input
         self._selector.register(0, selectors.EVENT_READ)
 
     def serve(self) -> str:
@@ -93,7 +93,7 @@ class _Server:
             self._reap()
 
     def _end(self) -> NoReturn:
-        """End this process, and what copies were left by tests that were killed."""
+        """End this process and the copies left by killed tests."""
         for pid in self._connections:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)
@@ -107,18 +107,18 @@ class _Server:
             return None
         while not data.endswith(b"\n"):
             data += connection.recv(MOST_BYTES)
-        asked = json.loads(data)
+        request = json.loads(data)
         has_become, says_so = os.pipe()
         pid = os.fork()
         if not pid:
             self._leave(connection)
             os.close(has_become)
-            become(asked, streams)
+            become(request, streams)
             os.close(says_so)
-            return str(asked["program"])
+            return str(request["program"])
         for stream in (says_so, *streams):
             os.close(stream)
-        # before that it could not be killed by its process group
+        # only now can the copy be killed by its process group
         os.read(has_become, 1)
         os.close(has_become)
         connection.sendall(f"{pid}\n".encode())
@@ -141,19 +141,19 @@ class _Server:
                 return
             if pid in self._connections:
                 with self._connections.pop(pid) as connection:
-                    told = {
+                    answer = {
                         "code": os.waitstatus_to_exitcode(status),
                         "seconds": used.ru_utime + used.ru_stime,
                     }
                     try:
-                        connection.sendall(json.dumps(told).encode() + b"\n")
+                        connection.sendall(json.dumps(answer).encode() + b"\n")
                     except BrokenPipeError:
                         continue  # nobody waits for it any more
 
 
-def become(asked: dict[str, Any], streams: list[int]) -> None:
-    """Make this copy what a Python is that has just been started so."""
-    if asked["session"]:
+def become(request: dict[str, Any], streams: list[int]) -> None:
+    """Turn this copy into the requested Python, as if just started."""
+    if request["session"]:
         os.setsid()
     else:
         os.setpgid(0, 0)
@@ -161,16 +161,16 @@ def become(asked: dict[str, Any], streams: list[int]) -> None:
         os.dup2(stream, number)
         os.close(stream)
     os.environ.clear()
-    os.environ.update(asked["environment"])
-    os.chdir(asked["folder"])
+    os.environ.update(request["environment"])
+    os.chdir(request["folder"])
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.argv = ["-c", *asked["arguments"]]
+    sys.argv = ["-c", *request["arguments"]]
     more = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     sys.path[:0] = [folder for folder in more if folder not in sys.path]
     for stream in (sys.stdout, sys.stderr):
         assert isinstance(stream, io.TextIOWrapper)
         stream.reconfigure(write_through=True)
-    # what the environment of the warm process has decided
+    # decisions that depend on the environment are made anew
     tempfile.tempdir = None
     time.tzset()
     dask.config.refresh()
@@ -187,7 +187,7 @@ def main() -> NoReturn:
 
 
 def run(program: str) -> NoReturn:
-    """Run a program as `python -c` does, and end this process without what would clear its memory, object by object."""
+    """Run a program as `python -c` does, and end this process without freeing its memory object by object."""
     code = 1
     try:
         exec(compile(program, "<string>", "exec"), vars(sys.modules["__main__"]))

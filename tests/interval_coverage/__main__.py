@@ -1,4 +1,4 @@
-"""`make coverage`: 480 records, side by side; resumable; exit code 1 where a target is missed. SEED= RECORDS="""
+"""`make coverage`: 480 records, side by side; resumable; exit code 1 if a target is missed. SEED= RECORDS="""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rich.console import Console
 from soak._journal import state_of_the_code
 from support.places import ROOT
 
-from interval_coverage._asked import asked
-from interval_coverage._table import Line, again, shares, table_of, thin
+from interval_coverage._asked import journal_line
+from interval_coverage._table import Line, again, shares, table_of, thin_cells
 
 SEED, RECORDS = 7, 480
 DRAWS = 7
-"""Further draws of the noise of records whose cell of the table has few intervals."""
+"""Number of further noises for the records of a table cell with few intervals."""
 Place = tuple[int, int]
-"""Case, and draw of its noise."""
+"""Number of the case, and of the draw of its noise."""
 
 
 def main() -> int:
-    """Ask all that the journal does not hold, further noises where a cell has few intervals, and print the table."""
+    """Estimate all records outside of the journal, and further noises for cells with few intervals; print the table."""
     seed, count = int(os.environ.get("SEED") or SEED), int(os.environ.get("RECORDS") or RECORDS)
     console = Console(width=110)
     path = ROOT / "results" / "coverage" / f"seed-{seed}-{state_of_the_code()}.jsonl"
@@ -36,7 +36,7 @@ def main() -> int:
 
         def ask(places: Iterable[Place]) -> None:
             waiting = [place for place in places if place not in lines]
-            for line in pool.imap_unordered(partial(asked, seed=seed), waiting):
+            for line in pool.imap_unordered(partial(journal_line, seed=seed), waiting):
                 print(json.dumps(line), file=journal, flush=True)
                 lines[line["case"], line["draw"]] = line
                 if len(lines) % 10 == 0:
@@ -44,7 +44,7 @@ def main() -> int:
 
         ask((case, 0) for case in range(count))
         cases = sorted(
-            {case for found in thin(lines.values()).values() for case in found if count >= RECORDS}
+            {case for found in thin_cells(lines.values()).values() for case in found if count >= RECORDS}
         )
         ask((case, draw) for case in cases for draw in range(1, DRAWS + 1))
     first = [line for line in lines.values() if not line["draw"]]
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def read(path: Path) -> dict[Place, Line]:
-    """Return the whole lines of a journal by case and draw; one that was cut off is asked again."""
+    """Return the complete lines of a journal by case and draw; a truncated line is computed again."""
     if not path.exists():
         return {}
     text = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""One record asked: what each method says of it, and whether it is sure."""
+"""Estimates from one record: the answer of each method, and whether it is free of reasons for doubt."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ METHODS = ("energy_known_damping", "energy_joint", "energy_amplitude", "weak_for
 
 
 def estimates_of(one: Record, methods: Sequence[str] = METHODS) -> ImpactEstimates:
-    """Return the estimates from a record with what is known of it."""
+    """Return the estimates from a record, given its known parameters."""
     axis = TimeAxis(one.time, float(one.time[1] - one.time[0]))
     channel = Channel("tip", one.values, "m", axis, np.zeros(len(one.time), np.uint8))
     with_stop, with_damping = one.known != "frequency", one.known == "damping"
@@ -29,10 +29,10 @@ def estimates_of(one: Record, methods: Sequence[str] = METHODS) -> ImpactEstimat
     return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=methods)
 
 
-def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
+def journal_line(place: tuple[int, int], seed: int) -> dict[str, Any]:
     """Return the line of the journal for a case and a draw of its noise.
 
-    `sure` holds, for each method without a doubt, [value, standard error, low, high, truth] by quantity.
+    `sure` holds, for each method without reasons for doubt, [value, standard error, low, high, truth] by quantity.
     """
     case, draw = place
     one, begin = record(case, seed, draw), time.process_time()
@@ -74,6 +74,6 @@ def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
 
 
 def _near(name: str, one: Record, value: float) -> float:
-    """Return the truth; of a phase that which is nearest to the estimate."""
+    """Return the truth; for a phase, the equivalent nearest to the estimate."""
     truth = one.truth[name]
     return truth + 2.0 * np.pi * round((value - truth) / (2.0 * np.pi)) if name == "phase" else truth

@@ -1,4 +1,4 @@
-"""Motion against stops by piecewise exact flow, written for these records alone: nothing of the package is in it.
+"""Motion against stops by piecewise exact flow, written only for these records: independent of the package.
 
 Modes q_k with q_k'' + 2 z_k w_k q_k' + w_k^2 (q_k - s_k f) = p_k w_1^2 y_st cos(Omega t + psi), and y = sum p_k q_k.
 f is the side of dry friction (-sign of y', for one mode only). At a stop the velocity V of y becomes -r(V) V, by an
@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
-# Points of the search for an event, in a period of the fastest mode.
+# Points per period of the fastest mode in the search for an event.
 _POINTS = 80
-# Impacts slower than this part of natural frequency times deflection are chatter that has come to its end.
+# Impact speed over natural frequency times deflection, below which chatter has ended.
 _AT_REST = 1e-6
 
 
@@ -26,13 +26,13 @@ class Body:
     Attributes
     ----------
     natural, damping, shape : ndarray, shape (mode,)
-        rad/s, damping ratios (below 1), and the part of each mode in y.
+        Angular frequencies (rad/s), damping ratios (below 1), and the part of each mode in y.
     deflection, frequency, phase : float
         Static deflection of the first mode, angular frequency and phase of the force.
     stops : tuple of (float, float)
         Position and side (1 upper, -1 lower).
     restitution : callable
-        Of the speed of approach.
+        Function of the speed of approach.
     friction : float
         Dry friction over the stiffness; 0: none.
     """
@@ -97,7 +97,7 @@ class _Flow:
 
 
 def simulate(body: Body, state: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, list[Impact]]:
-    """Return y at ascending instants from the first of them on, and the impacts.
+    """Return y at ascending instants, starting from the first, and the impacts.
 
     Parameters
     ----------
@@ -162,10 +162,10 @@ def _next_event(flow: _Flow, now: float, end: float) -> tuple[float, tuple[float
 
 
 def _crossing(gap: Callable[[np.ndarray], np.ndarray], grid: np.ndarray, now: float) -> float | None:
-    """Return where a gap first becomes negative; a graze between two points of the grid is looked for too."""
+    """Return the first instant of a negative gap; a graze between two points of the grid is detected too."""
     value = gap(grid)
     if grid[0] == now:
-        # starts on the stop: what counts is when it comes back
+        # it starts on the stop: the result is the time of its return
         grid = np.concatenate([[now + 1e-6 * (grid[1] - now), now + 1e-3 * (grid[1] - now)], grid[1:]])
         value = gap(grid)
     low = (value[1:-1] < value[:-2]) & (value[1:-1] < value[2:])
@@ -187,12 +187,12 @@ def _crossing(gap: Callable[[np.ndarray], np.ndarray], grid: np.ndarray, now: fl
 
 
 def _zero(gap: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:
-    """Return where a gap becomes negative between two instants."""
+    """Return the instant between two others at which a gap becomes negative."""
 
     def one(time: float) -> float:
         return float(gap(np.array([time]))[0])
 
-    # alone, an instant may be rounded otherwise than in a grid
+    # an instant alone may be rounded otherwise than in a grid
     if one(low) <= 0.0:
         return low
     return high if one(high) >= 0.0 else float(brentq(one, low, high, xtol=1e-15, rtol=1e-14))
@@ -201,7 +201,7 @@ def _zero(gap: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> f
 def _release(
     body: Body, place: float, stop: tuple[float, float] | None, now: float, end: float
 ) -> tuple[float, float]:
-    """Return when a body of one mode leaves where it rests (stop or dry friction), and friction's side then."""
+    """Return the time at which a resting body of one mode leaves (stop or dry friction), and friction's side then."""
 
     def push(time: np.ndarray) -> np.ndarray:
         return body.deflection * np.cos(body.frequency * time + body.phase) - place

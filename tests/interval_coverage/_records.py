@@ -1,4 +1,4 @@
-"""The records: drawn over the spread that an experiment may have, three levels of what is known, a twelfth spoiled."""
+"""Records drawn over the range of possible experiments: three levels of knowledge, and a twelfth of them spoiled."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 from interval_coverage._motion import Body, Impact, simulate
 
 SPOILS = ("second mode", "second stop", "dry friction", "speed-dependent restitution")
-"""What one record in twelve has, and the model of the estimators has not."""
+"""Effects in one record of twelve, outside of the estimators' model."""
 SPOILED_EVERY = 12
 KNOWN = ("frequency", "stop", "damping")
-"""What is known, each level with those before it: the forcing frequency, the stop, damping and offset."""
+"""Levels of knowledge, each including those before it: the forcing frequency, the stop, damping and offset."""
 REGIONS = ("whole spread", "50 samples a period", "5 % noise", "forcing below .8 of resonance")
-"""Parts of the spread that are drawn equally often: three of them hard."""
+"""Parts of the range, drawn equally often: three of them hard."""
 PER_PERIOD = (50, 100, 200, 500, 1000, 2000)
 _NOISE, _RATIO = (1e-3, 5e-2), (0.7, 4.0)
 _HARD_NOISE, _HARD_RATIO = 5e-2, (0.5, 0.8)
 _FEWEST_IMPACTS = 9
 _SETTLED = 30.0
-# A second stop is there when it is hit so often, a restitution depends on the speed when it varies by so much.
+# Fewest impacts on a second stop, and least relative variation of a restitution with speed, that count as visible.
 _FEWEST_SHOWN = 4
 _LEAST_SCATTER = 0.02
 
@@ -35,11 +35,11 @@ class Record:
     ----------
     time, values : ndarray, shape (sample,)
     truth : dict
-        By the names of `vibroimpact.analysis.estimation.QUANTITIES`.
+        True values, by the names of `vibroimpact.analysis.estimation.QUANTITIES`.
     region, known, spoil : str
-        Of `REGIONS`, of `KNOWN`, and of `SPOILS` or empty.
+        One of `REGIONS`, one of `KNOWN`, and one of `SPOILS` or empty.
     noise : float
-        Part of the peak.
+        Noise as a part of the peak.
     per_period, impacts : int
     flight_samples : float
         Median number of samples between impacts.
@@ -58,7 +58,7 @@ class Record:
 
 
 def record(case: int, seed: int, draw: int = 0) -> Record:
-    """Return one record; the same for the same case and seed, and of one motion for all draws of its noise."""
+    """Return one record, fixed by case and seed; all draws of its noise share one motion."""
     rng = np.random.default_rng([seed, case])
     block, place = divmod(case, SPOILED_EVERY)
     spoil = SPOILS[block % len(SPOILS)] if place == SPOILED_EVERY - 1 else ""
@@ -75,7 +75,7 @@ def record(case: int, seed: int, draw: int = 0) -> Record:
 def _drawn(
     rng: np.random.Generator, region: str, known: str, spoil: str, noises: np.random.Generator
 ) -> Record | None:
-    """Return a record, None where the motion hardly hits the stop."""
+    """Return a record; None for a motion that hardly hits the stop."""
     natural, deflection = _log(rng, 10.0, 1000.0), _log(rng, 0.1, 10.0)
     ratio = _log(rng, *(_HARD_RATIO if region == REGIONS[3] else _RATIO))
     damping = _log(rng, 0.02, 0.15)
@@ -121,7 +121,7 @@ def _drawn(
 
 
 def _shows(spoil: str, body: Body, impacts: Sequence[Impact], begin: float) -> bool:
-    """Tell whether the motion shows what spoils it: a second stop that is not hit, or speeds all alike, do not."""
+    """Whether the spoiling effect is visible: a second stop may be missed, and speeds may be all alike."""
     seen = [impact for impact in impacts if impact.instant > begin]
     if spoil == "second stop":
         return sum(impact.side < 0.0 for impact in seen) >= _FEWEST_SHOWN
@@ -144,7 +144,7 @@ def _body(
     spoil: str,
     rng: np.random.Generator,
 ) -> Body:
-    """Return the body, with what spoils it: of a size that an experiment may have and its maker not know."""
+    """Return the body with its spoiling effect, of a size that an experimenter may overlook."""
     modes, ratios, shape = [natural], [damping], [1.0]
     stops, friction = [(position, 1.0)], 0.0
     power, typical = 0.0, natural * deflection

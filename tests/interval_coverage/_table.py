@@ -1,4 +1,4 @@
-"""What the lines of a journal say: shares of intervals that hold the truth, of answers, of spoiled records found."""
+"""Figures from the lines of a journal: shares of intervals with the truth, of answers, of detected spoiled records."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ HELD, HELD_IN_REGION = (0.92, 0.98), (0.93, 0.97)
 ANSWERED, ANSWERED_GOOD, FLAGGED = 0.70, 0.90, 0.90
 SOMETHING_SURE = 0.60
 GOOD_NOISE, GOOD_FLIGHT = 0.02, 12
-# A share misses its target when this chance, or less, would bring it so far off were the target just met.
+# Probability of a deviation this large from a target that is just met, below which a share misses its target.
 CHANCE = 0.01
 FEWEST = 60
-"""Intervals below which a cell of the table says little: chance alone moves its share more than the target is wide."""
+"""Intervals below which a cell of the table tells little: chance moves its share by more than the target's width."""
 
 Line = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Share:
-    """A share with the target that it is held to; its standard error where several intervals are of one record."""
+    """A share with its target; it has a standard error if several intervals come from one record."""
 
     what: str
     hits: int
@@ -38,7 +38,7 @@ class Share:
 
     @property
     def missed(self) -> bool:
-        """Tell whether chance does not explain how far the share is off its target."""
+        """Whether the deviation from the target is too large for chance."""
         if not self.total:
             return False
         if self.error is not None:
@@ -56,9 +56,9 @@ def shares(lines: Sequence[Line]) -> list[Share]:
     good = [line for line in clean if line["noise"] <= GOOD_NOISE and line["flight_samples"] >= GOOD_FLIGHT]
     found = [*_held(clean), *_by_region(clean)]
     for method in METHODS:
-        asked = _can_answer(method)
+        is_answerable = _can_answer(method)
         for words, some, target in (("clean", clean, ANSWERED), ("good", good, ANSWERED_GOOD)):
-            able = [line for line in some if asked(line)]
+            able = [line for line in some if is_answerable(line)]
             hits = sum(method in line["sure"] for line in able)
             found.append(Share(f"{method}: answers that are sure, {words} records", hits, len(able), target))
     flagged = sum(not line["sure"] for line in spoiled)
@@ -67,7 +67,7 @@ def shares(lines: Sequence[Line]) -> list[Share]:
 
 
 def _held(clean: Iterable[Line]) -> Iterable[Share]:
-    """Yield the shares of intervals that hold the truth, by method and quantity."""
+    """Yield the shares of intervals that contain the truth, by method and quantity."""
     counts: dict[tuple[str, str], list[bool]] = {}
     for line in clean:
         for method, values in line["sure"].items():
@@ -79,9 +79,9 @@ def _held(clean: Iterable[Line]) -> Iterable[Share]:
 
 
 def _by_region(clean: Sequence[Line]) -> Iterable[Share]:
-    """Yield the shares of intervals that hold the truth, by region, and how many records have a method that is sure.
+    """Yield the shares of intervals that contain the truth, by region, and of records with at least one sure method.
 
-    The intervals of one record miss together: the standard error is that of sums over records.
+    The intervals of one record miss together: the standard error uses sums over records.
     """
     for region in REGIONS:
         lines = [line for line in clean if line["region"] == region]
@@ -101,8 +101,8 @@ def _by_region(clean: Sequence[Line]) -> Iterable[Share]:
         yield Share(f"{region}: records of which something is sure", sure, len(lines), SOMETHING_SURE)
 
 
-def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
-    """Return the cells of few intervals, by method and quantity, with the cases that they come from."""
+def thin_cells(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
+    """Return the cells with few intervals, by method and quantity, with the cases of these intervals."""
     cases: dict[tuple[str, str], list[int]] = {}
     for line in lines:
         if line["spoil"] or line["draw"]:
@@ -114,20 +114,20 @@ def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
 
 
 def again(lines: Sequence[Line], draws: int) -> list[Share]:
-    """Return the shares of the thin cells with further draws of the noise of each of their records."""
+    """Return the shares of the thin cells with further noises for each of their records."""
     found = []
-    for (method, name), cases in thin(lines).items():
-        asked = [line["sure"].get(method, {}).get(name) for line in lines if line["case"] in cases]
-        held = [low <= truth <= high for _, _, low, high, truth in filter(None, asked)]
+    for (method, name), cases in thin_cells(lines).items():
+        intervals = [line["sure"].get(method, {}).get(name) for line in lines if line["case"] in cases]
+        held = [low <= truth <= high for _, _, low, high, truth in filter(None, intervals)]
         found.append(Share(f"{method}: {name}, {draws + 1} noises of each", sum(held), len(held), *HELD))
     return found
 
 
 def _can_answer(method: str) -> Callable[[Line], bool]:
-    """Return which records a method can answer: the others lack what it takes as known.
+    """Return a test for the records that a method can answer: the others lack a parameter that it takes as known.
 
-    Energy with known damping takes the damping ratio. That with an unknown amplitude of the force has as many unknowns
-    as P(1,1) motion has equations, two, only where the damping ratio is known.
+    Energy with known damping takes the damping ratio. Energy with an unknown force amplitude has the two equations of
+    P(1,1) motion, and no more unknowns only if the damping ratio is known.
     """
     if method in ("energy_known_damping", "energy_amplitude"):
         return lambda line: line["known"] == "damping"

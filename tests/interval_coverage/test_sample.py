@@ -1,4 +1,4 @@
-"""Twelve short records of `make coverage`, eight plain ones and one of each kind that is spoiled."""
+"""Twelve short records of `make coverage`: eight plain ones and one of each spoiled kind."""
 
 import math
 from dataclasses import replace
@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from interval_coverage._asked import asked
+from interval_coverage._asked import journal_line
 from interval_coverage._records import KNOWN, REGIONS, SPOILS, record
-from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares, thin
+from interval_coverage._table import FEWEST, HELD, HELD_IN_REGION, Share, shares, thin_cells
 
 SEED = 1
 PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
@@ -18,7 +18,7 @@ SPOILED = {11: "second mode", 35: "dry friction", 95: "speed-dependent restituti
 
 @cache
 def line(case):
-    return asked((case, 0), SEED)
+    return journal_line((case, 0), SEED)
 
 
 @pytest.mark.parametrize("case", SPOILED)
@@ -33,7 +33,7 @@ def test_intervals_of_plain_records_hold_the_truth():
     assert sum({"weak_form", "trajectory"} <= set(one["sure"]) for one in lines) >= 7
     held = [share for share in shares(lines) if share.low == HELD[0]]
     hits, total = sum(share.hits for share in held), sum(share.total for share in held)
-    # intervals of one record are correlated: about two records' worth may miss at once
+    # intervals of one record are correlated: those of about two records may miss at once
     assert total > 80
     assert hits > 0.85 * total
 
@@ -79,7 +79,7 @@ def test_coverage_is_told_by_region_with_the_error_that_records_leave():
     found = {share.what: share for share in shares(lines)}
     one = found[f"{REGIONS[1]}: intervals"]
     assert (one.hits, one.total, one.low, one.high) == (48, 60, *HELD_IN_REGION)
-    # as many intervals as a record has miss at once: ten records, not sixty intervals
+    # all intervals of a record miss at once: ten records, not sixty intervals
     assert one.error == pytest.approx(math.sqrt(0.8 * 0.2 / 10))
     assert not one.missed
     assert replace(one, error=0.02).missed
@@ -97,8 +97,8 @@ def test_a_share_misses_its_target_only_beyond_chance(hits, missed):
 def test_cells_of_few_intervals_are_asked_again_and_told_apart():
     sure = {"weak_form": {"phase": [0.0, 1.0, -1.0, 1.0, 0.5]}}
     many = [{"case": case, "draw": 0, "spoil": "", "sure": sure} for case in range(FEWEST)]
-    assert thin(many) == {}
-    assert thin(many[1:]) == {("weak_form", "phase"): list(range(1, FEWEST))}
+    assert thin_cells(many) == {}
+    assert thin_cells(many[1:]) == {("weak_form", "phase"): list(range(1, FEWEST))}
 
 
 def test_intervals_that_hold_too_often_miss_their_target_too():

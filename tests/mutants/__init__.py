@@ -1,4 +1,4 @@
-"""`python -m mutants`: faults put into the C core on purpose, which `hard-cases` and quick tests have to notice.
+"""`python -m mutants`: deliberate faults in the C core, which `hard-cases` and quick tests have to detect.
 
-Each fault patches a copy of the sources, whose file alone is compiled again; nothing that is shipped knows of it.
+Each fault patches a copy of the sources, and only its file is compiled again; shipped code contains no trace of it.
 """

@@ -1,7 +1,7 @@
 """`python -m mutants`: 60 drawn faults and the chosen ones, side by side; resumable. SEED= MINUTES= KINDS= CASES=
 
-Exit code 1 where fewer than 95 % of all, or 90 % of the drawn ones, are noticed. `python -m mutants KIND SEED` tries
-one.
+Exit code 1 if fewer than 95 % of all, or 90 % of the drawn ones, are detected. `python -m mutants KIND SEED` tries
+a single fault.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ def main(arguments: Sequence[str]) -> int:
         print(f"{arguments[0]} {arguments[1]}: {problem or 'noticed'} ({seconds:.0f} s)")
         return int(problem is not None)
     console, base = Console(), int(os.environ.get("SEED") or SEED)
-    # as `make soak` has them, which may ask for kinds of its own alone
-    asked = os.environ.get("KINDS", "").replace(",", " ").split()
-    kinds = [kind(name, PACKAGE) for name in names(PACKAGE) if not asked or name in asked]
+    # the variables are those of `make soak`, which may name only kinds of its own
+    requested = os.environ.get("KINDS", "").replace(",", " ").split()
+    kinds = [kind(name, PACKAGE) for name in names(PACKAGE) if not requested or name in requested]
     if not kinds:
         return 0
     counts = {one.name: min(one.cases, int(os.environ.get("CASES") or one.cases)) for one in kinds}
     journal = Journal(ROOT / "results" / "mutants" / f"seed-{base}-{state_of_the_code()}.jsonl")
     console.print(f"seed {base}, journal {journal.path.relative_to(ROOT)}")
 
-    def tell(entry: Tried) -> None:
+    def report(entry: Tried) -> None:
         console.print(
             f"{entry.kind} {entry.seed}: {entry.problem or 'noticed'} ({entry.seconds:.0f} s)", markup=False
         )
 
     try:
         done = run(
-            kinds, counts, base, journal, 60.0 * float(os.environ.get("MINUTES") or MINUTES), tell=tell
+            kinds, counts, base, journal, 60.0 * float(os.environ.get("MINUTES") or MINUTES), report=report
         )
     except KeyboardInterrupt:
         done = False

@@ -48,23 +48,23 @@ class DoesNotCompile(Exception):
 
 @dataclass(frozen=True)
 class Library:
-    """A shared library that holds the core: that of a component, or the core's own (None)."""
+    """A shared library that holds the core: the library of a component, or the core's own (None)."""
 
     component: ComponentDescription | None
 
     @cached_property
     def sources(self) -> tuple[Path, ...]:
-        """Its C files."""
+        """C files of the library."""
         core = sorted((NATIVE / "core").rglob("*.c"))
         one = self.component
         if one is None:
             return tuple(core)
-        beside = sorted(path for folder in beside_core(one, NATIVE) for path in folder.rglob("*.c"))
-        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *beside)
+        others = sorted(path for folder in beside_core(one, NATIVE) for path in folder.rglob("*.c"))
+        return (*(path for path in core if is_part(one, path.relative_to(NATIVE / "core"))), *others)
 
     @cached_property
     def name(self) -> str:
-        """Its name without the suffix."""
+        """Name of the library without the suffix."""
         return CORE_LIBRARY if self.component is None else self.component.name
 
     def command(self, native: Path) -> list[str]:
@@ -77,7 +77,7 @@ class Library:
         return [*options, *(f"-I{folder}" for folder in folders)]
 
     def object_of(self, source: Path) -> Path:
-        """Return the object of one of its files as it is; made once."""
+        """Return the unpatched object of one of its files; made once."""
         key = digest(
             _headers(), content_of([source]), *self.command(NATIVE), compiler_identity(find_compiler())
         )
@@ -112,7 +112,7 @@ def _run(*command: str | Path) -> None:
 
 
 def copy_with(fault: Fault | None, folder: Path) -> Path:
-    """Make a copy of the package with a fault in it; return the folder that Python is to find it in.
+    """Make a copy of the package with a fault in it; return the folder for Python's path.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _including(file: Path) -> Iterator[Path]:
 
 
 def _link_package(built: Path) -> None:
-    """Make a package of links to ours, in which the folder of what is built is another."""
+    """Make a package of links to this one, with another folder of built libraries."""
     own = built.parent
     own.mkdir(parents=True)
     for place, links in ((own.parent, PACKAGE), (own, PACKAGE / "fmus")):

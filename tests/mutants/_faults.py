@@ -1,4 +1,4 @@
-"""Places of the C where a fault can be put: a constant, a sign, a comparison, a branch."""
+"""Places of the C for a fault: a constant, a sign, a comparison, a branch."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from vibroimpact.fmus.packaging.build import NATIVE
 
 ROOMS = ("core/body", "core/contact", "core/lanes", "core/modes", "core/motion", "bodies")
 HEADERS = ("rounds.h", "rounds_many.h")
-"""Headers that hold what is computed."""
+"""Headers that contain computations."""
 OF_INPUT = re.compile(r"vi_check|vi_complain|complaint|message|isfinite|isnan")
-"""Lines that check what is given, or say what is wrong with it."""
+"""Lines that check arguments, or write messages about them."""
 COMMENT_OR_TEXT = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])'", re.DOTALL)
 CONSTANT = re.compile(r"(?<![\w.])(?:\d+\.\d*|\d+(?=[eE]))(?:[eE][-+]?\d+)?(?![\w.])")
 SIGN = re.compile(r"(?<=[\w\])] )[-+](?= [\w(])")
@@ -31,11 +31,11 @@ class Fault:
     Attributes
     ----------
     file : str
-        From the folder of C sources.
+        Path from the folder of C sources.
     start, end : int
-        The characters that are replaced.
+        Range of the replaced characters.
     new : str
-        What stands there instead.
+        Text in their place.
     kind : str
     """
 
@@ -50,7 +50,7 @@ class Fault:
         return text[: self.start] + self.new + text[self.end :]
 
     def described(self) -> str:
-        """Return where it is and what it does."""
+        """Return place and effect of the fault."""
         text = (NATIVE / self.file).read_text(encoding="utf-8")
         line = text.count("\n", 0, self.start) + 1
         was = " ".join(text[self.start : self.end].split())
@@ -59,14 +59,14 @@ class Fault:
 
 @cache
 def places() -> tuple[Fault, ...]:
-    """Return all faults of the kinds above that the C has room for, in the order of its files."""
+    """Return all possible faults of the kinds above, in the order of the C files."""
     files = [path for room in ROOMS for path in sorted((NATIVE / room).rglob("*"))]
-    wanted = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
-    return tuple(fault for path in wanted for fault in _faults_of(path))
+    computing = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
+    return tuple(fault for path in computing for fault in _faults_of(path))
 
 
 def drawn(seed: int) -> Iterator[Fault]:
-    """Yield faults by chance: first a kind and a file, so that long files and frequent kinds are not all there is."""
+    """Yield random faults: kind and file are drawn first, so that long files and frequent kinds do not dominate."""
     chance = random.Random(seed)
     found = places()
     while True:
@@ -77,7 +77,7 @@ def drawn(seed: int) -> Iterator[Fault]:
 
 def _faults_of(path: Path) -> Iterator[Fault]:
     text = path.read_text(encoding="utf-8")
-    # what is no code keeps its length
+    # blanks replace comments and texts: all positions stay
     code = COMMENT_OR_TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     lines = code.split("\n")
     starts = [0]
@@ -87,7 +87,7 @@ def _faults_of(path: Path) -> Iterator[Fault]:
     def of_motion(place: int) -> bool:
         number = code.count("\n", 0, place)
         line = lines[number]
-        # a loop without its bound does not end
+        # a loop without its bound never ends
         return not (
             line.lstrip().startswith(("#", "for ", "while ")) or line.endswith("\\") or OF_INPUT.search(line)
         )

@@ -1,4 +1,4 @@
-"""Whether a fault is noticed: by quick tests, by `hard-cases`; and whether it changes any result at all."""
+"""Whether a fault is detected, by quick tests or by `hard-cases`, and whether it changes any result at all."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ QUICK = (
 )
 """Tests of references and laws that take half a minute together."""
 SECONDS = 60
-"""Processor time of all checks of a fault."""
+"""Largest processor time of a check of a fault, s."""
 HARD_CASES = "from vibroimpact.orchestrator.commands.cli import main; main()"
 PROBE = "from mutants._trial import main; main()"
 
 
 def noticed(fault: Fault | None) -> str | None:
-    """Return what notices a fault, `no result` where nothing can, None where it survives.
+    """Return the check that detects a fault, `no result` if it changes no result, None if it survives.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def noticed(fault: Fault | None) -> str | None:
 
 
 def tried(faults: Iterable[Fault]) -> str | None:
-    """Try the first of some faults that compiles and changes a result; return it where it survives."""
+    """Try the first fault that compiles and changes a result; return it if it survives."""
     for fault in faults:
         try:
             answer = noticed(fault)

@@ -1,4 +1,4 @@
-"""Faults that would be the worst to miss: too small to be seen, or in one kind of body or lanes alone."""
+"""The worst faults to miss: too small to be seen, or present only in one kind of body or in lanes."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ CHOSEN = {
         "double added = law->damping_slope * (1.0 + 1e-9) * amplitude;",
     ),
 }
-"""Of each fault the file, what stands there once, and what stands there instead."""
+"""For each fault: the file, a text that occurs once in it, and the text in its place."""
 CASES, SECONDS = len(CHOSEN), 900.0
 
 
@@ -121,5 +121,5 @@ def fault_of(name: str) -> Fault:
 
 
 def check(seed: int) -> str | None:
-    """Try a fault; return it where it survives."""
+    """Try a fault; return it if it survives."""
     return tried([fault_of(list(CHOSEN)[seed % SEED_STRIDE])])

@@ -1,4 +1,4 @@
-"""Faults that a seed draws over the core; one that does not compile or changes no result is replaced by the next."""
+"""Faults drawn over the core by a seed; a fault that does not compile or changes no result is replaced by the next."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from mutants._trial import tried
 
 CASES, SECONDS = 60, 900.0
 MOST = 40
-"""Faults that may be tried for one that changes a result."""
+"""Most faults tried in search of one that changes a result."""
 
 
 def check(seed: int) -> str | None:
-    """Try a fault; return it where it survives."""
+    """Try a fault; return it if it survives."""
     return tried(islice(drawn(seed), MOST))

@@ -1,4 +1,4 @@
-"""Faults that are put into the core compile to another library, and one of each kind is there to be drawn."""
+"""Faults in the core compile to another library, and faults of each kind can be drawn."""
 
 from __future__ import annotations
 

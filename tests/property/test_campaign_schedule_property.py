@@ -1,4 +1,4 @@
-"""Whatever workers do, a schedule hands out every run once, and every branch in its order."""
+"""A schedule hands out every run once, and every branch in order, for any behaviour of its workers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def sweep(points: int, path: SweepPath, others: int) -> tuple[Branch, ...]:
 
 
 def state_after(branches: tuple[Branch, ...], run: int) -> State | None:
-    """Return a state that names the run it comes from; independent runs hand on none."""
+    """Return a state that names its run; independent runs pass no state on."""
     return None if branches[0].direction == "independent" else (float(run), 0.0)
 
 

@@ -1,4 +1,4 @@
-"""The laws of stops by themselves, over random parameters: a free mass on one stop, against closed forms."""
+"""The laws of stops alone, over random parameters: a free mass on one stop, against closed forms."""
 
 import math
 
@@ -9,7 +9,7 @@ from support.tolerance import ROUNDING
 
 FEW = settings(max_examples=100, derandomize=True)
 
-#: Contacts with power laws are followed to a tolerance of 1e-10 at each of their segments.
+#: Error of contacts with power laws, which are solved to a tolerance of 1e-10 in each of their segments.
 FOLLOWED = 1e-8
 
 masses = st.floats(-3.0, 3.0).map(lambda x: 10.0**x)
@@ -88,7 +88,7 @@ def test_hertz_contacts_are_elastic_and_last_as_the_closed_form_says(
 def test_hunt_crossley_restitution_depends_on_chi_times_the_speed_alone(
     mass: float, speed: float, k: float, exponent: float, chi_speed: float
 ) -> None:
-    # m v dv = -K d^n (1 + chi v) dd, so that w - ln(1 + w), w = chi v, is the same on the way in and out
+    # m v dv = -K d^n (1 + chi v) dd. With w = chi v, w - ln(1 + w) is the same on the way in and out
     chi = chi_speed / speed
     stop = Stop([1.0 / math.sqrt(mass)], law="hunt_crossley", stiffness=k, damping=chi, exponent=exponent)
     restitution, _, _ = free_mass(mass, stop, speed)

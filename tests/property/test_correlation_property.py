@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 RADII = radius_ladder(2.0**-10, 8.0)
 
-# grids of quarters and of thirds: ties with each other, and on radii of the ladder
+# grids of quarters and of thirds: ties among distances, and with radii of the ladder
 numbers = st.one_of(
     st.floats(-4.0, 4.0, allow_subnormal=False),
     st.integers(-16, 16).map(lambda k: k / 4.0),

@@ -1,6 +1,6 @@
-"""A scene run fused, and coupled (its stop an FMU), meets the same impacts and loses the same energies.
+"""A scene run fused, and coupled (its stop an FMU), has the same impacts and the same energy losses.
 
-The first impacts are compared: in a chaotic motion the two differ later by what rounding has grown to.
+Only the first impacts are compared: in chaotic motion rounding grows, and the two runs differ later.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
-#: Impacts that are compared.
+#: Number of compared impacts.
 IMPACTS = {"restitution": 5, "kelvin_voigt": 5, "hertz": 2, "hunt_crossley": 2}
-#: A compliant stop's contact is followed by the importer in steps of a thirtieth of it: exact for a linear law, fourth
-#: order for the others. What a difference at one impact has become at the next depends on the orbit.
+#: Relative difference of the impacts. The importer divides a compliant contact into thirty steps: exact for a linear
+#: law, fourth order for the others. The orbit decides the growth of a difference from one impact to the next.
 AGREEMENT = {"restitution": 1e-9, "kelvin_voigt": 1e-9, "hertz": 1e-3, "hunt_crossley": 1e-3}
 
 laws = st.one_of(

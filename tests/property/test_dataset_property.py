@@ -135,7 +135,7 @@ def test_points_of_keys_that_move_together_are_selected_by_their_axis(
     with tempfile.TemporaryDirectory() as folder:
         write_dataset(dataset, Path(folder, "runs.nc"))
         with open_dataset(Path(folder, "runs.nc")) as opened:
-            # version 0.2 saved what it had opened without the axis
+            # version 0.2 saved opened files without the axis
             opened.drop_vars(dimension).to_netcdf(Path(folder, "again.nc"))
         with open_dataset(Path(folder, "again.nc" if saved else "runs.nc")) as opened:
             values = [name for name in names if len(set(opened[name].values)) == len(points)]

@@ -1,4 +1,4 @@
-"""What holds for every free decay: units and clocks do not matter, and damping takes energy out."""
+"""Laws of every free decay: units and clocks do not matter, and damping takes energy out."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_no_damping_law_ever_adds_energy(
     place, speed = nodes.displacement[:, :, 0], nodes.velocity[:, :, 0]
     energy = (0.5 * speed**2 + 0.5 * place**2 + 0.25 * cubic * place**4).ravel()
     assert np.all(np.isfinite(energy))
-    # Seventeen points a swing are exact to 1e-6 where it loses a quarter; the last one leaves the cubic spring out.
+    # Seventeen points a swing are exact to 1e-6 for a loss of a quarter; the last point leaves the cubic spring out.
     dead = np.abs(place).ravel() <= 3.0 * coulomb
     assert np.all(np.diff(energy)[~dead[1:]] <= 1e-6)
 

@@ -29,7 +29,7 @@ oscillators = st.builds(
 
 
 def made(parameters, ratio):
-    """Return the oscillator driven at so many times its natural frequency, its stop in units of the deflection."""
+    """Return the oscillator driven at `ratio` times its natural frequency, its stop in units of the deflection."""
     return replace(
         parameters,
         angular_frequency=ratio * parameters.natural_frequency,
@@ -38,7 +38,7 @@ def made(parameters, ratio):
 
 
 def estimated(time, values, forcing, known=None):
-    """Return the trajectory fit; motion that hardly hits the stop is not asked about."""
+    """Return the trajectory fit; motion with few impacts is skipped."""
     try:
         found = estimate_impacts(channel_of(time, values), forcing, known, methods=METHODS)
     except EstimationError as problem:
@@ -53,7 +53,7 @@ def estimated(time, values, forcing, known=None):
 def test_noiseless_record_gives_the_truth(parameters, ratio):
     record = record_of(made(parameters, ratio), periods=6, start=(parameters.stop_position - 0.3, 0.0))
     truth = record.truth
-    # every impact strong enough to be seen: no low bounces among them
+    # every impact is strong enough to be detected: there are no low bounces
     drops = record.velocity[:-1] - record.velocity[1:]
     hits = drops > 0.25 * np.max(np.abs(record.velocity))
     assume(5 <= np.count_nonzero(hits) <= 8)

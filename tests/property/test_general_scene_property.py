@@ -1,4 +1,4 @@
-"""Whatever a general scene holds, the answer is a scene or a list of clear problems."""
+"""Any content of a general scene gives a scene or a list of clear problems."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_any_two_variables_are_connected_or_told_why_not(data: st.DataObject) ->
     source, target = data.draw(names), data.draw(names)
     document["connection"] = [{"from": f"b.{source}", "to": f"a.{target}"}]
     problems = found_in(document)
-    # a connection that answers a contact of the watched component is told at the watch
-    told = ("s.toml: connection[1]", "s.toml: event[1].watch: expected a component without a contact")
-    assert all(problem.startswith(told) for problem in problems), problems
+    # a connection to a contact of the watched component is reported at the watch
+    expected = ("s.toml: connection[1]", "s.toml: event[1].watch: expected a component without a contact")
+    assert all(problem.startswith(expected) for problem in problems), problems
     assert len(problems) <= 2

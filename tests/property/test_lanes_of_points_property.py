@@ -1,4 +1,4 @@
-"""Points in lanes are those of the scalar engine to rounding, and the same bits however they are cut."""
+"""Points in lanes equal those of the scalar engine up to rounding, and have the same bits for any cut."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 RIGID = tuple(law for law in LAWS if "kelvin_voigt" not in law)
 FIRST_IMPACTS = 10
-"""Impacts of a point that are compared: a chaotic motion multiplies rounding by what it likes later."""
+"""Number of compared impacts of a point: later, chaotic motion multiplies rounding by any factor."""
 AGREEMENT = 1e-9
-"""Difference of their times and velocities: rounding, multiplied by some impacts."""
+"""Largest difference of their times and velocities: rounding, multiplied by some impacts."""
 
 
 def rows_of(scene: Scene, cuts: Sequence[int] = ()) -> xr.Dataset:
-    """Return the rows of a scene, its points cut where it is said, as the chunks of a campaign are."""
+    """Return the rows of a scene, its points cut at the given places, like the chunks of a campaign."""
     edges = [0, *cuts, run_count(scene.sweep)]
     points = columns_of_points(expand(scene), 0, edges[-1])
     pieces: list[RunColumns] = []
@@ -47,7 +47,7 @@ def first_impacts(rows: xr.Dataset, run: int) -> NDArray[np.float64]:
 
 
 def few_impacts(rows: xr.Dataset) -> NDArray[np.bool_]:
-    """Return which runs are known to have few impacts in all that was recorded."""
+    """Return a mask of the runs with few impacts in the whole recording."""
     if "impact_count" in rows:
         return np.asarray(rows.impact_count.values <= FIRST_IMPACTS)
     if "impacts_per_period" in rows:
@@ -65,14 +65,16 @@ def assert_agree(lanes: xr.Dataset, fused: xr.Dataset) -> None:
     short = few_impacts(fused)
     for name in ("final_displacement", "final_velocity", "displacement_max", "strobe_velocity"):
         if name in lanes:
-            values, wanted = (rows[name].values[short] for rows in (lanes, fused))
-            assert values == pytest.approx(wanted, rel=AGREEMENT, abs=AGREEMENT, nan_ok=True)
+            values, expected = (rows[name].values[short] for rows in (lanes, fused))
+            assert values == pytest.approx(expected, rel=AGREEMENT, abs=AGREEMENT, nan_ok=True)
 
 
 def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
     for name in set(one.variables) - {"point_seconds"}:
-        values, wanted = one[name].values, other[name].values
-        same = (values == wanted).all() if values.dtype == object else values.tobytes() == wanted.tobytes()
+        values, expected = one[name].values, other[name].values
+        same = (
+            (values == expected).all() if values.dtype == object else values.tobytes() == expected.tobytes()
+        )
         assert same, name
 
 

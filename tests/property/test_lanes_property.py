@@ -1,4 +1,4 @@
-"""Points in lanes do what the scalar engines make of them; every instruction set and cut gives the same bits."""
+"""Points in lanes move as in the scalar engines; every instruction set and cut gives the same bits."""
 
 import math
 
@@ -12,12 +12,12 @@ from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, inst
 from vibroimpact.fmus.errors import UsageError
 
 SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1)]
-#: A rounding after some dozen impacts, each of which may multiply it.
+#: Largest difference of a point: a rounding after some dozen impacts, each of which may multiply it.
 FLIGHTS = 1e-9
-#: Events of one point: elastic bodies between two stops would go on for long.
+#: Most events of one point: elastic bodies between two stops would go on for long.
 MOST = 300
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
-"""Of the impacts of P(1,1) of m = k = 1, zeta .1, F .5, w 1, r .7, stop 1: closed form."""
+"""Phase and velocity of the impacts of P(1,1) of m = k = 1, zeta .1, F .5, w 1, r .7, stop 1: closed form."""
 
 HERE = [each for each in Instructions if each and instructions() >= each]
 

@@ -1,4 +1,4 @@
-"""The largest force of a contact is that of its motion: no sample is above it, and dense samples come near it."""
+"""The recorded largest force of a contact: no sample exceeds it, and dense samples come near it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from support.random_structures import COMPLIANT, MOST_IMPACTS, POWER, Scene, sce
 FEW = settings(max_examples=25, derandomize=True, suppress_health_check=list(HealthCheck))
 
 STEPS = 1000
-"""Samples of a run."""
+"""Number of samples of a run."""
 DENSE = 40
-"""Samples of a contact from which on their second differences tell how far it can be above them."""
+"""Samples of a contact above which their second differences bound the largest force."""
 ROUNDING = 1e-9
-"""Of a force: a power law is followed to 1e-10 at each segment."""
+"""Relative error of a force: a power law is solved to 1e-10 in each segment."""
 
 
 @FEW

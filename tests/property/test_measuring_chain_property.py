@@ -1,4 +1,4 @@
-"""A measuring chain of any numbers: cuts between blocks change no bit, conversion is within half a step."""
+"""A measuring chain with any parameters: cuts between blocks change no bit, conversion is within half a step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHANNELS = ("sensor.velocity", "load_cell", "drive")
 
 @st.composite
 def chains(draw: st.DrawFn) -> Scene:
-    """Draw a scene with a load cell and an exciter, near or far, behind a rigid or a yielding stop."""
+    """Draw a scene with a load cell and an exciter, near or far, behind a rigid or a compliant stop."""
     rigid = draw(st.booleans())
     law = f"restitution = {draw(st.floats(0.0, 1.0))}" if rigid else 'law = "hertz"\nstiffness = 1e7'
     ring = draw(st.just(0.0) | st.floats(1e-9, 3000.0))
@@ -40,7 +40,7 @@ def chains(draw: st.DrawFn) -> Scene:
 
 
 def measured(scene: Scene, volts: Floats, cuts: list[int]) -> tuple[dict[str, Floats], Floats]:
-    # of a rig the instants of inputs and outputs are all in one row: uneven steps
+    # a rig has the instants of inputs and outputs in one row: uneven steps
     times = np.sort(
         np.append(np.arange(SAMPLES // 2 + 1) / 1000.0, np.arange(SAMPLES // 2) / 1000.0 + 2.3e-4)
     )

@@ -1,4 +1,4 @@
-"""Laws of the measuring chain: no cut of time changes it, impulses are kept, steps bound a converter's error."""
+"""Laws of the measuring chain: no cut of time changes it, impulses are conserved, steps bound a converter's error."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_no_cut_of_the_time_changes_what_a_load_cell_says(
         begin = block[-1]
     together = np.concatenate(divided)[np.searchsorted(fine, times)]
     load = np.abs(force).max() + np.sum(np.abs(impulses)) / cell[5]
-    # what is amplified by resonance is so in both
+    # resonance amplifies both alike
     size = cell[0] * (load * 10.0) * (1.0 + cell[1] * 0.3) + 1.0
     np.testing.assert_allclose(together, whole, rtol=0.0, atol=1e-12 * size)
 
@@ -60,7 +60,7 @@ def test_a_load_cell_shows_the_impulse_that_it_was_given(
     at, impulses = arranged(found)
     w = 2.0 * np.pi * natural
     cell = LoadCell(2.0, natural, ratio, contact_duration=duration)
-    # from y'' + 2 ratio w y' + w^2 y = w^2 F: the integral of y is that of F once y is at rest again
+    # from y'' + 2 ratio w y' + w^2 y = w^2 F: y and F have the same integral once y is at rest again
     slowest = w * (ratio - np.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else ratio * w
     end = 0.03 + duration + 60.0 / slowest
     integral = seen_integral(cell, at, impulses, end, w)
@@ -68,7 +68,7 @@ def test_a_load_cell_shows_the_impulse_that_it_was_given(
 
 
 def seen_integral(cell: LoadCell, at: Array, impulses: Array, end: float, w: float) -> float:
-    """Integral of output / sensitivity up to rest, by Gauss-Legendre points between all edges of pulses."""
+    """Return the integral of output / sensitivity until rest, by Gauss-Legendre points between all edges of pulses."""
     duration = cell._settings.contact_duration
     edges = np.unique([0.0, *at, *(at + duration), end])
     nodes, weights = np.polynomial.legendre.leggauss(20)

@@ -11,13 +11,13 @@ from vibroimpact.analysis.orbits.energies import energy_transfer, orbit_energies
 from vibroimpact.fmus.core.modes import chain_modes
 
 FEW = settings(max_examples=150, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
-#: Of the identity, over what goes through the modes: a slow force gives and takes back the energy of the rest position.
+#: Error of the identity over the energy through the modes: a slow force moves the rest position's energy to and fro.
 ROUNDING = 1e-12
 
 
 @st.composite
 def chains(draw: st.DrawFn) -> ImpactingBody:
-    """Chains of up to six masses, damped in proportion to their springs, with a stop on one of their masses."""
+    """Draw chains of up to six masses, with damping proportional to their springs and a stop on one of their masses."""
     count = draw(st.integers(1, 6))
     numbers = st.floats(0.2, 5.0)
     masses, springs, loads = (
@@ -46,7 +46,7 @@ def chains(draw: st.DrawFn) -> ImpactingBody:
 def orbits(body: ImpactingBody, periods: int) -> tuple[PeriodicOrbit, ...]:
     try:
         found = closed_form(body, periods)
-    except OrbitError:  # an undamped mode answers without bound
+    except OrbitError:  # an undamped mode has an unbounded response
         found = ()
     assume(found)
     return tuple(orbit for orbit in found if orbit.velocities[0] > 1e-6)
@@ -60,7 +60,7 @@ def test_what_impacts_lose_is_what_all_modes_have_left(body: ImpactingBody, peri
         rest = ((body.force / body.frequencies) ** 2).sum()
         through = np.abs(found.forcing).sum() + found.damping.sum() + found.before.sum() + rest
         assert abs(found.residual.sum() - found.lost.sum()) <= ROUNDING * through
-        # each mode on its own: what force and damping leave to it, impacts take
+        # each mode on its own: impacts take the balance of force and damping
         assert np.abs(found.residual + found.change.sum(axis=0)).max() <= ROUNDING * through
 
 
@@ -90,5 +90,5 @@ def test_the_matrix_of_energy_has_the_eigenvalue_of_the_restitution_once_and_els
     )
     np.testing.assert_allclose(of_velocity.T @ of_velocity, of_energy, atol=1e-14)
     assert abs(np.linalg.det(of_velocity) + restitution) <= 1e-14
-    # the contact turns round with the restitution, whatever the modes do
+    # the contact rebounds with the restitution, for any modes
     np.testing.assert_allclose(contact.shape @ of_velocity, -restitution * contact.shape, atol=1e-14)

@@ -19,11 +19,11 @@ from vibroimpact.fmus.core.modes import chain_modes
 
 FEW = settings(max_examples=60, derandomize=True, deadline=None)
 STEP = 1e-6
-"""Of the central differences, over the size of the motion."""
+"""Step of the central differences, over the size of the motion."""
 
 
 class Chain:
-    """A chain with damping in proportion to the stiffness, of which the last mass hits a stop above."""
+    """A chain with damping in proportion to the stiffness, whose last mass hits a stop above."""
 
     def __init__(
         self, masses: list[float], springs: list[float], ratio: float, force: list[float], w: float
@@ -42,7 +42,7 @@ class Chain:
         self.modes = chain_modes(self.masses, np.append(wall, 0.0), np.append(ratio * wall, 0.0))
 
     def body(self, position: float, restitution: float) -> ImpactingBody:
-        """Return the same in modes."""
+        """Return the chain in modal coordinates."""
         shape = self.modes.shapes[-1]
         contact = Contact(shape, 1.0, position, restitution)
         force = self.force @ self.modes.shapes
@@ -50,12 +50,12 @@ class Chain:
         return ImpactingBody(frequencies, ratios, force, 0.0 * force, self.w, 0.0, (contact,), shape)
 
     def fly(self, state: np.ndarray, phase: float, u: float) -> np.ndarray:
-        """Return the state `u` later."""
+        """Return the state after the time `u`."""
         return (expm(self.equations * u) @ np.append(state, [np.cos(phase), np.sin(phase)]))[:-2]
 
 
 def after_a_period(chain: Chain, state: np.ndarray, phase: float, orbit: PeriodicOrbit) -> np.ndarray:
-    """Fly on for the periods of an orbit P(1,q), through its impact, which is looked for near to its own."""
+    """Return the state after the periods of an orbit P(1,q); its impact is searched near the orbit's own."""
     contact, n = orbit.body.contacts[0], chain.masses.size
     length = orbit.periods * orbit.body.period
     u = (orbit.phases[0] - phase) % (2.0 * np.pi * orbit.periods) / chain.w
@@ -74,7 +74,7 @@ def chains(draw: st.DrawFn) -> Chain:
     masses, springs = ([draw(some) for _ in range(n)] for _ in range(2))
     force = [draw(st.floats(-1.0, 1.0)) for _ in range(n)]
     assume(max(map(abs, force)) > 0.1)
-    ratio = draw(st.one_of(st.floats(0.01, 0.3), st.floats(1.0, 4.0)))  # the last: overdamped modes as well
+    ratio = draw(st.one_of(st.floats(0.01, 0.3), st.floats(1.0, 4.0)))  # up to overdamped modes
     return Chain(masses, springs, ratio, force, draw(st.floats(0.4, 2.5)))
 
 
@@ -87,7 +87,7 @@ def orbits(chain: Chain, share: float, restitution: float, periods: int) -> tupl
     amplitude = abs(free.contacts[0].shape @ response)
     assume(amplitude > 1e-3)
     found = closed_form(chain.body(share * amplitude, restitution), periods)
-    # next to a graze, multipliers grow without bound
+    # near a graze, multipliers grow without bound
     kept = tuple(each for each in found if each.velocities[0] > 0.05 * amplitude * chain.w)
     assume(kept)
     return kept
@@ -115,7 +115,7 @@ def test_a_closed_orbit_is_closed_by_another_flow(chain: Chain, share: float, r:
 def test_newton_comes_back_to_the_closed_form(chain: Chain, share: float, r: float, q: int) -> None:
     for orbit in orbits(chain, share, r, q):
         again = find_orbit(orbit.body, orbit.phases + 1e-5, periods=q)
-        # the two orbits of a fold are as near to each other as they like
+        # the two orbits of a fold can be arbitrarily close to each other
         slope = abs(orbit.body.kernel.evaluate(orbit.contacts, orbit.phases, q).distance_slopes[0, 0])
         assume(slope > 1e-3 * orbit.body.scale)
         np.testing.assert_allclose(again.phases, orbit.phases, atol=1e-9)
@@ -128,7 +128,7 @@ def test_the_determinant_is_what_restitution_and_damping_leave(
     chain: Chain, share: float, r: float, q: int
 ) -> None:
     for orbit in orbits(chain, share, r, q):
-        size = np.prod(np.linalg.norm(orbit.monodromy, axis=1))  # Hadamard: what cancels in a determinant
+        size = np.prod(np.linalg.norm(orbit.monodromy, axis=1))  # Hadamard's bound of the determinant
         assert abs(orbit.determinant - orbit.exact_determinant) <= 1e-12 * size
 
 
@@ -139,8 +139,8 @@ def test_multipliers_are_those_of_differences_of_another_flow(
 ) -> None:
     for orbit in orbits(chain, share, r, q):
         n, shapes = chain.masses.size, chain.modes.shapes
-        whole = np.kron(np.eye(2), shapes)  # from modal states to physical ones
-        # a tenth of the flight after the impact, so that no difference begins beyond the stop
+        whole = np.kron(np.eye(2), shapes)  # from modal to physical states
+        # a tenth of the flight after the impact: no difference begins beyond the stop
         u = 0.1 * q * orbit.body.period
         phase = orbit.phases[0] + chain.w * u
         state = chain.fly(whole @ orbit.states[0], orbit.phases[0], u)

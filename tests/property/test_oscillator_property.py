@@ -87,13 +87,13 @@ def test_the_impact_map_changes_areas_as_restitution_damping_and_velocity_say(
 
     centre, h = image(time, v), 1e-6
     flight = centre[0] - time
-    # near a graze the map has a root: differences of 1e-6 see a line only far from it
+    # near a graze the map has a root: differences of 1e-6 are linear only far from it
     assume(centre[1] > 0.2)
     assume(flight > 0.05)
     columns = [
         (image(time + dt, v + dv) - image(time - dt, v - dv)) / (2.0 * h) for dt, dv in ((h, 0.0), (0.0, h))
     ]
-    # another branch of the map (a graze in between) within the differences
+    # another branch of the map (with a graze in between) within the differences
     assume(np.abs(np.array(columns)).max() < 50.0)
     expected = r * r * math.exp(-2.0 * zeta * flight) * v / centre[1]
     assert abs(np.linalg.det(np.array(columns).T) - expected) <= 100 * DIFFERENCES
@@ -140,7 +140,7 @@ def test_without_a_force_energy_only_falls_and_by_the_impacts_alone(
             rows = o.rows()
             lost = float(np.sum(0.5 * (1.0 - rows[:, 6] ** 2) * rows[:, 3] ** 2 * (rows[:, 0] == 1.0)))
             now = o.get("energy.kinetic") + o.get("energy.potential")
-            # the summed tail of a chatter begins at 1e-4 of its fastest impact and takes that energy at once
+            # the summed tail of a chatter starts at 1e-4 of its fastest impact and loses that energy at once
             assert abs(energy - lost - now) <= 1e-8 * first + 100 * ROUNDING * (energy + now) + EPSILON
             assert now <= energy * (1.0 + 100 * ROUNDING) + EPSILON
             energy = now
@@ -170,13 +170,11 @@ def test_a_certified_search_never_passes_a_contact(
     zeta: float, w: float, position: float, behind: float, velocity: float, phase: float
 ) -> None:
     body = (1.0, 2.0 * zeta, 1.0, 0.9, w)
-    assume(
-        behind < -1e-6 or abs(velocity) > 1e-12
-    )  # on the stop at rest, but for rounding, it rests, or leaves
+    assume(behind < -1e-6 or abs(velocity) > 1e-12)  # at rest on the stop up to rounding, it stays or leaves
     state, horizon = (position + behind, velocity), 12.0
     contact = next_contact(Oscillator(*body), state, position, horizon, phase=phase)
     end = horizon if contact is None else contact.time
-    # no instant before it lies beyond the stop, on a fine grid ...
+    # no earlier instant lies beyond the stop, on a fine grid ...
     for u in np.linspace(0.0, end, 1500)[1:-1]:
         assert flow(Oscillator(*body), state, u, phase=phase)[0] <= position + FLOW * 4.0
     if contact is not None and contact.velocity > 1e-3:

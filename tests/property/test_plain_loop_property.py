@@ -1,4 +1,4 @@
-"""Random scenes of bodies, stops and springs by plain steps in C and step by step in Python: to the bit."""
+"""Random scenes of bodies, stops and springs, by plain steps in C and step by step in Python: equal bits."""
 
 from __future__ import annotations
 

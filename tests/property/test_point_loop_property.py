@@ -1,4 +1,4 @@
-"""The loop over points in C gives the rows of points that are run one by one, bit for bit."""
+"""The loop over points in C gives the rows of points that run one by one, bit for bit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FUSED = '[execution]\nhow = "fused"\n'
 
 
 def in_both_ways(scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
-    """Return the rows of a scene by the loop in C, and by points that are run one by one."""
+    """Return the rows of a scene by the loop in C, and by points that run one by one."""
     points = columns_of_points(expand(scene), 0, run_count(scene.sweep))
     with PointRunner(scene, execution=scene.execution.how) as runner:
         assert runner.loop is not None
@@ -32,12 +32,14 @@ def in_both_ways(scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
 
 
 def assert_equal_bit_for_bit(one: xr.Dataset, other: xr.Dataset) -> None:
-    """Every variable but the wall time of the points."""
+    """Assert that every variable is equal, except for the wall time of the points."""
     assert list(one.variables) == list(other.variables)
     for name in set(one.variables) - {"point_seconds"}:
-        values, wanted = one[name].values, other[name].values
-        assert (values.dtype, values.shape) == (wanted.dtype, wanted.shape), name
-        same = (values == wanted).all() if values.dtype == object else values.tobytes() == wanted.tobytes()
+        values, expected = one[name].values, other[name].values
+        assert (values.dtype, values.shape) == (expected.dtype, expected.shape), name
+        same = (
+            (values == expected).all() if values.dtype == object else values.tobytes() == expected.tobytes()
+        )
         assert same, name
 
 

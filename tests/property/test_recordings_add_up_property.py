@@ -1,7 +1,7 @@
 """An impact, a contact or a rest belongs to the recording in which it begins: successive recordings add up.
 
-Runs are cut anywhere: between events, at one, in the middle of a contact, where it ends. Every law, both drivers of a
-body, lanes, and pairs of bodies.
+Runs are cut anywhere: between events, at an event, in the middle of a contact, at its end. The runs have every law,
+both drivers of a body, lanes, and pairs of bodies.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 
 def cut_at_its_release() -> Scene:
-    """Return a beam whose rest is over at an instant at which rounding presses it once more."""
+    """Return a beam whose rest ends at an instant at which rounding presses it once more."""
     forcing = "[forcing]\namplitude = 1.0\nangular_frequency = 2.501043067472021\n"
     stop = "[[stop]]\nposition = 0.3\nrestitution = 0.0\n[record]\nrecorded_periods = 1\n"
     body = BEAM.format(stiffness=1.0, damping=0.3, displacement=0.0, velocity=0.0)
@@ -187,7 +187,7 @@ PAIR_LAWS = (
 
 
 def events_of_pair(law: str, begin: float, end: float, displacement: float, up: float) -> Floats:
-    """Return the times of the events of two bodies that touch at time 0 where both have the same displacement."""
+    """Return the times of the events of two bodies that touch at time 0 with equal displacements."""
     text = PAIR.format(law=law, begin=begin, length=end - begin, displacement=displacement, up=up)
     runner = GeneralRunner(parse_scene(text, "pair.toml"))
     try:
@@ -207,9 +207,9 @@ def events_of_pair(law: str, begin: float, end: float, displacement: float, up: 
 )
 def test_recordings_of_a_pair_add_up(law: str, cut: float, displacement: float, up: float) -> None:
     whole = events_of_pair(law, 0.0, 4.0, displacement, up)
-    assert whole[0] == 0.0  # they touch and approach where their motion begins
+    assert whole[0] == 0.0  # they touch and approach at the start of their motion
     for at in (cut, float(whole[-1])):
         if 0.0 < at < 4.0:
             parts = [events_of_pair(law, *window, displacement, up) for window in ((0.0, at), (at, 4.0))]
-            room = 1e-6 if law.startswith("restitution") else 1e-2  # a cut makes other steps of a contact
+            room = 1e-6 if law.startswith("restitution") else 1e-2  # a cut changes the steps of a contact
             assert np.concatenate(parts) == pytest.approx(whole, abs=room)

@@ -1,4 +1,4 @@
-"""Where adaptive sweeps put their points, for random motions: classes that change at random places."""
+"""Points of adaptive sweeps for random motions: classes that change at random places."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.orchestrator.campaign.refinement import Known, Refined, cut_cel
 
 Floats = NDArray[np.float64]
 Motion = Callable[[Floats], NDArray[np.int64]]
-"""The class of the motion at points, shape (point, axis)."""
+"""Function from points to the class of their motion, shape (point, axis)."""
 
 STEP = 1.0
 unit = st.floats(0.0, 1.0)
@@ -32,7 +32,7 @@ def known(values: Floats, motion: Motion, direction: NDArray[np.int64] | None = 
 def rounds(
     start: Floats, motion: Motion, refine: Callable[[Known, int], Refined], at_most: int
 ) -> tuple[Floats, int]:
-    """Return all points of an adaptive sweep, and the places that there was no room for."""
+    """Return all points of an adaptive sweep, and the number of places without room for a point."""
     values = start
     while True:
         refined = refine(known(values, motion), at_most - len(values))
@@ -121,7 +121,7 @@ def half_planes_and_discs(
 def test_the_border_of_each_region_that_first_values_see_is_found_all_along(
     lines: list[tuple[float, float]], discs: list[tuple[float, float, float]]
 ) -> None:
-    """Half planes and discs of more than a diagonal of a first cell: there is no island between first values."""
+    """Half planes and discs larger than a diagonal of a first cell: no island lies between first values."""
     motion, cells, cuts = half_planes_and_discs(lines, discs), 2, 4
     finest = np.linspace(0.0, 1.0, cells * 2**cuts + 1)
     first = finest[:: 2**cuts].tolist()

@@ -1,4 +1,4 @@
-"""Invariances of the scores, and lags found again, for signals nobody chose."""
+"""Invariances of the scores, and recovered lags, for arbitrary signals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_scaling_or_shifting_both_signals_changes_no_score(seed: int, scale: flo
     measured = noise(seed)
     simulated = measured + 0.5 * noise(seed + 1)
     score = variance_accounted_for(measured, simulated)
-    # (1e5)^2 roundings where the shift is that much larger than the signal
+    # (1e5)^2 roundings for a shift that much larger than the signal
     moved = variance_accounted_for(scale * measured + shift, scale * simulated + shift)
     assert abs(moved - score) < 1e-6
 
@@ -63,7 +63,7 @@ def test_no_score_is_above_100_and_the_mean_scores_0(seed: int) -> None:
 def test_lag_and_polarity_put_in_are_found(
     lag: float, polarity: int, others: list[tuple[float, float, float]], frequency: float, seed: int
 ) -> None:
-    """A hit body of one to three modes under 2 % noise, its sensor inverted or not."""
+    """A hit body of one to three modes with 2 % noise, its sensor inverted or not."""
 
     def motion(time: Floats) -> Floats:
         further = [0.5 * size * ring(time, ratio * frequency, damping) for size, ratio, damping in others]

@@ -1,4 +1,4 @@
-"""Laws of every replay: superposition, any division of the steps, offsets that are taken off."""
+"""Laws of every replay: superposition, any division of the steps, removed offsets."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_response_to_a_sum_of_drives_is_the_sum_of_responses(
     parts = response(body, times, one) + factor * response(body, times, other)
     together = response(body, times, one + factor * other)
     size = max(1e-12, float(np.abs(one).max() + abs(factor) * np.abs(other).max()))
-    # displacements are of the size of the base's own, acceleration times duration squared, at most
+    # displacements are at most of the size of the base's own, acceleration times duration squared
     np.testing.assert_allclose(together, parts, rtol=0.0, atol=1e-11 * size * times[-1] ** 2)
 
 
@@ -59,5 +59,5 @@ def test_the_level_of_rest_shifts_and_scales_with_the_signal(
 ) -> None:
     level = quiet_level(values)
     assert abs(quiet_level(scale * values) - scale * level) <= 1e-9 * scale * (1.0 + np.abs(values).max())
-    # rounding of the offset may choose another of several parts that are equally quiet
+    # rounding of the offset may choose another one of several equally quiet parts
     assert values.min() - 1e-9 <= quiet_level(values + offset) - offset <= values.max() + 1e-9

@@ -1,4 +1,4 @@
-"""Every scene gives a dataset that can be written: rows of rigid and yielding stops side by side, in order of time."""
+"""Every scene gives a writable dataset: rows of rigid and compliant stops side by side, in order of time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SIDES = {"upper": 1.0, "lower": -1.0}
 
 @st.composite
 def scene_texts(draw: st.DrawFn) -> str:
-    """Chains of one to four masses with one rigid stop and one to three that yield."""
+    """Draw chains of one to four masses with one rigid stop and one to three compliant ones."""
     count = draw(st.integers(1, 4))
     number = st.floats(0.1, 3.0).map(lambda x: round(x, 3))
     masses = draw(st.lists(number, min_size=count, max_size=count))

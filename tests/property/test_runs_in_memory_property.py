@@ -1,4 +1,4 @@
-"""Runs of drawn scenes in memory are what their files give, and are the same each time."""
+"""Runs of drawn scenes in memory equal their files, and are the same each time."""
 
 from __future__ import annotations
 

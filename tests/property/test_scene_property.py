@@ -1,4 +1,4 @@
-"""Whatever a scene file holds, the answer is a scene or a list of clear problems."""
+"""Any content of a scene file gives a scene or a list of clear problems."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ toml_values = st.recursive(
 
 
 def written(value: Any) -> str:
-    """Write a value as TOML."""
+    """Return a value as TOML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{json.dumps(key)} = {written(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""A scene as a function gives the bits of its runs, whatever values its keys take."""
+"""A scene as a function gives the bits of its runs, for any values of its keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RANGES = {
     "stop[1].position": (0.2, 2.0),
     "stop[1].restitution": (0.0, 1.0),
 }
-"""Keys with the least and the largest of their drawn values."""
+"""Keys with the smallest and the largest of their drawn values."""
 
 
 @st.composite
@@ -46,8 +46,8 @@ def test_calls_have_the_bits_of_runs(drawn: tuple[list[str], list[list[float]]],
     with vi.runner(scene, keys) as motion:
         for point in values:
             found = motion(point)
-            wanted = vi.run(scene.with_values(dict(zip(keys, point, strict=True))), progress=False)
+            expected = vi.run(scene.with_values(dict(zip(keys, point, strict=True))), progress=False)
             for name, array in found.items():
-                own, values_of_run = np.asarray(array), wanted[name].values
+                own, values_of_run = np.asarray(array), expected[name].values
                 assert own.dtype.kind == "U" or own.tobytes() == values_of_run.tobytes(), name
-            assert str(found["message"]) == str(wanted.message.values)
+            assert str(found["message"]) == str(expected.message.values)

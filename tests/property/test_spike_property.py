@@ -1,4 +1,4 @@
-"""What spikes must not depend on: the unit, the offset, the origin of time, the sign of the signal."""
+"""Invariances of spikes: the unit, the offset, the origin of time, the sign of the signal."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_factor_scales_peaks_and_impulses_and_an_offset_changes_nothing(
     plain = measure_pulses(identify(channel(values, 1.0 / RATE)))
     other = measure_pulses(identify(channel(sign * scale * (values + offset), 1.0 / RATE)))
     assert len(other) == len(plain) == 4
-    # an offset of 100 costs the samples 1e-14 of a peak; fits stop at a step that lowers no sum of squares
+    # an offset of 100 costs the samples 1e-14 of a peak; fits stop when a step lowers no sum of squares
     assert other.start == pytest.approx(plain.start, abs=1e-12)
     assert other.peak == pytest.approx(sign * scale * plain.peak, rel=1e-9)
     assert other.impulse == pytest.approx(sign * scale * plain.impulse, rel=1e-6)
@@ -59,12 +59,12 @@ def test_another_origin_of_time_shifts_instants_and_nothing_else(seed: int, shif
 def test_a_half_sine_is_above_a_threshold_as_long_as_its_formula_says(
     part: float, offset: float, peak: float
 ) -> None:
-    # duration length (1 - (2/pi) arcsin(H/A)), impulse above it sqrt(1 - (H/A)^2) of 2 A length / pi; linear
+    # duration length (1 - (2/pi) arcsin(H/A)); impulse above H: the part sqrt(1 - (H/A)^2) of 2 A length / pi. Linear
     # interpolation between 40 samples a pulse costs less than .5 % of its length
     time = np.arange(2000) / 40_000.0
     signal = pulses(time, np.array([0.02 + offset / 40_000.0]), np.array([peak]), LENGTH)
-    asked = SpikeSettings(threshold=part * peak, minimum_samples=1)
-    found = measure_pulses(identify(channel(signal, 1.0 / 40_000.0), asked))
+    chosen = SpikeSettings(threshold=part * peak, minimum_samples=1)
+    found = measure_pulses(identify(channel(signal, 1.0 / 40_000.0), chosen))
     assert len(found) == 1
     expected = time_above(part * peak, np.array([peak]), LENGTH)
     assert found.duration == pytest.approx(expected, abs=5e-3 * LENGTH)

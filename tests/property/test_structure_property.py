@@ -1,7 +1,7 @@
 """Invariants of bodies of many modes with stops of every law, over random bodies, stops and forces.
 
 No reference is needed: each property follows from the equations of motion alone (equations.md 1.3, 5, 6). Where two
-runs must agree to rounding, what rounding may grow to is measured on the same scene (random_structures.apart).
+runs must agree to rounding, the growth of rounding is measured on the same scene (random_structures.apart).
 """
 
 from dataclasses import replace
@@ -25,11 +25,11 @@ from support.tolerance import ROUNDING
 
 FEW = settings(max_examples=40, derandomize=True, suppress_health_check=list(HealthCheck))
 
-#: No body may be further beyond a rigid stop, relative to the displacements that add up to its position.
+#: Largest penetration of a rigid stop, over the displacements that add up to its position.
 PENETRATION = 1e-12
-#: Of the energies integrated by quadrature, relative to all energy that was turned over.
+#: Error of the energies integrated by quadrature, over the turnover of energy.
 TURNOVER = 1e-12
-#: The same of contacts with power laws, which are followed to a tolerance of 1e-10 at each of their segments.
+#: The same for contacts with power laws, which are solved to a tolerance of 1e-10 in each of their segments.
 TURNOVER_POWER = 1e-8
 
 fractions = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=6)
@@ -39,7 +39,7 @@ def assert_same(scene: Scene, one: Run, other: Run, times: list[float]) -> None:
     if IMPACT_LIMIT not in (
         one.ended,
         other.ended,
-    ):  # which of two takes one bounce more is for rounding to say
+    ):  # rounding decides which of two runs has one more bounce
         assert one.times == other.times
     for time, difference, allowed in apart(scene, one, other, times):
         assert difference <= allowed, f"at {time} s apart by {difference:.3g}, allowed {allowed:.3g}"
@@ -110,7 +110,7 @@ def rescaled(scene: Scene, mass: float, length: float, time: float) -> Scene:
 
 scales = st.integers(-8, 8).map(
     lambda n: 4.0**n
-)  # powers of 4: their roots are powers of 2, nothing is rounded
+)  # powers of 4: their roots are powers of 2, without rounding
 
 
 def in_old_units(run: Run, modes: int, mass: float, length: float, time: float) -> Run:
@@ -160,7 +160,7 @@ def test_the_order_in_which_stops_are_listed_does_not_matter(scene: Scene, order
 @FEW
 @given(scenes(forced=True), st.integers(1, 1000))
 def test_a_start_some_forcing_periods_later_changes_nothing(scene: Scene, periods: int) -> None:
-    # the phase of the force is all that time is; 2 pi is not a whole number of anything, so it is rounded once
+    # time enters only as the phase of the force; 2 pi is no whole number, so the phase is rounded once
     angle = 2.0 * np.pi * periods
     later = replace(scene, modes=replace(scene.modes, phase=scene.modes.phase + angle))
     one, other = follow(scene, grid(scene)), follow(later, grid(scene))
@@ -191,7 +191,7 @@ def test_no_body_is_beyond_a_rigid_stop_and_no_stop_pulls(scene: Scene) -> None:
 
 
 def stored(scene: Scene, body: Structure) -> float:
-    """Return the energy in the springs of the compliant stops, as deep as the body is in them, J."""
+    """Return the energy in the springs of the compliant stops at the current depth, J."""
     energy = 0.0
     for stop in scene.stops:
         sign = 1.0 if stop.side == "upper" else -1.0
@@ -205,7 +205,7 @@ def stored(scene: Scene, body: Structure) -> float:
 @FEW
 @given(scenes(forced=False))
 def test_without_a_force_energy_never_grows_under_any_law(scene: Scene) -> None:
-    # a stop's force F takes F d'; K d^n d' of it is stored, the rest is lost: F <= K d^n on the way out
+    # of a stop's power F d', K d^n d' is stored, the rest is lost: F <= K d^n on the way out
     with scene.body() as body:
         before = start = body.energy + stored(scene, body)
         for time in grid(scene, 100):
@@ -227,7 +227,7 @@ def test_a_surface_that_takes_time_to_come_back_gives_no_energy_either(scene: Sc
         for end in grid(scene, 100):
             if body.advance(end - body.time, most_impacts=MOST_IMPACTS) != DONE:
                 break
-            # while a stop is pressed, or its surface is on the way back, part of the energy is there
+            # a pressed stop, or one whose surface is on the way back, holds part of the energy
             if all(status in ("free", "touching", "held") for status in body.statuses):
                 assert body.energy <= before + TURNOVER_POWER * start
                 before = body.energy
@@ -248,7 +248,7 @@ def test_all_energy_is_accounted_for(scene: Scene) -> None:
             assert body.damping_loss >= loss - ROUNDING * turnover
             work, loss, contact = body.forcing_work, body.damping_loss, body.contact_loss
             balance = body.energy - first - (work - loss - contact)
-            # a body that is put on its stop to the last bit moves by a rounding of its displacements
+            # placing a body on its stop to the last bit moves it by a rounding of its displacements
             rounding = ROUNDING * scene.speed**2
             assert (
                 abs(balance) <= (TURNOVER_POWER if power else TURNOVER) * (turnover + body.energy) + rounding
@@ -263,7 +263,7 @@ vectors = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
 def test_the_impulse_of_compliant_stops_is_the_momentum_that_the_body_lost(
     scene: Scene, one: Array, two: Array, velocity: Array
 ) -> None:
-    # modes without springs or dashpots: nothing but the stops changes their momenta
+    # modes without springs or dashpots: only the stops change their momenta
     one[0] += 1.5
     two[1] += 1.5
     shapes = (one, -two, two)
@@ -300,7 +300,7 @@ def test_elastic_hertz_stops_only_lend_energy(scene: Scene) -> None:
 @FEW
 @given(scenes(RIGID, forced=False), st.floats(0.3, 0.9))
 def test_elastic_stops_conserve_energy_also_when_several_are_hit_at_once(scene: Scene, gap: float) -> None:
-    # every stop twice, and all at the start: joint impulses from the first instant on
+    # every stop twice, and all touched at the start: joint impulses from the first instant on
     elastic = [replace(stop, restitution=1.0, yield_velocity=0.0) for stop in scene.stops]
     undamped = replace(scene, modes=Modes(scene.modes.natural), stops=tuple(elastic + elastic[:1]))
     with undamped.body() as body:

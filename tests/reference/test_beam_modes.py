@@ -18,11 +18,11 @@ from vibroimpact.fmus.core.modes import BOUNDARIES, Array, residual_vectors
 
 ENDS = sorted(BOUNDARIES)
 MODES = 64
-#: Ends and middle, places where reduction of the argument is easy and hard, and just inside of both ends.
+#: Ends and middle, places with easy and with hard reduction of the argument, and just inside of both ends.
 POINTS = [0.0, 1e-3, 0.1, 0.25, 0.3, 0.5, 0.61803398874989, 0.7, 0.9, 0.97, 0.999, 1.0]
-#: A table with 8 decimals.
+#: Error of a table with 8 decimals.
 PRINTED_8 = 5.1e-9
-#: Sum of 400 terms against an integral that is exactly 0 or 1: some 1e-14 are the weights' own.
+#: Error of a sum of 400 terms for an integral that is exactly 0 or 1: the weights have some 1e-14 each.
 QUADRATURE = 2e-13
 
 
@@ -42,8 +42,8 @@ def test_eigenvalues_of_64_modes_are_the_doubles_nearest_to_the_roots(boundary: 
 @pytest.mark.parametrize("boundary", ENDS)
 @pytest.mark.parametrize("derivative", [0, 1, 2, 3])
 def test_shapes_of_64_modes_keep_their_digits(boundary: Any, derivative: int) -> None:
-    # reference: cosh - cos - sigma (sinh - sin) in 120 digits, in which 87 cancel for mode 64. The project asks
-    # for 1e-13; the argument xi s is reduced without rounding, so that a few roundings are all that is left
+    # reference: cosh - cos - sigma (sinh - sin) in 120 digits, of which 87 cancel for mode 64. The project requires
+    # 1e-13; the argument xi s is reduced without rounding, so that only a few roundings are left
     modes = beam_modes(boundary, MODES)
     scaled = modes.shapes(POINTS, derivative) / modes.eigenvalues**derivative
     errors = [
@@ -92,7 +92,7 @@ def test_the_first_antinode_from_the_first_end_is_positive(boundary: Any) -> Non
 
 @pytest.mark.parametrize("boundary", ENDS)
 def test_shapes_and_curvatures_are_orthonormal(boundary: Any) -> None:
-    # equations.md 6.4, by Gauss's quadrature: exact but for rounding for these products
+    # equations.md 6.4, by Gauss's quadrature, which is exact for these products up to rounding
     s, weights = gauss()
     modes = beam_modes(boundary, MODES)
     for derivative in (0, 2):
@@ -110,7 +110,7 @@ def test_participation_is_the_integral_of_the_shape(boundary: Any) -> None:
 
 @pytest.mark.parametrize("boundary", ENDS)
 def test_effective_mass_fractions_sum_to_the_whole_mass(boundary: Any) -> None:
-    # equations.md 6.5: |participation| is at most 4 / xi, so that the rest after N modes is at most 16 / (pi^2 N)
+    # equations.md 6.5: |participation| is at most 4 / xi, so the remainder after N modes is at most 16 / (pi^2 N)
     for count in (5, 220, 2000):
         rest = 1.0 - float(np.sum(beam_modes(boundary, count).participation ** 2))
         assert 0.0 < rest <= 16.0 / (math.pi**2 * count)
@@ -178,7 +178,7 @@ def test_frequencies_and_stiffnesses_of_the_thesis_beams(name: str) -> None:
 
 
 def test_the_contact_mass_at_the_tip_is_the_mass_over_four_times_the_number_of_modes() -> None:
-    # equations.md 6.6: it tends to 0, so that a restitution coefficient means nothing without the number of modes
+    # equations.md 6.6: it tends to 0, so a restitution coefficient has no meaning without the number of modes
     for count in (1, 2, 7, MODES):
         tip = beam_modes("clamped_free", count).shapes(1.0)[0]
         assert 1.0 / float(tip @ tip) == 1.0 / (4.0 * count)
@@ -215,7 +215,7 @@ def test_supports_are_infinitely_stiff() -> None:
 
 
 def held_tip(count: int) -> Array:
-    """xi of the cantilever by Galerkin with its tip held: the stiffness on the complement of the tip's row."""
+    """Return xi of the cantilever with a held tip, by Galerkin: the stiffness on the complement of the tip's row."""
     modes = beam_modes("clamped_free", count)
     row = modes.shapes(1.0)
     complement = np.linalg.svd(row)[2][1:]
@@ -234,7 +234,7 @@ def test_holding_the_tip_of_a_cantilever_gives_the_clamped_pinned_beam_at_third_
 
 
 def timoshenko_drop(j: int, slenderness: float, e_over_g: float, shear: float) -> float:
-    """Exact drop of frequency j of the pinned-pinned Timoshenko beam beside Euler-Bernoulli's.
+    """Return the exact drop of frequency j of the pinned-pinned Timoshenko beam from Euler-Bernoulli's.
 
     With x = (w / w_0)^2 and r = (j pi slenderness)^2: E/(kap G) r^2 x^2 - (1 + r (1 + E/(kap G))) x + 1 = 0.
     """
@@ -294,7 +294,7 @@ def test_residual_vectors_are_the_best_of_what_many_more_modes_do(boundary: Any)
     stiffness, mass = (shapes * inverse**k @ shapes.T for k in (1, 2))
     values, vectors = eigh(stiffness, mass)
     found = residual_vectors(boundary, natural, points)
-    assert_allclose(found.eigenvalues**4, values, rtol=1e-6)  # the share of mass that is not summed
+    assert_allclose(found.eigenvalues**4, values, rtol=1e-6)  # the remaining share of mass outside of the sum
     places = np.linspace(0.0, 1.0, 41)
     expected = many.shapes(places)[:, natural:] * inverse @ shapes.T @ vectors
     signs = np.sign(np.sum(expected * found.shapes(places), axis=0))

@@ -1,4 +1,4 @@
-"""Scenes of every kind give the bits that version 0.2 gave: what is built otherwise must compute the same."""
+"""Scenes of every kind give the bits of version 0.2: a rebuilt part must compute the same."""
 
 from __future__ import annotations
 

@@ -10,15 +10,15 @@ from support.exact_modes import chain_modes as exact_modes
 from support.modes import ChainModes, chain_modes
 from support.tolerance import EPSILON, ROUNDING
 
-#: Frequencies and damping ratios of up to a dozen masses: a few roundings for each, of those some are the factor's
-#: entries sqrt(k/m) themselves.
+#: Relative error of frequencies and damping ratios of up to a dozen masses: a few roundings each. Some of them come
+#: from the factor's entries sqrt(k/m).
 FEW_MASSES = 3 * ROUNDING
-#: The same of 64 masses: the factors of the elimination have conditions of the order of 64.
+#: Relative error for 64 masses: the factors of the elimination have conditions of the order of 64.
 MANY_MASSES = 100 * EPSILON
 
 
 def graded(seed: int, masses: int, grounded: str) -> tuple[np.ndarray, np.ndarray]:
-    """Masses of 1e-9 to 1e9 kg and springs of 1e-5 to 1e15 N/m, the far one last."""
+    """Return masses of 1e-9 to 1e9 kg and springs of 1e-5 to 1e15 N/m, the far spring last."""
     random = np.random.default_rng(seed)
     m, k = 10 ** random.uniform(-9, 9, masses), 10 ** random.uniform(-5, 15, masses + 1)
     if grounded in ("near", "nowhere"):
@@ -33,7 +33,7 @@ def modes_of(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> ChainModes:
 
 
 def uniform(masses: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies and orthonormal shapes of equations.md 5.2 for m = k = 1, in 40 digits and rounded."""
+    """Return frequencies and orthonormal shapes of equations.md 5.2 for m = k = 1, in 40 digits and rounded."""
     with mp.workdps(40):
         angle = [(2 * j + 1) * mp.pi / (2 * masses + 1) for j in range(masses)]
         natural = [float(2 * mp.sin(a / 2)) for a in angle]
@@ -70,7 +70,7 @@ def test_uniform_chains_have_the_closed_form_to_the_last_digits(masses: int) -> 
 
 @pytest.mark.parametrize("masses", [2, 5, 31, 64])
 def test_the_solver_finds_the_closed_form_of_a_chain_that_is_all_but_uniform(masses: int) -> None:
-    # one mass heavier by one part in 2^52 is enough to take the general road
+    # one mass heavier by one part in 2^52 is enough for the general method
     m = np.ones(masses)
     m[0] += EPSILON
     found = chain_modes(m, [1.0] * masses, [0.1] * masses)
@@ -84,7 +84,7 @@ def test_the_solver_finds_the_closed_form_of_a_chain_that_is_all_but_uniform(mas
 @pytest.mark.parametrize("grounded", ["near", "far", "both", "nowhere"])
 def test_every_mode_of_a_graded_chain_is_right_to_a_few_roundings(grounded: str) -> None:
     # reference: eigenvectors of M^-1/2 K M^-1/2 in 80 digits. In doubles that matrix has lost all but the largest
-    # frequencies; damping c = k / 1000 s, so that ratios are w / 2000
+    # frequencies. Damping c = k / 1000 s gives the ratios w / 2000
     for seed in range(15):
         masses = 2 + seed % 11
         m, k = graded(seed, masses, grounded)
@@ -105,15 +105,15 @@ def test_sixty_four_masses_over_eighteen_decades_keep_all_frequencies() -> None:
     m, k = graded(0, 64, "near")
     found = modes_of(m, k, 1e-3 * k)
     assert found.natural[-1] / found.natural[0] > 1e17
-    # as many exact frequencies are below each of these as are right, and one more a few roundings above it
+    # an exact count checks each frequency: j of them lie a few roundings below it, and j + 1 a few roundings above it
     for j, natural in enumerate(found.natural):
         assert frequencies_below(m, k, float(natural), 1.0 - MANY_MASSES) == j
         assert frequencies_below(m, k, float(natural), 1.0 + MANY_MASSES) == j + 1
 
 
 def test_small_masses_among_large_ones_keep_the_digits_of_their_displacements() -> None:
-    # beside the mode's largest displacement; as components of a unit vector in sqrt(mass) they would keep 7 digits.
-    # What is left (6e-14 here) are modes in which a small mass is all but in resonance
+    # errors are relative to the mode's largest displacement; components of a unit vector in sqrt(mass) keep only 7
+    # digits. The remaining error (6e-14 here) belongs to modes in which a small mass is almost in resonance
     for seed in range(40):
         random = np.random.default_rng(seed)
         masses = 2 + seed % 7
@@ -135,7 +135,7 @@ def test_masses_without_a_spring_to_the_ground_move_as_one() -> None:
 
 
 def exact_damping(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Psi' C Psi in 80 digits."""
+    """Return Psi' C Psi in 80 digits."""
     _, vectors = exact_modes(m, k)
     n = len(m)
     with mp.workdps(80):
@@ -149,7 +149,7 @@ def exact_damping(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("grounded", ["near", "both"])
 def test_the_modal_damping_matrix_of_any_dampers_keeps_its_digits(grounded: str) -> None:
-    # relative to the damping rates of the two modes that an entry couples
+    # relative to the damping rates of the two modes coupled by an entry
     for seed in range(8):
         m, k = graded(seed, 2 + seed, grounded)
         c = k * 10 ** np.random.default_rng(seed).uniform(-4, -2, len(k))

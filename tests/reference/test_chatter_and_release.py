@@ -59,7 +59,7 @@ def test_the_summed_tail_takes_up_the_momentum_of_its_impacts() -> None:
         rows = o.rows()
     impacts, stick = rows[rows[:, 0] == 1.0], rows[rows[:, 0] == 2.0][0]
     velocities = impacts[:, 3]
-    # below V the sequence is geometric: the rest of its momentum is m (1 + r) V r / (1 - r)
+    # below V the sequence is geometric: its remaining momentum is m (1 + r) V r / (1 - r)
     assert abs(stick[4] / (1.7 * velocities[-1] * 0.7 / 0.3) - 1.0) <= 1e-3
     assert np.all(np.diff(velocities) < 0.0)
 

@@ -1,6 +1,6 @@
-"""A body and a stop that yields, as two FMUs, keep the interface energy and move as one FMU does.
+"""A body and a compliant stop, as two FMUs, conserve the interface energy and move like one FMU.
 
-Closed forms: equations.md 6.9 (a spring and a dashpot, letting go where the force is zero) and 6.10.
+Closed forms: equations.md 6.9 (a spring and a dashpot, with separation at zero force) and 6.10.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from vibroimpact.orchestrator.run.fused import BodyDriver
 
 MIXED = [(b, s) for b in VERSIONS for s in VERSIONS]
 EXACT = 1e-12
-"""Of one contact with a linear stop: some thirty roundings of the flow."""
+"""Relative energy error of one contact with a linear stop: some thirty roundings of the flow."""
 REPORTED = 1e-9
-"""Of the residual against the energy that is really gained, as parts of the energy of the impact."""
+"""Largest difference between the residual and the energy really gained, over the energy of the impact."""
 
 
 # ---- the requirement ----
@@ -38,7 +38,7 @@ def test_an_elastic_contact_at_thirty_steps_keeps_its_energy(
 
 
 def test_a_plain_importer_creates_the_energy_that_this_one_does_not() -> None:
-    # held forces, no events, thirty steps per contact: each step multiplies the energy by 1 + (w H)^2 / 2 and more
+    # held forces, no events, thirty steps per contact: each step multiplies the energy by at least 1 + (w H)^2 / 2
     assert plain_energy_error("jacobi", 30) > 0.6
     assert plain_energy_error("gauss_seidel", 30) > 0.15
     # first order: ten times the steps leave a tenth of it
@@ -73,7 +73,7 @@ def test_the_error_of_a_nonlinear_stop_falls_faster_than_the_second_power_of_the
 def test_the_reported_residual_is_the_energy_gained(
     versions: tuple[str, str], slopes: bool, steps: float
 ) -> None:
-    # an elastic stop keeps all energy, so what the mass has too much is what the exchange has added
+    # an elastic stop stores all energy: any excess of the mass comes from the exchange
     error, residual = contact_energy_error(
         "hertz", LAWS["hertz"], versions=versions, slopes=slopes, contact_steps=steps
     )
@@ -91,14 +91,14 @@ def test_the_residual_of_a_stop_below_is_that_of_its_mirror_image(side: str) -> 
     run.importer.free()
 
 
-# ---- stops that answer with a force alone ----
+# ---- stops that return only a force ----
 
 
 @pytest.mark.parametrize("versions", MIXED, ids="+".join)
 def test_a_stop_without_slopes_keeps_energy_by_repeated_steps(versions: tuple[str, str]) -> None:
     spring, _ = contact_energy_error("kelvin_voigt", {"stiffness": 1e4}, versions=versions, slopes=False)
     ball, _ = contact_energy_error("hertz", LAWS["hertz"], versions=versions, slopes=False)
-    assert abs(spring) <= EXACT  # the straight line through its answers is the spring
+    assert abs(spring) <= EXACT  # the straight line through its answers equals the spring
     assert abs(ball) <= 1e-2
 
 
@@ -116,7 +116,7 @@ def test_a_stop_without_slopes_converges_to_the_one_with() -> None:
     assert errors[2] < errors[0] / 100.0
 
 
-# ---- when the contact begins and ends ----
+# ---- the begin and the end of a contact ----
 
 
 @pytest.mark.parametrize("versions", MIXED, ids="+".join)
@@ -144,7 +144,7 @@ def test_entry_exit_and_restitution_of_a_dashpot_are_those_of_the_closed_form(
     restitution, lasts = math.exp(-ratio * angle), angle / w
     assert began == pytest.approx(0.75, abs=1e-14)
     assert -velocity == pytest.approx(restitution, rel=1e-11)
-    # it leaves where the force is zero: k y + c v = 0 at y = c e / k beyond the surface
+    # separation is at zero force: k y + c v = 0 at y = c e / k beyond the surface
     at_exit = 1.0 + 2.0 * ratio * restitution / w
     assert 1.5 + (displacement - at_exit) / restitution == pytest.approx(0.75 + lasts, abs=1e-12)
 
@@ -207,7 +207,7 @@ def both(law: str, parameters: dict[str, float], **settings: object) -> tuple[np
 def test_coupled_is_fused_for_a_spring_and_a_dashpot(damping: float, macro_step: float) -> None:
     fused, apart = both("kelvin_voigt", {"stiffness": 1e3, "damping": damping}, macro_step=macro_step)
     assert len(fused) == len(apart) > 20
-    # every communication point in the flight before is a rounding of the state, and of absolute time
+    # every communication point in the flight before adds a rounding of the state, and of absolute time
     assert np.abs(fused[:, 1:] - apart[:, 1:]).max() <= 2e-12
     assert np.abs(fused[:, 0] - apart[:, 0]).max() <= 2e-12
 
@@ -219,7 +219,7 @@ def test_coupled_is_fused_for_a_nonlinear_stop_within_its_order(law: str) -> Non
     )
     assert len(fused) == len(apart) > 20
     assert np.abs(fused[:, [0, 2, 3]] - apart[:, [0, 2, 3]]).max() <= 1e-3
-    # energies: what each impact takes from the mass
+    # energies that each impact takes from the mass
     taken = [rows[:, 2] ** 2 * (1.0 - rows[:, 5] ** 2) for rows in (fused, apart)]
     assert np.abs(taken[0] - taken[1]).max() <= 1e-3 * float((fused[:, 2] ** 2).max())
 
@@ -228,6 +228,6 @@ def test_a_restitution_that_falls_with_speed_is_the_same_coupled_and_fused() -> 
     fused, apart = both("restitution", {"restitution": 0.7, "yield_velocity": 0.1})
     assert len(fused) > 20
     np.testing.assert_array_equal(fused, apart)
-    # it is one that falls: (V / yield_velocity)^(-1/4)
+    # the restitution falls with speed: (V / yield_velocity)^(-1/4)
     fast = fused[fused[:, 2] > 0.2]
     np.testing.assert_allclose(fast[:, 5], 0.7 * (fast[:, 2] / 0.1) ** -0.25, rtol=1e-14)

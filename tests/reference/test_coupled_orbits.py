@@ -1,4 +1,4 @@
-"""A body and a stop as two FMUs move as one FMU does, and as the closed form says, at any macro step."""
+"""A body and a stop as two FMUs move like one FMU, and like the closed form, at any macro step."""
 
 import math
 import re
@@ -29,7 +29,7 @@ from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
 PERIOD = 2.0 * math.pi
 ORBIT = 1e-12
-"""Of the orbit at any macro step: what the issue promises, 1e-12."""
+"""Largest error of the orbit at any macro step, from the issue: 1e-12."""
 TIME, PHASE, SPEED, CONTACT = 0, 1, 2, 4
 """Columns of a record's impacts."""
 
@@ -76,7 +76,7 @@ def test_the_coupled_orbit_does_not_depend_on_the_exchange(versions: tuple[str, 
 
 
 def example(name: str, periods: int, macro_step: float | None = None) -> Scene:
-    """Return a shipped scene with so many recorded periods, without samples; its macro step makes it coupled."""
+    """Return a shipped scene with `periods` recorded periods, without samples; a macro step makes it coupled."""
     text = (EXAMPLES / name).read_text(encoding="utf-8")
     text = re.sub(r"recorded_periods = \d+", f"recorded_periods = {periods}", text)
     text = re.sub(r"time_series = .*", "", text)
@@ -107,7 +107,7 @@ def assert_same_motion(one: RunRecord, other: RunRecord, tolerance: float = SEQU
     assert np.nanmax(around, initial=0.0) <= tolerance
     assert np.abs(a[:, SPEED] - b[:, SPEED]).max(initial=0.0) <= tolerance
     assert np.array_equal(a[:, CONTACT], b[:, CONTACT])
-    # absolute times are rounded at their own size
+    # rounding of an absolute time is relative to the time
     assert np.all(np.abs(a[:, TIME] - b[:, TIME]) <= tolerance * (1.0 + np.abs(a[:, TIME])))
     assert one.outcome is other.outcome
 
@@ -140,7 +140,7 @@ def test_every_shipped_scene_of_the_short_form_is_compared() -> None:
 @pytest.mark.parametrize("name", SHORT_FORM)
 def test_a_thousand_impacts_coupled_are_those_of_the_fused_body(name: str) -> None:
     for point in SHORT_FORM[name]:
-        # at least one impact in two periods; chatter has forty in one
+        # at least one impact in two periods; chatter has forty per period
         periods = 50 if name == "chatter.toml" else 2010
         fused = run(example(name, periods), "fused", point)
         coupled = run(example(name, periods), "coupled", point)
@@ -165,7 +165,7 @@ def test_a_thousand_impacts_are_the_same_with_communication_points_between_them(
 
 @pytest.mark.parametrize("transient", [1000, 1001, 1002])
 def test_no_row_is_lost_wherever_an_impact_fills_the_record(transient: int) -> None:
-    """Rows of impacts are written between steps, those of periods in them: either may be the last there is room for."""
+    """Impacts are written between steps, periods within steps: a row of either kind may be the last that fits."""
     scene = example("bifurcation.toml", 900)
     scene = scene.model_copy(
         update={"record": scene.record.model_copy(update={"transient_periods": transient})}
@@ -281,7 +281,7 @@ recorded_periods = 20000
 
 def test_in_chaos_the_first_ten_impacts_agree_and_then_the_statistics() -> None:
     fused = run(parse_scene(CHAOS, "chaos.toml"), "fused", {})
-    # communication points that the fused run has not: other roundings, and soon another orbit
+    # the fused run lacks these communication points: other roundings, and soon another orbit
     text = f'{CHAOS}[execution]\nhow = "coupled"\nmacro_step = 1.9\n'
     coupled = run(parse_scene(text, "chaos.toml"), "coupled", {})
     a, b = impacts_of(fused), impacts_of(coupled)
@@ -289,7 +289,7 @@ def test_in_chaos_the_first_ten_impacts_agree_and_then_the_statistics() -> None:
         b[:10], rel=0.0, abs=1e-10, nan_ok=True
     )  # a rigid stop has no largest force
     shorter = min(len(a), len(b))
-    assert np.abs(a[:shorter, SPEED] - b[:shorter, SPEED]).max() > 0.1  # it is chaos
+    assert np.abs(a[:shorter, SPEED] - b[:shorter, SPEED]).max() > 0.1  # the motion is chaotic
     assert abs(len(a) / len(b) - 1.0) <= 0.02
     assert abs(a[:, SPEED].mean() / b[:, SPEED].mean() - 1.0) <= 0.02
     assert abs(a[:, SPEED].std() / b[:, SPEED].std() - 1.0) <= 0.02

@@ -1,4 +1,4 @@
-"""Free decays recorded in laboratories, against what was published of them or checked by hand before."""
+"""Free decays recorded in laboratories, against published results or earlier checks by hand."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def test_the_published_fit_of_the_pendulum_is_found_again() -> None:
     assert fit.angular_frequency.value == pytest.approx(4.4348, abs=0.0002)
     assert fit.decay_rate.value == pytest.approx(0.0247, abs=0.0001)
     assert fit.offset.value == pytest.approx(438.7, abs=0.1)
-    # The published amplitude is that of the first sample of the window, at 40.023 s, not of t = 0 or 40.
+    # The published amplitude belongs to the first sample of the window, at 40.023 s, not to t = 0 or 40.
     at_first_sample = fit.amplitude.value * np.exp(-fit.decay_rate.value * (samples.time[0] - 40.0))
     assert at_first_sample == pytest.approx(57.78, abs=0.005)
-    # The residual is coloured: the errors are well above those of white noise (.000060 rad/s), and said to be.
+    # The residual is coloured: the errors are well above those of white noise (.000060 rad/s), and the fit says so.
     assert fit.angular_frequency.standard_error > 2.0 * 0.00006
     assert not fit.test.adequate
 
@@ -62,13 +62,13 @@ def test_no_damping_law_fits_the_whole_pendulum_and_the_sum_of_all_three_is_the_
     assert "viscous + Coulomb + quadratic has the lowest AIC" in words
     assert "none of the laws is adequate" in words
     assert "AIC assumes white residuals" in words
-    # Samples taken 28 to a period of a residual that lasts for many are worth a hundredth.
+    # A residual that lasts for many periods, sampled 28 times in each, is worth a hundredth of its samples.
     assert choice.effective_samples < 0.05 * len(choice.best.fitted)
 
 
 @pytest.mark.parametrize("trial", ["a0", "a1"])
 def test_the_circuit_board_is_slower_at_large_amplitudes(trial: str) -> None:
-    # Checked by hand before: 800 Hz at 350 g, 807 Hz below 26 g, damping ratio about .010.
+    # Earlier check by hand: 800 Hz at 350 g, 807 Hz below 26 g, damping ratio about .010.
     samples = board(trial, 0.012)
     found = backbone(samples)
     hertz = found.angular_frequency / (2.0 * np.pi)

@@ -1,4 +1,4 @@
-"""What a study says of its own reference holds against the same motion in 40 digits: of every kind that is known so."""
+"""The estimated error of a study's reference holds against the same motion in 40 digits, for each solvable kind."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def oscillator(stop: dict[str, Any], **changes: Any) -> dict[str, Any]:
 
 
 def graze(excess: float) -> dict[str, Any]:
-    """Start at rest at the far side of a free swing whose peak is beyond the stop by so much."""
+    """Return a scene that starts at rest at the far side of a free swing; its peak exceeds the stop by `excess`."""
     with mp.workdps(DIGITS):
         peak = mp.exp(-mp.mpf("0.1") * mp.pi / mp.sqrt(1 - mp.mpf("0.01")))
     body = {"mass": 1.0, "stiffness": 1.0, "damping": 0.2, "displacement_start": -1.0}
@@ -119,7 +119,7 @@ def test_the_estimated_error_of_a_reference_holds_in_40_digits(name: str) -> Non
     law = {key: value for key, value in tables["stop"][0].items() if key != "law"}
     body = beam(tables) if "kind" in tables["body"] else mass(tables)
     motion = ExactMotion(body, ExactStop(**law))
-    # from time 0: a run has all impacts, of which the study compares those that it records
+    # from time 0: such a run has all impacts, and the study compares only the recorded ones
     whole = scene.with_values(
         {
             "record.recorded_periods": scene.record.recorded_periods + scene.record.transient_periods,

@@ -1,4 +1,4 @@
-"""What the estimates must reach on the synthetic example of thesis 4.2.5, and that their intervals are honest."""
+"""Required accuracy of the estimates for the synthetic example of thesis 4.2.5, and coverage of their intervals."""
 
 from functools import cache
 
@@ -10,12 +10,12 @@ from vibroimpact.analysis.estimation import Known, estimate_impacts
 
 NOISE = 0.01
 NOMINAL = 0.95
-FEW = 16  # records, where `make soak` has 30 or 40
+FEW = 16  # records; `make soak` has 30 or 40
 
 
 @cache
 def estimate_of(case, seed):
-    """Return the estimate from one of the records of a case, which differ in their noise."""
+    """Return the estimate from one record of a case; records differ in their noise."""
     parameters, known, methods, forcing = CASES[case]
     record = record_of(parameters, periods=8)
     return estimate_impacts(
@@ -36,7 +36,7 @@ def test_restitution_with_damping_known_is_within_a_half_percent_on_average(coun
     # 100 samples in a period, noise of 1 % of the peak, 30 draws; one record is eight periods
     values = values_of(estimates_of("damping and stop known", count), "energy_known_damping", "restitution")
     assert abs(np.mean(values) - 0.89) < 0.005
-    # and each draw by itself
+    # each draw by itself is as good
     assert np.max(np.abs(values - 0.89)) < 0.005
 
 
@@ -54,7 +54,7 @@ def test_joint_estimates_are_within_the_targets_on_average(count):
 
 
 def covered(case, count):
-    """Return how many intervals hold the truth, and how many there are, by method and quantity."""
+    """Return the share of the intervals that contain the truth, by method and quantity."""
     parameters, known, methods, forcing = CASES[case]
     record = record_of(parameters, periods=8)
     counts = {}
@@ -64,7 +64,7 @@ def covered(case, count):
     for one in estimates_of(case, count):
         for method, values in one.values.items():
             for quantity, estimate in values.items():
-                # speeds and loss factor are of the noiseless record; the others are its parameters
+                # speeds and loss factor come from the noiseless record; the other truths are its parameters
                 truth = getattr(record.truth, quantity, None)
                 if truth is None:
                     truth = exact[method if method in exact else "weak_form"][quantity].value
@@ -72,7 +72,7 @@ def covered(case, count):
                     truth += 2.0 * np.pi * round((estimate.value - truth) / (2.0 * np.pi))
                 hits, total = counts.get((method, quantity), (0, 0))
                 counts[method, quantity] = hits + estimate.covers(truth), total + 1
-    # a method that refuses some of the records has chosen the others
+    # a method that refuses some records has selected the others
     return {key: hits / total for key, (hits, total) in counts.items() if total >= 0.95 * count}
 
 
@@ -103,7 +103,7 @@ CASES = {
 def test_intervals_hold_the_truth_in_most_records(case, count, least):
     shares = covered(case, count)
     assert len(shares) >= 8
-    # 34 or fewer of 40, or 12 or fewer of 16, would be seen once in 150 times; `make coverage` asks 300 of all kinds
+    # 34 or fewer of 40, or 12 or fewer of 16, happen once in 150 times; `make coverage` runs 300 records of all kinds
     for key, share in shares.items():
         assert share >= least / count, (key, share)
     assert abs(np.mean(list(shares.values())) - NOMINAL) < 0.04 * np.sqrt(40 / count)

@@ -49,7 +49,7 @@ def test_the_flow_keeps_its_digits_in_every_regime_and_at_resonance(
     body = (1.0, 2.0 * zeta, 1.0, 0.8, w)
     found = flow(Oscillator(*body), (0.2, -0.5), duration, phase=0.4 * w)
     exact = exact_flow(Exact(*body), (0.2, -0.5), duration, 0.4 * w)
-    # what is added up: state, force; the forcing's phase w u turns with its own rounding
+    # the sum has state and force; the forcing's phase w u has its own rounding
     scale = 1.0 + 0.1 * w * duration
     assert abs(float(found[0] - exact[0])) <= FLOW * scale
     assert abs(float(found[1] - exact[1])) <= FLOW * scale

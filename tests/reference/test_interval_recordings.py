@@ -13,7 +13,7 @@ from vibroimpact.analysis.intervals.variability import coefficient_of_variation,
 Floats = NDArray[np.float64]
 
 SEAM, GRID = 3600.0, 0.02322
-"""Where the audio of the bounces was joined, and the frames of its beat tracker, s."""
+"""Time of the joint in the audio of the bounces, and frame length of its beat tracker, s."""
 
 
 def retina(name: str) -> Floats:
@@ -26,7 +26,7 @@ def bounces() -> Floats:
     return np.loadtxt(recording_folder("ttd_bounces") / "ttd-world-record_beats.csv")
 
 
-# numbers of the recording's notes: worked out once from the file, with plain histograms
+# numbers of the recording's notes: computed once from the file, with plain histograms
 @pytest.mark.parametrize(
     ("name", "fano", "hertz", "variation"),
     [("SpikesLow", 0.7165, 25.0, 0.9642), ("SpikesHigh", 1.7781, 32.3, 2.0218)],
@@ -37,7 +37,7 @@ def test_a_neuron_has_its_rate_its_variation_and_its_fano_factor(
     train = interval_train(retina(name), window=(0.0, 30.0))
     found = fano_factor(train, 0.05)
     assert found.value == pytest.approx(fano, abs=6e-5)
-    # it moves by a few percent with the offset of the bins, and the report says how far
+    # the value changes by a few percent with the offset of the bins; the report gives the range
     assert found.lowest < found.value < found.highest < 1.1 * found.value
     assert rate(train)[0] == pytest.approx(hertz, abs=1e-9)
     assert coefficient_of_variation(train) == pytest.approx(variation, abs=6e-5)
@@ -50,7 +50,7 @@ def test_a_neuron_is_noise_on_log_intervals_and_raw_ones_flatten_as_their_surrog
     embedding = report["embedding"].values
     assert np.all(report["slope_log"].values >= 0.83 * embedding)
     assert np.all(np.abs(report["slope_raw"] - report["surrogate_slope_raw"]).values < 0.25)
-    # what would be called a dimension without the surrogate
+    # without the surrogate this would be called a dimension
     assert float(report["slope_raw"][-1]) < 0.75 * 6.0
     assert report.attrs["dimension_log"].startswith("no saturation: noise-like")
     assert "surrogate" in report.attrs["dimension_raw"]
@@ -79,7 +79,7 @@ def test_without_masks_the_gaps_are_the_five_seams_and_24_intervals_are_distinct
     report = interval_report(times, resolution=GRID)
     beginnings, lengths = report["gap_start"].values, report["gap_length"].values
     seam = SEAM * np.arange(1, 6)
-    # the beats of the tracker end a little before the seam and begin again a little after it
+    # the tracker's beats end a little before the seam and start again a little after it
     assert np.all((beginnings < seam) & (beginnings + lengths > seam))
     assert "only 24 distinct intervals" in report.attrs["dimension_log"]
 
@@ -95,7 +95,7 @@ def test_every_gap_is_found_where_beats_are_taken_out_at_random(part: float) -> 
         train = interval_train(times[kept], masked=spans)
         true = (np.diff(kept) > 1) & train.kept
         gaps = find_gaps(train)
-        # none missed, and no false alarm either
+        # no gap is missed, and there is no false alarm
         assert np.array_equal(gaps.place, np.flatnonzero(true))
         right = gaps.missing == np.diff(kept)[gaps.place] - 1
         assert np.mean(right) > 0.99

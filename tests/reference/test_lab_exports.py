@@ -1,4 +1,4 @@
-"""Small exports in the manner of instruments and loggers, kept beside the checkout: each has one right reading."""
+"""Small exports in the style of instruments and loggers, next to the checkout: each has one right reading."""
 
 from __future__ import annotations
 

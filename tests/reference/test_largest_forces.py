@@ -13,11 +13,11 @@ import vibroimpact as vi
 
 SPEED = 0.8
 AGREEMENT = {"fused": 1e-9, "coupled": 3e-5}
-"""Coupled: what 30 steps of a contact leave of a force that is no line."""
+"""Error of a coupled run: 30 steps of a contact resolve a nonlinear force to this part."""
 
 
 def largest_force(law: str, parameters: dict[str, float], how: str, mass: float = 2.0) -> float:
-    """Return the one of the only contact of a mass that flies freely."""
+    """Return the largest force of the single contact of a free mass."""
     scene = {
         "body": {"mass": mass, "stiffness": 0.0, "velocity_start": SPEED},
         "stop": [{"law": law, "position": 0.3, **parameters}],
@@ -35,7 +35,7 @@ def test_a_spring_and_a_dashpot_have_the_force_of_the_closed_form(ratio: float, 
     mass, stiffness = 2.0, 1e4
     rate = math.sqrt(stiffness / mass)
     damping = 2.0 * ratio * rate * mass
-    if ratio >= 0.5:  # it falls from the touch-down on
+    if ratio >= 0.5:  # the force falls from the touch-down on
         expected = damping * SPEED
     else:
         root = math.sqrt(1.0 - ratio**2)
@@ -88,12 +88,12 @@ SOFT = {
     "hertz": {"stiffness": 3e4},
     "hunt_crossley": {"stiffness": 3e4, "damping": 0.2, "exponent": 1.5},
 }
-"""Stops on which the light mass swings while the heavy one presses it there."""
+"""Stops on which the light mass swings while the heavy mass presses it there."""
 
 
 @pytest.mark.parametrize("law", SOFT)
 def test_a_contact_of_several_humps_has_the_largest_of_them(law: str) -> None:
-    """A light mass meets the stop, and a heavy one behind it presses it there: dense samples see all humps."""
+    """A light mass meets the stop, and a heavy mass behind it presses it there: dense samples show all humps."""
     scene = {
         "body": {"kind": "chain", "masses": [1.0, 0.05], "stiffnesses": [1.0, 400.0], "dampings": [0.0, 0.5]}
         | {"velocity_start": [1.0, 1.0]},

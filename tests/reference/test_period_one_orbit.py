@@ -39,7 +39,7 @@ def test_a_million_impacts_later_the_time_of_the_last_one_is_that_of_its_period_
     with OscillatorFmu(SCENE) as o:
         o.step((MILLION + 1) * PERIOD)
         time, count = o.contact("last_time", "count")
-    # 2 pi in 33 digits: MILLION times the double 2 pi alone would be wrong by 2.4e-10
+    # 2 pi in 33 digits: MILLION times the double 2 pi alone has an error of 2.4e-10
     period = (6.283185307179586232, 2.449293598294706414e-16)
     exact = math.fsum([PHASE, count * period[0], count * period[1]])
     assert abs(time - exact) <= 2 * math.ulp(exact)
@@ -81,7 +81,7 @@ def test_every_stable_closed_form_orbit_is_an_orbit_of_the_fmu(part: int) -> Non
             count, phase, velocity = o.contact("count", "last_phase", "last_velocity")
         case = f"zeta={zeta} w={w} F={force} r={r}: {orbit}"
         assert count == 40, case
-        # 1 / velocity: a phase is a displacement's rounding over the velocity it is crossed with
+        # 1 / velocity: the error of a phase is a displacement's rounding over the velocity
         bound = 20 * ORBIT * (1.0 + 1.0 / orbit.velocity) / (1.0 - orbit.multiplier)
         assert abs(math.remainder(phase - orbit.phase, 2.0 * math.pi)) <= bound, case
         assert abs(velocity - orbit.velocity) <= bound, case

@@ -1,6 +1,6 @@
 """Recordings of laboratories, imported: the facts that were found by hand in each, and its traps.
 
-The numbers are those of the notes beside the recordings, and of plain `numpy.loadtxt` on the files.
+The numbers come from the notes next to the recordings, and from plain `numpy.loadtxt` on the files.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def test_base_and_board_of_a_shock_have_their_own_triggers_and_the_board_is_clip
     assert counted(recording, "base", Quality.clipped) == 0
     extremes = board.values[board.quality == int(Quality.clipped)]
     np.testing.assert_allclose(np.abs(extremes), 546.5, atol=0.1)
-    told = "\n".join(recording.remarks)
-    assert "base: rests at -1.1" in told
-    assert "the lag between their time axes is not known" in told
+    remarks = "\n".join(recording.remarks)
+    assert "base: rests at -1.1" in remarks
+    assert "the lag between their time axes is not known" in remarks
 
 
 def test_the_header_of_the_second_board_gives_the_interval_that_its_instants_are_too_short_for() -> None:
@@ -94,11 +94,11 @@ def test_the_shaker_s_conflicting_clocks_are_told_with_their_uncertainty(impact:
         assert channel.axis.interval_uncertainty == pytest.approx(0.033, abs=5e-4)
         assert not channel.quality.any()
         assert channel.unit == "1"
-    told = "\n".join(recording.remarks)
-    assert "0.000586, 0.000606 s an interval in the header, 0.000605 s in the column of instants" in told
-    assert "uncertain by 3.3%" in told
-    assert "unit s, which is that of time: not believed" in told
-    # the command is a sine of 5 Hz, within what its clocks leave open
+    remarks = "\n".join(recording.remarks)
+    assert "0.000586, 0.000606 s an interval in the header, 0.000605 s in the column of instants" in remarks
+    assert "uncertain by 3.3%" in remarks
+    assert "unit s, which is that of time: not believed" in remarks
+    # the command is a sine of 5 Hz, up to the difference of its clocks
     spectrum = np.abs(np.fft.rfft(command.values * np.hanning(len(command.values))))
     frequency = np.argmax(spectrum[1:]) + 1
     assert frequency * command.axis.rate / len(command.values) == pytest.approx(5.0, abs=0.165)

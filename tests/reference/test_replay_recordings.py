@@ -56,7 +56,7 @@ def test_one_mode_fitted_on_a_trial_predicts_another_better_if_it_follows_the_am
     assert own.counts["clipped"] + other.counts["clipped"] >= 26
     assert trust({"a0": own.variance}, {"a1": other.variance}).trusted
     bent, _, better = fitted_and_scored(linear.numbers | dict.fromkeys(SLOPES, 0.0), paths)
-    # the board rings lower while it rings hard: 800 Hz at 350 g, 807 below 26 g
+    # the board's frequency falls with its amplitude: 800 Hz at 350 g, 807 below 26 g
     assert bent.numbers["body.frequency_slope"] < -5.0 * bent.standard_error[3]
     assert better.variance >= 99.5
 
@@ -80,7 +80,7 @@ def test_a_linear_replay_of_the_package_says_that_it_is_not_to_be_trusted(tmp_pa
     assert not verdict.trusted
     assert "Do not trust this linear replay" in verdict.words
     assert scores.fitted["05.nc"] < 80.0
-    assert np.isnan(scores.others["00.nc"])  # no impact: nothing to be scored
+    assert np.isnan(scores.others["00.nc"])  # no impact, so there is no score
 
 
 def test_an_oscillator_replays_the_pendulum_with_the_published_numbers(tmp_path: Path) -> None:
@@ -107,9 +107,9 @@ def test_an_oscillator_replays_the_pendulum_with_the_published_numbers(tmp_path:
 @pytest.mark.parametrize(
     ("scene", "folder", "file", "settings", "least"),
     [
-        # the vibration moves the board with its base: any stiff beam reaches this, and the page says so
+        # the vibration moves the board with its base: any stiff beam reaches this, as the page says
         ("shaker", "shaker_vibration_plus_shock", "amp7_impact0.0_vib0.5.lvm", "shaker.toml", 98.0),
-        # from the start values of the scene, nothing fitted
+        # with the start values of the scene, without a fit
         ("pendulum_whole", "damped_pendulum", "pendolo_smorzato.txt", None, 80.0),
     ],
 )

@@ -1,4 +1,4 @@
-"""Intervals of a resonance that a random force drives, alone or beside another: the truth is that of the drawing."""
+"""Intervals of a resonance driven by a random force, alone or next to another: the drawn parameters are the truth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_intervals_of_a_resonance_that_is_sure_hold_the_truth(records: int, shar
         try:
             fit = fit_resonance(curve_of(frequency_response(*driven(modes, noise, rng))))
         except EstimationError:
-            assert len(modes) == 2  # the fit of one resonance to two may leave the band
+            assert len(modes) == 2  # a fit of one resonance to two may leave the band
             continue
         natural = fit.natural_angular_frequency
         mode = min(modes, key=lambda one: abs(2.0 * np.pi * one.frequency - natural.value))
@@ -62,7 +62,7 @@ def test_segments_are_longer_where_the_peak_has_fewer_than_four_lines() -> None:
 
 
 def test_leakage_is_that_of_the_drive() -> None:
-    """A noise leaks as the correlation of the window does; one period in each segment does not leak at all."""
+    """Noise leaks like the correlation of the window; a drive with one period in each segment does not leak at all."""
     rng = np.random.default_rng(6)
     force, tip = driven((Mode(20.0, 0.01),), 0.0, rng, 20_000)
     noise = frequency_response(force, tip, segment=2048, window="boxcar").leakage
@@ -72,7 +72,7 @@ def test_leakage_is_that_of_the_drive() -> None:
     periodic = leakage_of(period, np.ones(1024), 1.0 / 400.0, 1e-3)
     delays = np.arange(5) * 2048.0 / 400.0 / 16.0
     rho = noise.weights @ np.cos(noise.spacing * np.outer(np.arange(17), delays))
-    # of a boxcar: 1 - t / T
+    # for a boxcar: 1 - t / T
     assert rho == pytest.approx(1.0 - np.arange(5) / 16.0, abs=0.03)
-    # before the record there is no force: the first of 39 segments counts in part
+    # there is no force before the record: the first of 39 segments counts in part
     assert periodic.weights[0] == pytest.approx(1.0, abs=0.05)

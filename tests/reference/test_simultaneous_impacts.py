@@ -1,4 +1,4 @@
-"""Two masses hit their stops at one instant: coupled is fused, and the order of the stops changes nothing."""
+"""Two masses hit their stops at one instant: coupled equals fused, in any order of the stops."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
-# symmetric about its middle, and moved symmetrically: both masses do the same
+# symmetric about its middle, with a symmetric motion: both masses move alike
 SCENE = """
 [body]
 kind = "chain"
@@ -55,7 +55,7 @@ def test_masses_that_move_alike_hit_alike_whatever_the_order_of_their_stops(
 
 
 def test_elastic_masses_that_hit_together_keep_their_speed() -> None:
-    # each is a unit mass on a unit spring: the spring between them does nothing. Speed at .3 from speed 1 at 0
+    # each is a unit mass on a unit spring: the spring between them has no effect. Speed at .3 from speed 1 at 0
     one = impacts_of("fused", 1, 1.0)
     np.testing.assert_allclose(one[:, 2], np.sqrt(1.0 - 0.3**2), rtol=1e-12)
 

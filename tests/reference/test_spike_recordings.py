@@ -1,6 +1,6 @@
 """Spikes in recordings made in laboratories, and in load-cell records made from simulated impacts.
 
-What the recordings contain was found by others of those who recorded them or by eye, and is said at each test.
+The authors of the recordings found their spikes by other methods or by eye; each test gives its source.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def test_a_board_that_was_hit_shows_one_impact_and_one_that_was_not_shows_none()
 
 @pytest.mark.parametrize("part", [0.02, 0.03, 0.05, 0.07, 0.1])
 def test_the_impulse_of_the_impact_is_the_same_for_any_threshold(part: float) -> None:
-    # 4.728 m/s is the sum of the samples above 5 % of the peak, 4457 g; widths at 5, 10 and 50 % read off likewise
+    # 4.728 m/s is the sum of the samples above 5 % of the peak, 4457 g; widths at 5, 10 and 50 % also come from samples
     found = measure_pulses(identify(board("05"), SpikeSettings(threshold_part=part)))
     assert len(found) == 1
     assert found.impulse[0] == pytest.approx(4.73, rel=0.02)
@@ -69,7 +69,7 @@ def test_the_impulse_of_the_impact_is_the_same_for_any_threshold(part: float) ->
 
 @pytest.mark.parametrize("name", ["command", "base", "board"])
 def test_the_shaker_shows_its_shock_and_nothing_else(name: str) -> None:
-    # the shock was commanded for 3.96 s in one recording and not in the other; at the start the shaker settles
+    # one recording has the commanded shock at 3.96 s, the other has none; at the start the shaker settles
     report = spike_report(shaker("0.3")[name])
     assert report.found.method == "cycle_median"
     assert report.dataset.sizes["spike"] == 1
@@ -90,8 +90,8 @@ def test_a_plain_threshold_cannot_see_the_shock_of_the_shaker() -> None:
 
 @pytest.mark.parametrize("trial", ["a0", "a1"])
 def test_the_base_of_the_clamped_board_is_hit_by_one_pulse(trial: str) -> None:
-    # peaks 479 to 523 g, half width .21 to .23 ms, impulse above 10 % of the peak 1.07 to 1.09 m/s from
-    # the samples alone; the two parts of an interval at its ends, which are counted here, add .010 m/s
+    # from the samples alone: peaks 479 to 523 g, half width .21 to .23 ms, impulse above 10 % of the peak 1.07 to
+    # 1.09 m/s. The two part intervals at the ends, which are counted here, add .010 m/s
     file = recording_folder("pcb_repeated_shock") / f"acc_base_{trial}.txt"
     base = import_recording([file], ImportSettings(name=("base",), unit=("g",))).channels["base"]
     assert len(identify(base).groups) == 1
@@ -136,7 +136,7 @@ def impacts(folder: Path, **scene: float) -> EventTrain:
 
 
 def load_cell(times: np.ndarray, impulses: np.ndarray, rng: np.random.Generator, noise: float) -> Channel:
-    """Return volts of a load cell: half-sines of 2 ms on the impacts, noise, and drift as large as the spikes."""
+    """Return volts of a load cell: half-sines of 2 ms at the impacts, noise, and drift as large as the spikes."""
     begin = times[0] - 0.05
     time = np.arange(int((times[-1] - begin + 0.05) * RATE)) / RATE
     peaks = np.pi * impulses / (2.0 * CONTACT)
@@ -149,13 +149,13 @@ def load_cell(times: np.ndarray, impulses: np.ndarray, rng: np.random.Generator,
 def assert_two_percent(
     cell: Channel, times: np.ndarray, impulses: np.ndarray, velocities: np.ndarray
 ) -> np.ndarray:
-    """Assert that spikes are the impacts, and return their instants."""
+    """Assert that the spikes match the impacts, and return their instants."""
     known = Mechanics(mass=MASS, restitution=RESTITUTION, sensitivity=SENSITIVITY)
     report = spike_report(cell, SpikeSettings(polarity="positive"), known)
     data = report.dataset
     assert report.found.method == "threshold"
     assert data.sizes["spike"] == len(times)
-    # a spike is seen where it passes the threshold, after the contact began
+    # a spike starts when it passes the threshold, after the contact has begun
     late = data["spike_time"].values - times
     assert np.all((late > -1e-4) & (late < 0.25 * CONTACT))
     contact = time_above(float(data["threshold"]), np.pi * impulses / (2.0 * CONTACT), CONTACT)

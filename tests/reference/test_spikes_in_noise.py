@@ -1,4 +1,4 @@
-"""Spikes six to sixteen times as high as the noise: what the automatic threshold finds, once each, and what it adds."""
+"""Spikes six to sixteen times as high as the noise: the automatic threshold finds each once, and adds few others."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_spikes_of_eight_times_the_noise_are_found_once_and_nothing_else(records
         there[ratio] += record.starts.size
         found[ratio] += once
         others += none
-        # what is missed is told: a threshold that hides the spikes is no silent one
+        # a threshold that hides spikes has to give a remark
         if record.starts.size - once > 10:
             assert report.doubts, (shape, noise, ratio, seed)
     for ratio in RATIOS[1:]:
@@ -39,7 +39,7 @@ def test_spikes_of_eight_times_the_noise_are_found_once_and_nothing_else(records
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_all_half_cycles_of_a_spike_count_as_its_samples(shape: str) -> None:
-    """A cell that rings has no half cycle of four samples above the threshold, but enough of them."""
+    """A ringing cell has no half cycle of four samples above the threshold, but enough samples in all half cycles."""
     rng = np.random.default_rng(7)
     record = SpikeRecord(rng, shape, 10.0, "white")
     report = identify(record.channel, SpikeSettings(noise=1.0))

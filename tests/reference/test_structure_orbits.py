@@ -1,4 +1,4 @@
-"""Chains and beams against roads that share nothing with the engine: closed forms, printed numbers, DOP853."""
+"""Chains and beams against references independent of the engine: closed forms, printed numbers, DOP853."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def chain_parameters(
 
 
 def thesis_chain(angular_frequency: float, **more: float) -> dict[str, float]:
-    """Two unit masses, k = 1, c = .1, stop on mass 2 at .1, force .5 on mass 1, r = .7 (thesis 6.2)."""
+    """Return two unit masses, k = 1, c = .1, stop on mass 2 at .1, force .5 on mass 1, r = .7 (thesis 6.2)."""
     return {
         **chain_parameters([1.0, 1.0], [1.0, 1.0], [0.1, 0.1]),
         **each("forcing.amplitude", [0.5, 0.0]),
@@ -52,7 +52,7 @@ def thesis_chain(angular_frequency: float, **more: float) -> dict[str, float]:
 
 
 def thesis_reference(angular_frequency: float, fmu: StructureFmu) -> Reference:
-    """The reference of the same chain from the present state of the FMU."""
+    """Return the reference of the same chain, from the current state of the FMU."""
     body = uniform_chain(2)
     inverse = np.linalg.inv(body.shapes)
     return Reference(
@@ -130,7 +130,7 @@ def test_a_stick_of_the_thesis_chain_begins_and_ends_where_the_reference_says() 
 
 
 class Orbiting(NamedTuple):
-    """A body on its P(1,1) orbit: parts of the reference, parameters of the FMU, and what turns q into its start."""
+    """A body on its P(1,1) orbit: parts of the reference, parameters of the FMU, and a function from q to its start."""
 
     body: Body
     contact: np.ndarray
@@ -179,7 +179,7 @@ def orbiting_chain() -> Orbiting:
 
 
 def orbiting_beam() -> Orbiting:
-    """A clamped-free beam of four modes, forced in the middle at its first natural frequency, a stop at the tip."""
+    """Return a clamped-free beam of four modes, forced in the middle at its first frequency, stop at the tip."""
     body: Beam = beam(4, damping_ratio=0.05)
     parameters = {
         "modes": 4,
@@ -267,7 +267,7 @@ def test_the_chatter_of_a_chain_accumulates_at_the_time_in_forty_digits() -> Non
 
 
 def test_a_held_mass_leaves_the_printed_motion_of_the_others_and_the_printed_force() -> None:
-    # equations.md 3.4; a constant force of 1 on the held mass keeps it pressed and does nothing else
+    # equations.md 3.4; a constant force of 1 on the held mass keeps it pressed and has no other effect
     parameters = {
         **chain_parameters([1.0, 2.0, 0.5], [3.0, 1.0, 2.0], [0.12, 0.04, 0.08]),
         **each("forcing.amplitude", [0.6, 0.0, 0.2]),
@@ -304,7 +304,7 @@ def test_a_hertzian_stop_gives_all_energy_back_after_its_closed_form_contact_tim
     factor = 0.8 * beta(0.4, 0.5) * 1.25**0.4
     assert factor == pytest.approx(3.218065, abs=5e-7)
     time, restitution, impulse = compliant(HERTZ, stiffness=stiffness)
-    # with the default contact_tolerance of 1e-10: the end of the contact, where the force is flat, is the less exact
+    # with the default contact_tolerance of 1e-10 the end of the contact, where the force is flat, is less exact
     assert time == pytest.approx(factor * stiffness**-0.4, rel=1e-8)
     assert restitution == pytest.approx(1.0, abs=1e-9)
     assert impulse == pytest.approx(2.0, abs=1e-9)
@@ -343,7 +343,7 @@ def test_a_stiff_kelvin_voigt_stop_tends_to_the_restitution_law_with_the_contact
 
 
 def constrained(body: Beam) -> tuple[np.ndarray, np.ndarray]:
-    """Return natural frequencies and shapes of a beam whose tip is held, in modal coordinates."""
+    """Return natural frequencies and shapes of a beam with a held tip, in modal coordinates."""
     _, _, rows = np.linalg.svd(body.shape(1.0)[None])
     space = rows[1:].T
     squares, vectors = np.linalg.eigh(space.T @ np.diag(body.natural**2) @ space)
@@ -369,7 +369,7 @@ def test_a_beam_with_its_tip_held_approaches_the_clamped_pinned_beam_with_the_th
 def test_a_beam_pressed_to_a_stop_at_its_tip_swings_at_the_frequencies_of_the_held_galerkin_beam(
     modes: int, number: int
 ) -> None:
-    """Released in a held mode, it is turned over after half a period of that mode and back after a whole one."""
+    """Released in a held mode, it is inverted after half a period of that mode, and back after a whole period."""
     body = beam(modes)
     natural, vectors = constrained(body)
     start = 1e-3 * vectors[:, number - 1]

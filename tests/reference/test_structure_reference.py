@@ -26,7 +26,7 @@ THREE_MASSES = chain([1.0, 2.0, 0.5], [3.0, 1.0, 2.0], [0.12, 0.04, 0.08])
 
 
 def thesis_chain() -> Chain:
-    """The two-mass chain of thesis 6.2: stop at .1 on mass 2, force .5 on mass 1, r = .7."""
+    """Return the two-mass chain of thesis 6.2: stop at .1 on mass 2, force .5 on mass 1, r = .7."""
     return uniform_chain(2)
 
 
@@ -145,12 +145,12 @@ def test_the_chatter_of_a_chain_accumulates_at_the_printed_time() -> None:
         np.zeros(2),
         np.zeros(2),
     ).advance(2.5)
-    # cutting the chatter off errs by 5e-12, the integration by up to 1e-11 with the order of the processor's sums
+    # the cut of the chatter errs by 5e-12, the integration by up to 1e-11, depending on the processor's order of sums
     assert motion.sticks[0].start == pytest.approx(1.649577027167, abs=2e-11)
 
 
 def test_a_held_mass_leaves_the_printed_motion_of_the_others_and_the_printed_force() -> None:
-    # equations.md 3.4; the printed case keeps the mass held whatever its force, so this one is told to
+    # equations.md 3.4; the printed case holds the mass under any force, so the test sets its status
     body = THREE_MASSES
     inverse = np.linalg.inv(body.shapes)
     motion = Reference(
@@ -173,7 +173,7 @@ def restitution_of(law: str, mass: float, velocity: float, **parameters: float) 
     shape = np.array([1.0 / math.sqrt(mass)])
     stop = Stop(shape, 0.0, law=law, **parameters)
     start = np.array([velocity / shape[0]])
-    # it begins on the stop; penetrations are small, and so must be the absolute tolerance
+    # it starts on the stop; penetrations are small, and the absolute tolerance must be small as well
     motion = Reference(body, [stop], Forcing(np.zeros(1)), np.zeros(1), start, scale=1e-4).advance(1.0)
     (press,) = motion.presses
     return press.end - press.start, press.velocity_out / velocity
@@ -194,7 +194,7 @@ def test_a_hertzian_stop_has_the_printed_contact_time_and_gives_all_energy_back(
 
 
 def test_a_hunt_crossley_stop_has_the_restitution_of_its_implicit_equation() -> None:
-    # equations.md 6.10: p (1 + e) = ln((1 + p) / (1 - p e)), whatever stiffness and exponent
+    # equations.md 6.10: p (1 + e) = ln((1 + p) / (1 - p e)), for every stiffness and exponent
     p = 0.5 * 0.4
     exact = brentq(lambda e: p * (1.0 + e) - math.log((1.0 + p) / (1.0 - p * e)), 0.5, 1.0, xtol=1e-15)
     assert exact == pytest.approx(0.882189986, abs=5e-10)

@@ -1,4 +1,4 @@
-"""The cost of reading as the number of tokens doubles, and whether it grows faster than it may."""
+"""The cost of reading as the number of tokens doubles, and whether it grows too fast."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from pathlib import Path
 from vibroimpact.fmus.errors import VibroimpactError
 
 Made = Callable[[int], str]
-"""Returns the text that has so many tokens."""
+"""Function from a number of tokens to a text with them."""
 STEEPEST = 1.3
 """Exponent of the processor time over the number of tokens, above which a parser fails."""
 FROM_SECONDS = 0.02
-"""Processor time, s, below which nothing is compared: rounding of the clock, and what is read once."""
+"""Processor time, s, below which nothing is compared: rounding of the clock, and reading of fixed parts."""
 LIBRARY_SECONDS = 0.5
-"""Processor time, s, that a library may take whatever its exponent, at the largest size that is allowed."""
+"""Largest processor time of a library, s, at the largest allowed size; its exponent does not matter."""
 LAST_SECONDS = 2.0
 """Processor time of a reading, s, above which no larger content is tried."""
 LAST_MAKING = 10.0
-"""Processor time of making a content, s, above which no larger one is tried: its writer is none of ours."""
+"""Processor time of making a content, s, above which no larger one is tried: its writer is not under test."""
 LARGEST = 2**24
-"""Bytes of the largest content that is tried, where the parser itself allows as many or more."""
+"""Bytes of the largest content, if the parser itself allows at least as many."""
 FIRST = 32
 """Tokens of the first content."""
 REPEATS = 7
-"""Readings of each content where one looks too dear: the quickest counts, on a machine that does other things too."""
+"""Readings of each content that looks too expensive: the quickest counts, on a machine with other work."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ class Tokens:
     ----------
     parser, kind : str
     content : callable
-        Returns the bytes of a file with so many tokens.
+        Returns the bytes of a file with a number of tokens.
     read : callable
         Reads the file at a path; a refusal of this package counts as read.
     name : str
-        Of the file.
+        Name of the file.
     most : int
-        Bytes that the parser allows, or `LARGEST`.
+        Largest number of bytes that the parser allows, or `LARGEST`.
     """
 
     parser: str
@@ -70,10 +70,10 @@ class Rung:
 
 
 def ladder(tokens: Tokens, folder: Path, rungs: int) -> list[Rung]:
-    """Return the costs of n, 2n, 4n, ... tokens, at most so many, from the first that is worth comparing.
+    """Return the costs of n, 2n, 4n, ... tokens, at most `rungs` of them, from the first comparable one.
 
-    It ends at the size that is allowed, where content grows no more, and where reading takes `LAST_SECONDS` or making
-    it `LAST_MAKING`.
+    It ends at the allowed size, at content that grows no more, and where reading takes `LAST_SECONDS` or making
+    `LAST_MAKING`.
     """
     found: list[Rung] = []
     count, size = FIRST, 0
@@ -81,7 +81,7 @@ def ladder(tokens: Tokens, folder: Path, rungs: int) -> list[Rung]:
         rung = _rung(tokens, count, folder)
         if not size < rung.size <= tokens.most:
             break
-        # the first reading may have imported what reads
+        # the first reading may have imported the reader's modules
         found = [*found, rung] if rung.seconds >= FROM_SECONDS else []
         if rung.seconds > LAST_SECONDS or rung.making > LAST_MAKING:
             break
@@ -91,14 +91,14 @@ def ladder(tokens: Tokens, folder: Path, rungs: int) -> list[Rung]:
 
 
 def problem_of(tokens: Tokens, folder: Path, rungs: int, library: str = "") -> str | None:
-    """Return which doubling costs too much; None where none does.
+    """Return the doubling that costs too much; None without one.
 
-    `library` names what a library does: it may cost `LIBRARY_SECONDS`, however that grows.
+    `library` names the work of a library, which may cost `LIBRARY_SECONDS`, for any growth.
     """
     found = ladder(tokens, folder, rungs)
     if library:
-        dear = [rung for rung in found if rung.seconds > LIBRARY_SECONDS]
-        return f"{library}: {_said(dear[:1])}, which is above {LIBRARY_SECONDS} s" if dear else None
+        expensive = [rung for rung in found if rung.seconds > LIBRARY_SECONDS]
+        return f"{library}: {_said(expensive[:1])}, which is above {LIBRARY_SECONDS} s" if expensive else None
     for three in zip(found, found[1:], found[2:], strict=False):
         if _is_steep(three):
             again = _quickest(tokens, three, folder)
@@ -108,9 +108,9 @@ def problem_of(tokens: Tokens, folder: Path, rungs: int, library: str = "") -> s
 
 
 def _is_steep(rungs: Sequence[Rung]) -> bool:
-    """Whether each of two doublings costs too much: a table that no longer fits a cache makes one of them dear.
+    """Whether each of two doublings costs too much: a table that no longer fits a cache slows one of them.
 
-    Where content grows faster than its tokens, as rows do that widen, its bytes count.
+    If content grows faster than its tokens, as widening rows do, its bytes count.
     """
     return all(
         after.seconds > before.seconds * max(after.count / before.count, after.size / before.size) ** STEEPEST
@@ -121,7 +121,7 @@ def _is_steep(rungs: Sequence[Rung]) -> bool:
 def _quickest(tokens: Tokens, rungs: Sequence[Rung], folder: Path) -> list[Rung]:
     """Return the quickest of several readings of each content, in turn: a busy moment meets all of them.
 
-    It ends with the first that are not steep: what costs too much is steep each time.
+    It ends with the first readings that are not steep: a real fault is steep each time.
     """
     found = list(rungs)
     for _ in range(REPEATS):
@@ -137,18 +137,18 @@ def _said(rungs: Sequence[Rung]) -> str:
 
 
 def _rung(tokens: Tokens, count: int, folder: Path) -> Rung:
-    begun = time.process_time()
+    making_began = time.process_time()
     content = tokens.content(count)
     path = folder / tokens.name
     path.write_bytes(content)
     began = time.process_time()
     with suppress(VibroimpactError):
         tokens.read(path)
-    return Rung(count, len(content), time.process_time() - began, began - begun)
+    return Rung(count, len(content), time.process_time() - began, began - making_began)
 
 
 def each(line: str, before: str = "", after: str = "") -> Made:
-    """Return the maker of a text of numbered lines: `{at}` is the number of each."""
+    """Return the maker of a text of numbered lines: `{at}` is the number of a line."""
     return lambda n: before + "".join(line.replace("{at}", str(at)) for at in range(n)) + after
 
 

@@ -233,7 +233,7 @@ def _selected(text: str) -> object:
 
 
 def _scene_of_the_service(path: Path) -> object:
-    """Read a scene and find the places of its problems, as a validation by the service does."""
+    """Read a scene and find the places of its problems, like the service's validation."""
     try:
         return load_scene(path)
     except SceneError as refusal:

@@ -173,7 +173,7 @@ HDF5: Mapping[str, Made] = {
 
 
 def _cdf(count: int = 3, *, more: list[bytes] | None = None, dims: int = 0, attributes: int = 0) -> bytes:
-    """Return a file with instants and a channel; more variables share the data."""
+    """Return a file with instants and a channel; further variables share the data."""
     lengths = [raw.cdf_name("time") + struct.pack(">i", count)]
     lengths += [raw.cdf_name(f"d{at}") + struct.pack(">i", 1) for at in range(dims)]
     known = [raw.cdf_text(f"key{at}", "word") for at in range(attributes)]
@@ -304,7 +304,7 @@ def _read(path: Path) -> object:
 
 
 def all_tokens() -> list[Tokens]:
-    """Return all kinds of tokens of binary recordings, of the readers alone and of whole imports."""
+    """Return all kinds of tokens of binary recordings, for the readers alone and for whole imports."""
     found = [
         Tokens(parser, kind, make, _read, name)
         for parser, (name, made) in READERS.items()

@@ -1,4 +1,4 @@
-"""Each parser costs no more than n^1.3 on n tokens of each kind, but for what a library does within .5 s."""
+"""Each parser costs no more than n^1.3 for n tokens of each kind, except for a library's work within .5 s."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ ALL = {
     str(one): one for module in (texts, recordings, descriptions, documents) for one in module.all_tokens()
 }
 LIBRARY: dict[str, str] = {}
-"""Kinds of tokens on which a library is steeper, and what it does: at most .5 s at the size that is allowed."""
+"""Kinds of tokens on which a library is steeper, and the work of the library: at most .5 s at the allowed size."""
 BOUNDED = {"journal: heads of all that follows", "journal: heads of nothing", "journal: heads of notes"}
-"""Kinds of tokens that are read by a parser which looks at a limited number of bytes, whatever a file has."""
+"""Kinds of tokens whose parser reads a limited number of bytes of any file."""
 QUICK = (
     "text: rows of dates below rows",
     "text: a wide row among rows",
@@ -34,7 +34,7 @@ QUICK = (
     "journal: blocks",
     "JSON body: texts",
 )
-"""One kind of each parser whose reading costs little more than its content, or that was once too dear."""
+"""One kind of each parser: its reading costs little more than its content, or was once too expensive."""
 RUNGS, ALL_RUNGS = 3, 8
 
 
@@ -54,7 +54,7 @@ def test_a_parser_costs_no_more_than_in_proportion_up_to_the_size_that_is_allowe
 
 
 class Clock:
-    """Processor time that passes only as a reader says, ns for each step."""
+    """Processor time that a reader advances, ns for each step."""
 
     def __init__(self) -> None:
         self.now = 0.0

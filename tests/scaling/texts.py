@@ -54,7 +54,7 @@ IN_A_CELL: Mapping[str, str] = {
     "slashes apart": " / ",
     "combining marks": "\u0301",
 }
-"""What a cell of the second row repeats."""
+"""Repeated text of a cell in the second row."""
 LINES: Mapping[str, str] = {
     "rows": "0.5,1.25\n",
     "rows of whole numbers": "5,1\n",
@@ -182,7 +182,7 @@ def _lvm(columns: str = "One", more: str = "") -> str:
 
 
 INSTRUMENT_CELLS = ("1", " ", ",", ";", "\t", ":", ".", '"', "-", "a", "_X;", " -> ", "Y[1]", "1,", "Volt,")
-"""What a line repeats that follows the head of an export, and one that precedes it."""
+"""Repeated text of a line after the head of an export, and of a line before it."""
 
 
 def _export(kind: str, count: int, unit: str = "") -> str:

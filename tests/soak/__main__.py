@@ -25,11 +25,11 @@ MINUTES = 60.0
 LINE_SECONDS = 60.0
 """Time between two lines of progress where there is no terminal to draw bars on."""
 PROBLEMS_SHOWN = 20
-"""Of each kind; the journal holds all."""
+"""Problems of each kind that are shown; the journal holds all."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one case or all; return the exit code: 0 no problem, 1 some, 2 misused."""
+    """Run one case or all; return the exit code: 0 without problems, 1 with problems, 2 for misuse."""
     if len(arguments) == 2 and arguments[1].isdecimal():
         seconds, problem = attempt(arguments[0], "soak", int(arguments[1]))
         print(f"{arguments[0]} {arguments[1]}: {problem or 'no problem'} ({seconds:.2f} s)")
@@ -69,8 +69,8 @@ def _soak(kinds: Sequence[Kind], counts: Counts, base: int, seconds: float) -> i
     journal = Journal(ROOT / "results" / "soak" / f"seed-{base}-{state_of_the_code()}.jsonl")
     console.print(f"seed {base}, at most {seconds / 60:g} minutes, journal {journal.path.relative_to(ROOT)}")
     try:
-        with _Shown(console, kinds, counts, journal) as shown:
-            done = run(kinds, counts, base, journal, seconds, tell=shown.add)
+        with _Display(console, kinds, counts, journal) as shown:
+            done = run(kinds, counts, base, journal, seconds, report=shown.add)
     except KeyboardInterrupt:
         console.print("Interrupted; the same command goes on from here.")
         done = False
@@ -79,7 +79,7 @@ def _soak(kinds: Sequence[Kind], counts: Counts, base: int, seconds: float) -> i
     return _report(console, kinds, counts, journal, done)
 
 
-class _Shown:
+class _Display:
     """Progress: bars on a terminal, else a line each minute."""
 
     def __init__(self, console: Console, kinds: Sequence[Kind], counts: Counts, journal: Journal) -> None:
@@ -97,7 +97,7 @@ class _Shown:
             for one in kinds
         }
 
-    def __enter__(self) -> _Shown:
+    def __enter__(self) -> _Display:
         if self._progress.console.is_terminal:
             self._progress.start()
         return self

@@ -48,14 +48,14 @@ def _described(error: Exception) -> str:
 
 
 def serve(package: str) -> None:
-    """Answer until the other side ends; what a case prints goes to `log` in the folder the process starts in."""
+    """Answer until the other side ends; a case prints to `log` in the folder where the process starts."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     log = os.open("log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(log, 1)
     os.dup2(log, 2)
     faulthandler.enable()
     if hasattr(faulthandler, "register"):
-        # a case that does not answer is asked where it is
+        # the runner asks a case that does not answer for its stack
         faulthandler.register(signal.SIGUSR1)
     warnings.simplefilter("error")
     for line in sys.stdin:

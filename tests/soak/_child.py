@@ -1,4 +1,4 @@
-"""The other end of a child process: hands it one case at a time, and replaces it where it does not come back."""
+"""The parent's side of a child process: hands it one case at a time, and replaces it if it dies or hangs."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from support.places import TESTS
 from soak._kinds import Kind
 
 WALL_PER_PROCESSOR_TIME = 5.0
-"""On a machine that is shared, a case may take so much longer than its processor time."""
+"""Wall time of a case over its processor time, at most: other programs share the machine."""
 CASES = "import sys; from soak._case import serve; serve(sys.argv[1])"
 START_SECONDS = 60.0
 """Processor time for starting Python and importing the package, added to the limit of a child's first case."""
 
 
 class Child:
-    """A process that tries cases, and the case that it is at.
+    """A process that tries cases, and its current case.
 
     Attributes
     ----------
     at : (Kind, int, int) or None
-        Kind, number and seed of the case that is being tried.
+        Kind, number and seed of the case under way.
     """
 
     def __init__(self, package: str) -> None:
@@ -43,7 +43,7 @@ class Child:
 
     def _start(self) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="vibroimpact-soak-"))
-        # what is remembered of random files must not fill the cache of the person who starts this
+        # cached facts about random files must not fill the user's own cache
         own = {"TMPDIR": str(self._folder), "VIBROIMPACT_CACHE": str(self._folder / "cache")}
         path = os.pathsep.join(filter(None, [str(TESTS), *(entry for entry in sys.path if entry)]))
         self._process = warm.start(
@@ -61,12 +61,12 @@ class Child:
 
     @property
     def answers(self) -> IO[str]:
-        """Where an answer comes from; readable too when the process has died."""
+        """The stream of answers; it is readable too when the process has died."""
         assert self._process.stdout is not None
         return self._process.stdout
 
     def hand(self, kind: Kind, case: int, seed: int) -> None:
-        """Let it try a case, in a new process where the last one was of another kind."""
+        """Give the process a case; a case of another kind starts a new process."""
         if self._kind not in ("", kind.name):
             self._replace()
         self._kind, self._handed = kind.name, self._handed + 1
@@ -77,10 +77,10 @@ class Child:
             self._process.stdin.write(json.dumps([kind.name, seed]) + "\n")
             self._process.stdin.flush()
         except BrokenPipeError:
-            pass  # it has died since; reading its answer says so
+            pass  # it has died since; reading its answer reports the death
 
     def answer(self) -> tuple[float, str | None]:
-        """Read processor time and problem of the case, or say how the process died."""
+        """Read processor time and problem of the case, or report how the process died."""
         line = self.answers.readline()
         if line:
             self._allowance = 0.0
@@ -93,19 +93,19 @@ class Child:
         return seconds, f"the process died: {_named(status)}; {said}"
 
     def overdue(self) -> tuple[float, str] | None:
-        """Return time and problem of a case that has had its time; the process is replaced."""
+        """Return time and problem of a case that has used up its time; the process is replaced."""
         if self.at is None:
             return None
         limit = self.at[0].seconds + self._allowance
         wall, used = time.monotonic() - self._began, self._processor_time() - self._used
         if used <= limit and wall <= WALL_PER_PROCESSOR_TIME * limit:
             return None
-        where = self._asked_where_it_is()
+        where = self._place_of_hang()
         self._replace()
         return used, f"no answer after {used:.0f} s of processor time ({wall:.0f} s of wall time); {where}"
 
     def close(self) -> None:
-        """End the process with all that it has started, and remove its folder."""
+        """End the process and its children, and remove its folder."""
         _kill(self._process)
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
@@ -124,7 +124,7 @@ class Child:
             return 0.0
         return used.user + used.system + used.children_user + used.children_system
 
-    def _asked_where_it_is(self) -> str:
+    def _place_of_hang(self) -> str:
         if hasattr(signal, "SIGUSR1"):
             self._process.send_signal(signal.SIGUSR1)
             time.sleep(0.5)
@@ -169,4 +169,4 @@ def _close(pipe: IO[str]) -> None:
     try:
         pipe.close()
     except BrokenPipeError:
-        return  # what was still to be said has no listener
+        return  # nobody listens to the remaining output

@@ -1,8 +1,8 @@
-"""What the grammars of recordings have in common: drawn signals, odd values for any field, what must hold.
+"""Shared parts of the grammars of recordings: drawn signals, odd values for any field, and the rules of reading.
 
-A sound file is read back equal to what was drawn. An odd one, of a sound structure with odd values in its fields, is
-read or refused in one line that names it; so is a damaged one, which is read equal where its format has a checksum.
-Nothing takes more than `MOST_MEMORY`; the runner ends what hangs.
+A sound file is read back equal to the drawn signals. An odd file has a sound structure with odd values in its fields.
+An odd or damaged file is read, or refused in one line that names it; a damaged file with a checksum is read equal.
+No file takes more than `MOST_MEMORY`; the runner ends a hanging case.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ UNITS: Mapping[str, str] = {
     "mm": "0.001 m",
     "": "1",
 }
-"""Units as files have them, and as recordings do."""
+"""Units as they stand in files, and in recordings."""
 NAMES = ("base", "tip", "board", "rail", "pickup", "mount", "sensor_2", "bench", "strain")
-"""Words that mean no quantity: a unit that contradicts a heading is not believed."""
+"""Words that mean no quantity: a unit that contradicts a heading is not accepted."""
 INTERVALS = (1e-3, 2e-3, 1.0 / 1024.0, 0.01, 0.5, 4e-5)
 NUMBERS: tuple[Any, ...] = (
     0, 1, -1, 2, 3, 7, 100, 2**7, 2**8, 2**15, 2**16, 2**31 - 1, 2**31, 2**32 - 1, 2**53, 2**63 - 1, -(2**31), -(2**63),
@@ -98,18 +98,18 @@ WORDS = (
 
 
 def number(draw: random.Random, *usual: int) -> int:
-    """Return a whole number that is usual, or an odd one."""
+    """Return a usual whole number, or an odd one."""
     return draw.choice(usual) if usual and draw.random() < 0.8 else draw.choice(NUMBERS)
 
 
 def bounded(value: int, bits: int, *, signed: bool = False) -> int:
-    """Return a number as it is stored in so many bits."""
+    """Return a number as `bits` bits store it."""
     value &= (1 << bits) - 1
     return value - (1 << bits) if signed and value >> (bits - 1) else value
 
 
 def word(draw: random.Random, *usual: str) -> str:
-    """Return a text that is usual, or an odd one."""
+    """Return a usual text, or an odd one."""
     return draw.choice(usual) if usual and draw.random() < 0.7 else draw.choice(WORDS)
 
 
@@ -120,7 +120,7 @@ class Signals:
     Attributes
     ----------
     names, units : sequence of str
-        As the file has them.
+        As the file spells them.
     values : sequence of ndarray, shape (sample,)
     interval, start : float
         s
@@ -139,13 +139,13 @@ class Signals:
 
     @property
     def instants(self) -> Floats:
-        """When they were taken, s."""
+        """Times of the samples, s."""
         return self.start + self.interval * np.arange(self.count)
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is to be read: the channels in their order, with values, CF units and intervals."""
+    """The expected reading: the channels in their order, with values, CF units and intervals."""
 
     values: Sequence[Floats]
     units: Sequence[str]
@@ -168,7 +168,7 @@ def drawn_signals(draw: random.Random, *, most: int = 5, fewest_rows: int = 12) 
 
 
 def drawn_values(draw: random.Random, count: int) -> Floats:
-    """Return values of one channel; their first two differ, and they do not only ascend."""
+    """Return values of one channel; the first two differ, and the values do not only ascend."""
     noise = np.random.default_rng(draw.randrange(2**32)).normal(size=count)
     scale = draw.choice((1.0, 1.0, 30.0, 1e-6, 1e6))
     values = scale * draw.choice((noise, np.sin(np.arange(count) / 3.0), np.round(10.0 * noise) + 2.0))
@@ -177,14 +177,14 @@ def drawn_values(draw: random.Random, count: int) -> Floats:
 
 
 def truth_of(signals: Signals, **known: Any) -> Truth:
-    """Return what is to be read of signals, as they were drawn."""
+    """Return the expected reading of drawn signals."""
     units = [UNITS[unit] for unit in signals.units]
     given = {"names": list(signals.names), "start": signals.start, **known}
     return Truth(list(signals.values), units, signals.interval, **given)
 
 
 def differs(recording: Recording, truth: Truth) -> str | None:
-    """Return what of a recording is not as it was drawn."""
+    """Return the first difference between a recording and the drawn signals; None without one."""
     channels = list(recording.channels.values())
     said = f"; remarks: {' | '.join(recording.remarks)[:300]}"
     if recording.events or len(channels) != len(truth.values):
@@ -216,7 +216,7 @@ def _same(got: Floats, drawn: Floats, tolerance: float) -> NDArray[np.bool_]:
 
 
 def sound(path: Path, truth: Truth, settings: Mapping[str, Any] | None = None) -> str | None:
-    """Return what is wrong with how a sound file is read."""
+    """Return the problem of the reading of a sound file; None without one."""
     with bounded_memory() as grown:
         try:
             recording = imported_directly(path, settings)
@@ -233,14 +233,14 @@ def odd(
     equal: Truth | None = None,
     crashes: bool = False,
 ) -> str | None:
-    """Return what is wrong with how an odd or damaged file is read.
+    """Return the problem of the reading of an odd or damaged file; None without one.
 
     Parameters
     ----------
     equal : Truth, optional
-        What alone may be read of it, since its format has checksums.
+        The only reading that is right, since the format has checksums.
     crashes : bool
-        Its library is compiled and crashes on damaged bytes: another process reads it, as always outside of tests.
+        The compiled library of the format crashes on damaged bytes: another process reads it, as outside of tests.
     """
     with bounded_memory() as grown:
         try:
@@ -253,7 +253,7 @@ def odd(
 
 
 def badly_said(refusal: VibroimpactError, path: Path) -> str | None:
-    """Return what is wrong with a refusal: it names the file, and is neither long nor full of control characters."""
+    """Return the problem of a refusal; a good one names the file, is short and has no control characters."""
     text = str(refusal)
     if path.name not in text or len(text) > LONGEST_MESSAGE:
         return f"{len(text)} characters of refusal: {text[:300]!r}"
@@ -261,7 +261,7 @@ def badly_said(refusal: VibroimpactError, path: Path) -> str | None:
 
 
 def _unsound(recording: Recording, path: Path) -> str | None:
-    """Return what no recording is: with infinite values, with instants in disorder, or not written as it was read."""
+    """Return the fault of a recording: infinite values, instants in disorder, or other values when written."""
     for channel in recording.channels.values():
         if np.any(np.isinf(channel.values)):
             return f"{channel.name}: an infinite value"
@@ -270,7 +270,7 @@ def _unsound(recording: Recording, path: Path) -> str | None:
     target = path.with_name("written.nc")
     try:
         write_recording(recording, target)
-    except DatasetError as refusal:  # of numbers that no measurement has
+    except DatasetError as refusal:  # the recording holds numbers that no measurement has
         return wrong_message(str(refusal))
     back = open_recording(target)
     target.unlink()
@@ -281,7 +281,7 @@ def _unsound(recording: Recording, path: Path) -> str | None:
 
 
 def beginning(recording: Recording, truth: Truth) -> str | None:
-    """Return the sample of a file that was cut off which is wrong, where nothing is said of the end."""
+    """Return the first wrong sample of a file that was cut off; None where a remark names the cut end."""
     if "the text ends with" in "\n".join(recording.remarks):
         return None
     for channel, known in zip(recording.channels.values(), truth.values, strict=False):
@@ -296,7 +296,7 @@ def beginning(recording: Recording, truth: Truth) -> str | None:
 
 
 def damaged(draw: random.Random, content: bytes) -> bytes:
-    """Return a file with bits flipped, bytes set, taken out, doubled or cut off."""
+    """Return a file with bits flipped, or with bytes set, taken out, doubled or cut off."""
     changed = bytearray(content)
     for _ in range(draw.choice((1, 1, 2, 5, 20))):
         place = draw.randrange(len(changed) + 1)
@@ -315,7 +315,7 @@ def damaged(draw: random.Random, content: bytes) -> bytes:
 
 
 def flipped(draw: random.Random, content: bytes) -> bytes:
-    """Return a file with some bits flipped, none of them at its start, by which its format is known."""
+    """Return a file with some bits flipped, none of them at its start, which identifies the format."""
     changed = bytearray(content)
     for _ in range(draw.choice((1, 1, 1, 2, 8))):
         changed[draw.randrange(min(8, len(changed) - 1), len(changed))] ^= 1 << draw.randrange(8)
@@ -324,7 +324,7 @@ def flipped(draw: random.Random, content: bytes) -> bytes:
 
 @contextmanager
 def bounded_memory() -> Iterator[Callable[[], str | None]]:
-    """Yield what says, at the end, that this process grew by more than `MOST_MEMORY`."""
+    """Yield a check to be called at the end: it reports growth of this process by more than `MOST_MEMORY`."""
     before = _peak(reset=True)
     yield lambda: _grown(before)
 
@@ -335,7 +335,7 @@ def _grown(before: int) -> str | None:
 
 
 def _peak(*, reset: bool = False) -> int:
-    """Return the largest resident memory since the last reset, bytes; 0 where the system does not say."""
+    """Return the largest resident memory since the last reset, bytes; 0 where the system does not report it."""
     if sys.platform != "linux":
         return 0
     if reset:

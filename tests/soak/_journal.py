@@ -1,4 +1,4 @@
-"""What has been tried so far: one file for each base seed and state of the code, one line a case."""
+"""The cases tried so far: one file for each base seed and state of the code, one line a case."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SUFFIXES = {".py", ".c", ".h", ".toml"}
 
 @dataclass(frozen=True)
 class Tried:
-    """A case that has been tried: processor time in s, problem or None."""
+    """A finished case: processor time in s, and problem or None."""
 
     kind: str
     case: int
@@ -25,7 +25,7 @@ class Tried:
 
 
 def state_of_the_code(root: Path = ROOT) -> str:
-    """Return a digest of all sources whose change makes a case worth trying again."""
+    """Return a digest of all sources; a change of any of them makes a case worth trying again."""
     digest = hashlib.sha256()
     for folder in SOURCES:
         for path in sorted((root / folder).rglob("*")):
@@ -35,7 +35,7 @@ def state_of_the_code(root: Path = ROOT) -> str:
 
 
 class Journal:
-    """A file to which every case is appended; a run that ended, however it did, goes on from there."""
+    """A file to which every case is appended; a run that ended, for whatever reason, goes on from there."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -49,7 +49,7 @@ class Journal:
         print(json.dumps(asdict(entry)), file=self._file, flush=True)
 
     def of(self, kind: str) -> list[Tried]:
-        """Return the cases of a kind that have been tried, in order."""
+        """Return the finished cases of a kind, in order."""
         return sorted(
             (entry for entry in self.tried.values() if entry.kind == kind), key=lambda entry: entry.case
         )
@@ -65,6 +65,6 @@ def _read(path: Path) -> list[Tried]:
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     if whole != text:
-        # a line that was cut off by the end of the machine would join the next one
+        # a line cut off by a crash of the machine would join the next line
         path.write_text(whole, encoding="utf-8")
     return [Tried(**json.loads(line)) for line in whole.splitlines()]

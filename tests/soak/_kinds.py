@@ -11,7 +11,7 @@ CASES = 5000
 SAMPLE = 40
 SECONDS = 20.0
 SEED_STRIDE = 1_000_000
-"""Seeds of one base seed; no kind has as many cases."""
+"""Number of seeds for each base seed; no kind has as many cases."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Kind:
     seconds : float
         Processor time after which a case counts as hanging.
     is_alone : bool
-        It measures wall time: its cases have the machine for themselves.
+        The kind measures wall time: its cases run without other cases beside them.
     """
 
     name: str

@@ -12,7 +12,7 @@ from soak._journal import Journal, Tried
 from soak._kinds import Kind
 
 LONGEST_BLOCK, BLOCKS = 50, 100
-"""Cases of one kind in a row, at most, and blocks of a kind, at least: a process is left to one kind for a block."""
+"""Most cases of one kind in a row, and fewest blocks of a kind: a process keeps one kind for a block."""
 LOOK_SECONDS = 0.2
 """Time between looks at children that do not answer."""
 
@@ -27,22 +27,22 @@ def run(
     seconds: float,
     *,
     processes: int | None = None,
-    tell: Callable[[Tried], None] = lambda entry: None,
+    report: Callable[[Tried], None] = lambda entry: None,
 ) -> bool:
     """Try all cases of all kinds that the journal does not hold; return whether they are all tried.
 
     Parameters
     ----------
     kinds : sequence of Kind
-        All of one package; they advance side by side, by equal shares, after those whose cases run alone.
+        Kinds of one package; they advance side by side, by equal shares, after the kinds whose cases run alone.
     counts : dict
         Number of cases of each kind, by name.
     base : int
         Base seed.
     journal : Journal
-        What has been tried, and where it is added.
+        Finished cases; new ones are added.
     seconds : float
-        Wall time after which no case is begun; those that are being tried are given up.
+        Wall time after which no case starts; unfinished cases are given up.
     processes : int, optional
         Number of child processes; one for each core.
     tell : function of Tried, optional
@@ -50,9 +50,9 @@ def run(
     """
     end = time.monotonic() + seconds
     alone = [kind for kind in kinds if kind.is_alone]
-    beside = [kind for kind in kinds if not kind.is_alone]
-    parts = [(part, number) for part, number in ((alone, 1), (beside, processes)) if part]
-    return all([_run(part, counts, base, journal, end, number, tell) for part, number in parts])
+    shared = [kind for kind in kinds if not kind.is_alone]
+    parts = [(part, number) for part, number in ((alone, 1), (shared, processes)) if part]
+    return all([_run(part, counts, base, journal, end, number, report) for part, number in parts])
 
 
 def _run(
@@ -62,12 +62,12 @@ def _run(
     journal: Journal,
     end: float,
     processes: int | None,
-    tell: Callable[[Tried], None],
+    report: Callable[[Tried], None],
 ) -> bool:
     """Try the cases of kinds side by side until an instant; return whether they are all tried."""
     waiting = _waiting(kinds, counts, base, journal)
-    wanted = sum(counts[kind.name] for kind in kinds) - len(_tried(kinds, counts, journal))
-    children = [Child(kinds[0].package) for _ in range(min(processes or os.cpu_count() or 1, wanted))]
+    remaining = sum(counts[kind.name] for kind in kinds) - len(_tried(kinds, counts, journal))
+    children = [Child(kinds[0].package) for _ in range(min(processes or os.cpu_count() or 1, remaining))]
     busy = [child for child in children if _hand_next(child, waiting)]
     try:
         while busy and time.monotonic() < end:
@@ -76,7 +76,7 @@ def _run(
                 kind, case, seed = child.at
                 entry = Tried(kind.name, case, seed, round(taken, 4), problem)
                 journal.add(entry)
-                tell(entry)
+                report(entry)
                 if not _hand_next(child, waiting):
                     busy.remove(child)
     finally:
@@ -115,7 +115,7 @@ def _hand_next(child: Child, waiting: Iterator[tuple[Kind, int, int]]) -> bool:
 
 
 def _answers(busy: Sequence[Child]) -> list[tuple[Child, tuple[float, str | None]]]:
-    """Wait a moment for answers; return those that came, and those of children whose time is up."""
+    """Wait a moment for answers; return the answers, and the reports of children whose time is up."""
     with selectors.DefaultSelector() as selector:
         for child in busy:
             selector.register(child.answers, selectors.EVENT_READ, child)

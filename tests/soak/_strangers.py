@@ -1,4 +1,4 @@
-"""What a stranger without the token does to a port: each way runs until its time is over."""
+"""Attacks of a stranger without the token on a port: each way runs until its time is over."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import time
 from collections.abc import Callable, Iterator, MutableSequence
 
 NOBODY = 65534
-"""User and group of strangers, where this user may become another."""
+"""User and group of strangers, where the current user may become another."""
 MOST_OPEN = 1500
 """Connections that one stranger keeps open."""
 DESCRIPTORS = 4096
-"""Open files that a stranger allows itself, where the system does."""
+"""Open files that a stranger allows itself, where the system permits."""
 WAY_SECONDS = 3.0
 """Time after which a stranger goes on to the next way, s."""
 Place = tuple[str, int]
@@ -23,7 +23,7 @@ ANYTHING = b"GET /api/v1/campaigns HTTP/1.1\r\n" + HOST + b"\r\n"
 
 
 def attack(place: Place, ways: list[str], seed: int, seconds: float, opened: MutableSequence[int]) -> None:
-    """Do what the ways say for so many seconds, as another user where that is allowed.
+    """Attack in the given ways for a number of seconds, as another user where the system permits.
 
     `opened` counts the connections of each of `WAYS`, in their order.
     """
@@ -68,7 +68,7 @@ def _sent(connection: socket.socket, content: bytes) -> bool:
 
 
 def idle(place: Place, chance: random.Random, end: float) -> int:
-    """Open as many connections as may be, and say nothing or half a request."""
+    """Open as many connections as possible, and send nothing or half a request."""
     kept = []
     for connection in _opened(place, MOST_OPEN, end):
         kept.append(connection)
@@ -115,7 +115,7 @@ def huge(place: Place, chance: random.Random, end: float) -> int:
 
 
 def many(place: Place, chance: random.Random, end: float) -> int:
-    """Ask for anything, many times on a connection, without reading an answer."""
+    """Send many requests on one connection, without reading an answer."""
     paths = [b"/", b"/page/main.js", b"/api/v1/campaigns", b"/metrics", b"/nothing/%00"]
     kept: list[socket.socket] = []
     count = 0
@@ -130,7 +130,7 @@ def many(place: Place, chance: random.Random, end: float) -> int:
 
 
 def half_closed(place: Place, chance: random.Random, end: float) -> int:
-    """Close one side after a part of a request, or noise, and keep the other."""
+    """Close one direction after a part of a request, or noise, and keep the other."""
     kept = []
     for connection in _opened(place, 300, end):
         kept.append(connection)

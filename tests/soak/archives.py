@@ -1,4 +1,4 @@
-"""Hostile FMU archives through `fmu check` and the importer: used, or one refusal, and nothing is written outside."""
+"""Hostile FMU archives through `fmu check` and the importer: accepted, or one refusal; nothing is written outside."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def whole() -> bytes:
 
 
 def description(draw: random.Random) -> bytes:
-    """Return a model description that is odd in some way."""
+    """Return a model description with something odd in it."""
     pick = draw.choice
     variables = "".join(
         VARIABLE.format(
@@ -175,7 +175,7 @@ def member(draw: random.Random) -> zipfile.ZipInfo:
 
 
 def archive(draw: random.Random) -> bytes:
-    """Return a zip archive with members of every odd kind, and often a description that could be one."""
+    """Return a zip archive with members of every odd kind, and often a plausible description."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", draw.choice([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])) as file:
         if draw.random() < 0.9:
@@ -183,7 +183,7 @@ def archive(draw: random.Random) -> bytes:
         if draw.random() < 0.5:
             file.writestr(BINARY, draw.choice([b"", b"\x7fELF" + bytes(60), b"no library"]))
         for _ in range(draw.choice([0, 0, 1, 2, 4])):
-            # two of one name are wanted
+            # two members of one name are intended
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 file.writestr(
@@ -198,10 +198,10 @@ def archive(draw: random.Random) -> bytes:
 
 
 def damaged(content: bytes, draw: random.Random) -> bytes:
-    """Return an archive with bits flipped, sizes and offsets that lie, or parts missing."""
+    """Return an archive with bits flipped, wrong sizes and offsets, or missing parts."""
     spoilt = bytearray(content)
     for _ in range(draw.choice([1, 1, 3, 10])):
-        # the directory at the end is where archives lie
+        # the directory at the end is where wrong entries matter most
         place = (
             draw.randrange(len(spoilt))
             if draw.random() < 0.5
@@ -221,7 +221,7 @@ def damaged(content: bytes, draw: random.Random) -> bytes:
 
 
 def check(seed: int) -> str | None:
-    """Let one archive through the doors that untrusted ones come by."""
+    """Pass one archive to the entry points for untrusted files."""
     draw = random.Random(seed)
     kind = draw.random()
     content = damaged(whole(), draw) if kind < 0.3 else archive(draw)
@@ -245,7 +245,7 @@ def check(seed: int) -> str | None:
 
 
 def _unpacked(path: Path) -> str | None:
-    """Unpack an archive twice; return what is wrong with the copy, or with how it is refused."""
+    """Unpack an archive twice; return the problem of the copy or of the refusal."""
     try:
         first = unpack(path)
         kept = {entry: entry.stat().st_ino for entry in first.folder.rglob("*")}

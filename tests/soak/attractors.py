@@ -1,8 +1,8 @@
-"""Basins and branches of random oscillators beside brute-force runs: mirrored stops, light damping, two attractors.
+"""Basins and branches of random oscillators against brute-force runs: mirrored stops, light damping, two attractors.
 
-`basins`: each start is run by itself for thousands of periods, and ends where its cell says. `follow`: each change of
-stability along a branch has a named cause or is said to have none, and runs from beside an orbit stay or leave as its
-multipliers say.
+`basins`: each start is run by itself for thousands of periods, and ends on the attractor of its cell. `follow`: each
+change of stability along a branch has a named cause, or the result says that no cause was found. Runs that start close
+to an orbit stay or leave as its multipliers predict.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ SECONDS = 300.0
 POINTS = 12
 """Starts of a plane along each axis."""
 RUNS = 40
-"""Starts that are run by themselves."""
+"""Starts that are run one by one."""
 SHIFTS = np.array([[0.0, 0.0], [-1e-9, 0.0], [-1e-10, 1e-9], [-1e-9, -1e-9]])
-"""Changes of a start, over the size of the motion, that do not change where it ends unless rounding does too."""
+"""Shifts of a start, over the size of the motion; a run that ends elsewhere after a shift is decided by rounding."""
 FAR = 4.0
-"""Standard deviations of a count at which a share is off."""
+"""Standard deviations of a count above which a share is wrong."""
 PERIODS = 4000
-"""Forcing periods of each of these runs before it is looked at."""
+"""Forcing periods of each such run before its end is judged."""
 NEAR = 1e-3
-"""Distance from an attractor at phase 0, over the size of the motion, at which a run is on it."""
+"""Distance from an attractor at phase 0, over the size of the motion, below which a run is on it."""
 MISSED = 2
-"""Starts of RUNS that may end elsewhere: by chance all neighbours end alike; chaos that a sample told."""
+"""Most starts out of RUNS that may end elsewhere: all shifts agree by chance, or a sample was labelled chaos."""
 FREQUENCY = "forcing.angular_frequency"
 WEAK = 0.02
-"""Distance of the largest multiplier from 1 below which a run of this length shows neither."""
-BESIDE = 1e-7
-"""Change of velocity of a run that begins beside an orbit, m/s."""
+"""Distance of the largest multiplier from 1 below which a run of this length shows neither decay nor growth."""
+NUDGE = 1e-7
+"""Change of velocity of a run that starts close to an orbit, m/s."""
 
 Tables = dict[str, Any]
 Floats = NDArray[np.float64]
 
 
 def check(seed: int) -> str | None:
-    """Return what is wrong with basins or branches of the oscillator of this seed; None where all is right."""
+    """Return the fault of the basins or branches of the oscillator of this seed; None without one."""
     draw = random.Random(seed)
     tables = oscillator(draw)
     problem = _basins(draw, tables) if draw.random() < 0.5 else _branches(draw, tables)
@@ -98,7 +98,7 @@ def _basins(draw: random.Random, tables: Tables) -> str | None:
 
 
 def _wrong_cells(draw: random.Random, runner: PointRunner, found: Basins) -> str | None:
-    """Run some starts by themselves; return those that do not end where their cells say, and shares that are off."""
+    """Run some starts one by one; return starts that do not end where their cells say, and wrong shares."""
     wrong, of_chaos = [], 0
     cells, runs = np.zeros(len(found.attractors)), np.zeros(len(found.attractors))
     for place in draw.sample(range(found.labels.size), RUNS):
@@ -111,7 +111,7 @@ def _wrong_cells(draw: random.Random, runner: PointRunner, found: Basins) -> str
         elif ends[0] is not None:
             cells[label] += 1
             runs[ends[0]] += 1
-        # of a start whose neighbours end elsewhere rounding decides: there shares alone are compared
+        # rounding decides a start whose shifted runs end differently: such starts enter only the comparison of shares
         if not found.attractors[label].is_chaotic and ends == [ends[0]] * len(ends) and ends[0] != label:
             wrong.append(f"{start.tolist()}: {found.names[label]}, its runs end on {ends[0]}")
     room = FAR * np.sqrt(0.5 * (cells + runs)) + 1.0
@@ -124,13 +124,13 @@ def _wrong_cells(draw: random.Random, runner: PointRunner, found: Basins) -> str
 
 
 def _end(runner: PointRunner, found: Basins, start: Floats) -> int | None:
-    """Return the attractor that a run from a start ends on; None where that is none with a period."""
+    """Return the periodic attractor that a run from a start ends on; None where it ends on no such attractor."""
     record = runner.run({}, (float(start[0]), float(start[1])))
     return next((number for number in range(len(found.attractors)) if _is_on(record, found, number)), None)
 
 
 def _is_on(record: RunRecord, found: Basins, number: int) -> bool:
-    """Say whether the end of a run is on an attractor with a period."""
+    """Whether the end of a run is on a periodic attractor."""
     attractor = found.attractors[number]
     if attractor.is_chaotic or record.periods is None:
         return False
@@ -142,8 +142,8 @@ def _is_on(record: RunRecord, found: Basins, number: int) -> bool:
 # ---- branches ----
 
 
-class _Beside(NamedTuple):
-    """What a run shows that begins beside an orbit."""
+class _NearbyRun(NamedTuple):
+    """Impact speeds of a run that starts close to an orbit, and whether the run stays on it."""
 
     speeds: Floats
     stays: bool
@@ -157,7 +157,7 @@ def _branches(draw: random.Random, tables: Tables) -> str | None:
         if draw.random() < 0.4:
             study = Following(scene, FREQUENCY, *ends, impacts=1, doublings=0)
         else:
-            # the orbit that the scene's own run ends on, mostly one that hits both stops
+            # the orbit on which the scene's own run ends; it mostly hits both stops
             run = vi.run(scene.with_values({"record": {"transient_periods": 3000, "recorded_periods": 64}}))
             seed = vi.seed_of_run(run)
             study = Following(
@@ -165,7 +165,7 @@ def _branches(draw: random.Random, tables: Tables) -> str | None:
             )
         branches = whole(study).followed.branches
     except (OrbitError, DatasetError):
-        return None  # no orbit there, which it says
+        return None  # no orbit there, which the error says
     for branch in branches:
         problem = _unnamed_change(branch) or _unlike_its_runs(draw, scene, branch)
         if problem is not None:
@@ -174,7 +174,7 @@ def _branches(draw: random.Random, tables: Tables) -> str | None:
 
 
 def _unnamed_change(branch: Branch) -> str | None:
-    """Return where the stability changes along a branch without a point that names a cause, or that there is none."""
+    """Return the first change of stability without a point that names its cause, or points of unknown kinds."""
     places = {place for point in branch.points for place in _places(branch, point.at)}
     stable = [each.orbit.is_stable for each in branch.orbits]
     for k in range(1, len(stable)):
@@ -191,25 +191,25 @@ def _places(branch: Branch, at: BranchOrbit) -> list[int]:
 
 
 def _unlike_its_runs(draw: random.Random, scene: Scene, branch: Branch) -> str | None:
-    """Return which orbit of a branch a run from beside it does not keep, or keeps, against its multipliers."""
+    """Return the first orbit of a branch that a nearby run keeps or leaves against its multipliers."""
     for each in draw.sample(branch.orbits, min(3, len(branch.orbits))):
         largest = float(np.abs(each.orbit.multipliers).max())
-        # a graze next by throws runs off stable orbits, too
+        # a nearby graze throws runs off stable orbits, too
         slow = each.orbit.velocities.min() < 1e-3
         touches = each.orbit.highest[0] > -1e-3 * each.orbit.body.scale
         if abs(largest - 1.0) < WEAK or slow or touches:
             continue
-        beside = _run_beside(scene, each)
-        if beside.stays != (largest < 1.0):
-            word = "stays" if beside.stays else "leaves"
+        nearby = _run_nearby(scene, each)
+        if nearby.stays != (largest < 1.0):
+            word = "stays" if nearby.stays else "leaves"
             return (
                 f"multipliers {each.orbit.multipliers.tolist()} at {each.value:.12g}, and a run beside it {word}: "
-                f"{beside.speeds.tolist()} for {each.orbit.velocities.tolist()}"
+                f"{nearby.speeds.tolist()} for {each.orbit.velocities.tolist()}"
             )
     return None
 
 
-def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
+def _run_nearby(scene: Scene, each: BranchOrbit) -> _NearbyRun:
     """Run from just after the first impact of an orbit, a little slower or faster."""
     orbit = each.orbit
     stop = scene.stops[int(orbit.contacts[0])]
@@ -218,7 +218,7 @@ def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
             FREQUENCY: each.value,
             "forcing.phase": float(orbit.phases[0]) % (2.0 * np.pi),
             "body.displacement_start": stop.position,
-            "body.velocity_start": float(orbit.states[0][1]) + (BESIDE if stop.side == "lower" else -BESIDE),
+            "body.velocity_start": float(orbit.states[0][1]) + (NUDGE if stop.side == "lower" else -NUDGE),
             "record": {"transient_periods": PERIODS, "recorded_periods": 2 * orbit.periods},
         }
     )
@@ -231,4 +231,4 @@ def _run_beside(scene: Scene, each: BranchOrbit) -> _Beside:
     speeds = impacts[:, 2]
     expected = np.sort(np.tile(orbit.velocities, 2))
     stays = len(speeds) == len(expected) and np.allclose(np.sort(speeds), expected, rtol=1e-4, atol=1e-6)
-    return _Beside(speeds, bool(stays))
+    return _NearbyRun(speeds, bool(stays))

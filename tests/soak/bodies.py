@@ -1,8 +1,8 @@
-"""Adversarial random bodies: always two kinds of stop on one, in the places where decisions are hardest.
+"""Adversarial random bodies: always two kinds of stop on one body, in the places where decisions are hardest.
 
-Oscillators, chains and beams with coincident and opposed stops, no room between them, symmetric points, starts on a
-stop or in it, no springs, restitution 0 and 1, stiffnesses over twelve decades. `check` runs one and says what is wrong
-with it.
+Oscillators, chains and beams have coincident and opposed stops, no room between them, and symmetric points. They start
+on a stop or in it, have no springs, restitution 0 and 1, and stiffnesses over twelve decades. `check` runs one body
+and returns its fault.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from vibroimpact.fmus.errors import ComponentError
 
 #: Processor time that a run may take, s.
 LONGEST = 2.0
-#: A run is followed for at most so many radians of its stiffest stop: resting on it takes their time.
+#: Largest duration of a run, in radians of its stiffest stop: time at rest on the stop counts too.
 MOST_RADIANS = 1e4
 CASES = 20_000
 SAMPLE = 12
 DURATION = 10.0
 STEPS = 97
-#: Energy that may be missing, of all that was turned over; with power laws, followed to a tolerance of 1e-10 each.
+#: Largest energy error over the turnover; the second for power laws, which are solved to a tolerance of 1e-10 each.
 TURNOVER, TURNOVER_POWER = 1e-11, 1e-7
-#: Times what `apart` allows, and of the largest speed for each impact: bounces of 1e-10 m are rounded anew each time.
+#: Factor on the bound of `apart`, and share of the largest speed for each impact: bounces of 1e-10 m round anew.
 LOOSE, EACH_IMPACT = 10.0, 1e-7
-#: Beyond a rigid stop, of the displacements that add up there.
+#: Largest penetration of a rigid stop, over the displacements that add up there.
 PENETRATION = 1e-12
 
 
 @dataclass(frozen=True)
 class Body:
-    """The modes of a body and the shapes of its points that may be hit, shape (points, modes)."""
+    """The modes of a body and the shapes of its points with stops, shape (points, modes)."""
 
     natural: Array
     damping_ratio: Array
@@ -103,7 +103,7 @@ def _stops(random: np.random.Generator, body: Body, q: Array) -> tuple[Stop, ...
             body.points[int(random.integers(len(body.points)))],
             str(random.choice(["upper", "lower"])),
         )
-        if stops and random.random() < 0.3:  # at the point of another
+        if stops and random.random() < 0.3:  # at the point of another stop
             shape = np.asarray(stops[-1].shape)
         gap = _pick(random, *gaps)
         if law in COMPLIANT and random.random() < 0.1:
@@ -115,7 +115,7 @@ def _stops(random: np.random.Generator, body: Body, q: Array) -> tuple[Stop, ...
 
 
 def fastest(modes: Modes, stops: tuple[Stop, ...], q: Array) -> float:
-    """Return the rate that the body reaches with its stiffest stop pressed by a unit, or as at the start, rad/s."""
+    """Return the largest rate of the body with its stiffest stop pressed by a unit or as at the start, rad/s."""
     rates = [float(np.max(modes.natural)), modes.angular_frequency]
     for stop in stops:
         mobility = float(np.square(np.asarray(stop.shape)).sum())
@@ -128,7 +128,7 @@ def fastest(modes: Modes, stops: tuple[Stop, ...], q: Array) -> float:
 
 
 def case(seed: int) -> Scene:
-    """Return the scene of this number."""
+    """Return the scene of a seed."""
     random = np.random.default_rng(seed)
     body = (_oscillator, _chain, _beam)[int(random.integers(3))](random)
     n = len(body.natural)
@@ -144,7 +144,7 @@ def case(seed: int) -> Scene:
 
 
 def _energy_problem(scene: Scene) -> str | None:
-    """Follow it in steps with its energies; return what is missing, penetrates or pulls."""
+    """Follow the scene in steps with its energies; return missing energy, penetration or a pulling contact."""
     power = any(stop.law in POWER for stop in scene.stops)
     with scene.body(energies=True) as body:
         start = turnover = body.energy
@@ -160,7 +160,7 @@ def _energy_problem(scene: Scene) -> str | None:
             work, loss, contact = body.forcing_work, body.damping_loss, body.contact_loss
             balance = body.energy - start - (work - loss - contact)
             allowed = (TURNOVER_POWER if power else TURNOVER) * (turnover + body.energy + scene.stored)
-            # each impact puts the body on its stop: work of the loads over a rounding of its place
+            # each impact puts the body on its stop: the loads do work over the rounding of its position
             allowed += 1e-15 * max(1.0, scene.speed) ** 2 * (1.0 + 0.01 * len(body.impacts))
             if not abs(balance) <= allowed:
                 return f"energy off by {balance:.3g} of {turnover:.3g} at {body.time:.6g} s"
@@ -186,13 +186,13 @@ def _state_problem(scene: Scene, body: Structure) -> str | None:
 
 
 def _timed(scene: Scene, steps: int) -> tuple[Run, float]:
-    begun = time.process_time()
+    began = time.process_time()
     run = follow(scene, [scene.duration], stepped=[scene.duration * (i + 1) / steps for i in range(steps)])
-    return run, time.process_time() - begun
+    return run, time.process_time() - began
 
 
 def check(seed: int) -> str | None:
-    """Run the scene of this number in one step and in 97; return what is wrong, None where nothing is."""
+    """Run the scene of this seed in one step and in 97; return the fault, or None."""
     try:
         return _problem(case(seed))
     except ComponentError as error:
@@ -206,7 +206,7 @@ def _problem(scene: Scene) -> str | None:
     many, seconds = _timed(scene, STEPS)
     if seconds > LONGEST:
         return f"took {seconds:.1f} s in {STEPS} steps"
-    # runs whose impacts differ in number were decided otherwise by rounding; the others `apart` judges
+    # rounding decided otherwise where the numbers of impacts differ; `apart` judges the other runs
     if IMPACT_LIMIT not in (one.ended, many.ended) and one.counts == many.counts:
         rounded = EACH_IMPACT * scene.speed * sum(map(sum, one.counts))
         for _, difference, allowed in apart(scene, one, many, [scene.duration]):

@@ -1,4 +1,4 @@
-"""Any misuse of any command: one clear message, exit code 0, 1 or 2, and no file that nobody asked for."""
+"""Any misuse of any command: one clear message, exit code 0, 1 or 2, and no unrequested file."""
 
 from __future__ import annotations
 
@@ -140,13 +140,13 @@ WORDS = (
         "$HOME",
     ),
 )
-# Each would do minutes of work where it is used well; another kind or test does that.
+# Each of these would work for minutes if used well; another kind or test covers that.
 ONLY_MISUSED = {("campaign",), ("demo",), ("fmu", "build")}
 
 
 @functools.cache
 def commands() -> dict[tuple[str, ...], Any]:
-    """Return every command by its path, as the command line knows it."""
+    """Return every command by its path, from the command line's own table."""
     load_commands()
     found: dict[tuple[str, ...], Any] = {}
 
@@ -171,7 +171,7 @@ def dataset() -> bytes:
 
 
 def invocation(draw: random.Random) -> list[str]:
-    """Return a command with what may follow it, some of it right."""
+    """Return a command with arguments, some of them right."""
     path = draw.choice(sorted(commands()))
     words: list[str] = []
     for parameter in commands()[path].params:
@@ -180,7 +180,7 @@ def invocation(draw: random.Random) -> list[str]:
         elif parameter.name != "help" and draw.random() < (0.8 if parameter.name == "output" else 0.15):
             words += _option(draw, parameter)
     if path in ONLY_MISUSED:
-        # what is there already as a file cannot be the folder that is written
+        # an existing file cannot be the output folder
         return [*path, *(word for word in words if word != "scene.toml"), "--output", "empty"]
     if path == ("serve",):
         return [*path, *words, "--data", "empty"]  # used well it never ends
@@ -216,7 +216,7 @@ def _path(draw: random.Random) -> str:
 
 
 def check(seed: int) -> str | None:
-    """Call one command in this process and look at what it leaves."""
+    """Call one command in this process and check its message, its exit code and its files."""
     draw = random.Random(seed)
     words = invocation(draw)
     image = dataset()
@@ -252,16 +252,18 @@ def _said_badly(code: int, text: str) -> str | None:
 
 
 def _left(before: dict[str, bytes | None], words: list[str], code: int) -> str | None:
-    """Say which files came, went or changed that nobody asked for."""
+    """Return the files that came, went or changed without a request."""
     after = _contents()
     changed = sorted(
         name for name in before.keys() | after.keys() if before.get(name, b"") != after.get(name, b"")
     )
     if code:
         return f"exit code {code}, yet changed: {changed}" if changed else None
-    asked = {str(Path(word.partition("=")[2] or word)) for word in words}
+    requested = {str(Path(word.partition("=")[2] or word)) for word in words}
     # without --output an export is named after its component
     strange = [
-        name for name in changed if name not in asked and not (words[0] == "fmu" and name.endswith(".fmu"))
+        name
+        for name in changed
+        if name not in requested and not (words[0] == "fmu" and name.endswith(".fmu"))
     ]
     return f"changed without being asked for: {strange}" if strange else None

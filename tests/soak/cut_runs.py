@@ -1,7 +1,7 @@
-"""Runs that are cut anywhere: the impacts, contacts and rests of successive recordings add up to those of the whole.
+"""Runs that are cut anywhere: impacts, contacts and rests of successive recordings add up to those of the whole run.
 
-Bodies of every kind and law, fused and coupled; many points, in lanes and in the loop; bodies that hit each other, and
-bodies of other tools. Contacts are open, the body rests or chatters where a run is cut.
+Bodies of every kind and law run fused and coupled, and many points run in lanes and in the loop. Other runs have bodies
+that hit each other, or bodies of other tools. A cut meets open contacts, rest or chatter.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ POINTS = 6
 SCALE = 0.3
 """Displacement of the stops, m; the bodies move about twice as far."""
 PAIR_ROOM = {"restitution": 1e-6, "yields": 1e-2}
-"""Difference of the times of one event of two bodies in two runs, s: a cut makes other steps of a contact."""
+"""Largest difference of one event's time between two runs of a pair, s: a cut changes the steps of a contact."""
 RESTING = "bodies at rest on each other"
-"""What a run says whose pairs overlap in rest: whether they bounce at the release depends on its steps."""
+"""Remark of a run whose pairs overlap in rest: the steps decide whether the pair bounces at the release."""
 
 Tables = dict[str, Any]
 
 
 def check(seed: int) -> str | None:
-    """Return what does not add up in the run of this seed; None where all does."""
+    """Return the difference between the cut and the whole run of this seed; None without one."""
     draw = random.Random(seed)
     check_one = draw.choices((_fused, _coupled, _many_points, _pair, _foreign_body), (10, 2, 4, 2, 2))[0]
     return check_one(draw)
@@ -67,7 +67,7 @@ def _coupled(draw: random.Random) -> str | None:
 
 
 def _coupled_is_fused(tables: Tables, how: Tables, end: float) -> str | None:
-    """Compare the first impacts of a coupled run with those of the fused one."""
+    """Compare the first impacts of a coupled run with those of the fused run."""
     first: list[NDArray[np.float64]] = []
     scenes = Scene.from_dict(tables), Scene.from_dict(tables | {"execution": how})
     for scene, execution in zip(scenes, ("fused", "coupled"), strict=True):
@@ -135,7 +135,7 @@ def _chain(draw: random.Random, laws: list[Tables]) -> tuple[Tables, list[Tables
     }
     stops = []
     for k, law in enumerate(laws):
-        # of two stops on one side at one mass the farther one would be out of reach
+        # the farther of two stops on one side at one mass would be out of reach
         side, mass = ("upper", "lower")[k % 2], 1 + (draw.randrange(count) + k // 2) % count
         position = draw.choice((SCALE, 0.1)) * (1 if side == "upper" else -1)
         if not any(stop["mass"] == mass and stop["side"] == side for stop in stops):
@@ -165,14 +165,14 @@ def _beam(draw: random.Random, laws: list[Tables]) -> tuple[Tables, list[Tables]
 
 
 def stop_law(draw: random.Random, *, relaxes: bool = True) -> Tables:
-    """Return a law of a stop with its numbers."""
+    """Return a contact law of a stop with its parameters."""
     law = draw.choice(("restitution", "restitution", "kelvin_voigt", "hertz", "hunt_crossley"))
     if law == "restitution":
         yields = {"yield_velocity": draw.choice((0.05, 0.5))} if relaxes and draw.random() < 0.2 else {}
         return {"law": law, "restitution": draw.choice((0.0, 0.15, 0.3, 0.7, 0.95, 1.0))} | yields
     stop: Tables = {"law": law, "stiffness": 10.0 ** draw.uniform(0.7, 5.0)}
     if law == "kelvin_voigt":
-        # an importer finds the end of a strong dashpot's force no better than its steps
+        # an importer locates the end of a strong dashpot's force only to within its steps
         stop["damping"] = draw.choice((0.0, 0.1, 3.0, 30.0) if relaxes else (0.0, 0.1, 0.5))
         if relaxes:
             stop["relaxation_time"] = draw.choice((0.0, 0.0, 0.1, 2.0))
@@ -198,7 +198,7 @@ def _driven(draw: random.Random, body: Tables) -> Tables:
 
 
 def _many_points(draw: random.Random) -> str | None:
-    """Cut the runs of many points, which go in lanes or in the loop, at a time or, forced, at a period."""
+    """Cut the runs of many points, which go in lanes or in the loop, at an instant or, when forced, at a period."""
     tables = body_tables(draw)
     if draw.random() < 0.5:  # rigid stops can go in lanes
         tables["stop"] = [
@@ -221,7 +221,7 @@ def _many_points(draw: random.Random) -> str | None:
         counts = [_counts(tables, is_forced, *window) for window in windows]
     except VibroimpactError as error:
         return f"{json.dumps(tables)}: {error}"
-    # chaos multiplies rounding by anything; lanes are followed in other steps from another beginning
+    # chaos multiplies rounding by any factor; lanes that start elsewhere take other steps
     few = [k for k, own in enumerate(zip(*counts, strict=True)) if None not in own and own[-1] < MOST_EVENTS]
     *parts, whole = [[count[k] or 0 for k in few] for count in counts]
     problem = counts_differ(parts, whole)
@@ -229,7 +229,7 @@ def _many_points(draw: random.Random) -> str | None:
 
 
 def _counts(tables: Tables, is_forced: bool, begin: float, end: float) -> list[int | None]:
-    """Return the impacts and rests of each point in a recording; None where a graze is one of them."""
+    """Return the impacts and rests of each point in a recording; None where one of them is a graze."""
     unit = "periods" if is_forced else "time"
     window = {f"transient_{unit}": begin, f"recorded_{unit}": end - begin}
     scene = Scene.from_dict(tables | {"record": window})
@@ -279,7 +279,7 @@ def _pair(draw: random.Random) -> str | None:
 
 
 def pair_law(draw: random.Random) -> Tables:
-    """Return a law of two bodies that hit each other."""
+    """Return a contact law of two bodies that hit each other."""
     law = draw.choice(("restitution", "kelvin_voigt", "hertz", "hunt_crossley"))
     if law == "restitution":
         return {"restitution": draw.choice((0.0, 0.5, 0.8, 1.0))}
@@ -288,7 +288,7 @@ def pair_law(draw: random.Random) -> Tables:
 
 
 def _foreign_body(draw: random.Random) -> str | None:
-    """Cut a run of a body of another tool, at a stop that yields or at a body of this package."""
+    """Cut a run of a body of another tool, at a compliant stop or at a body of this package."""
     mass = fmu_factory.mass(Path.cwd(), draw.choice(("2.0", "3.0")))
     variables = {"displacement": "x", "velocity": "v", "force": "f", "mass": 1.0}
     parameters = {
@@ -342,7 +342,7 @@ def _cut_general(draw: random.Random, tables: Tables, end: float) -> str | None:
 
 
 def _events(tables: Tables, begin: float, end: float) -> tuple[NDArray[np.float64], str]:
-    """Return the times of the events of a recording, s, and what the run says."""
+    """Return the times of the events of a recording, s, and the messages of the run."""
     window = {"transient_time": begin, "recorded_time": end - begin}
     runner = GeneralRunner(Scene.from_dict(tables | {"record": window}, str(Path.cwd() / "scene.toml")))
     try:

@@ -1,4 +1,4 @@
-"""Damaged and hostile NetCDF and MATLAB files through every door that reads them: opened, or one line of refusal."""
+"""Damaged and hostile NetCDF and MATLAB files through every reader: opened, or refused in one line."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ DOORS: tuple[Door, ...] = (
 
 @functools.cache
 def whole(kind: str) -> bytes:
-    """Return a sound file, without the hash that would give damage away."""
+    """Return a sound file, without the hash that would reveal damage."""
     path = Path(f"{kind}.base")
     if kind == "matlab":
         content = io.BytesIO()
@@ -164,10 +164,10 @@ DIMENSIONS = ("run", "period", "impact", "stick", "sample", "event", "time", "es
 
 
 def hostile(path: Path, draw: random.Random) -> None:
-    """Write a file of names that mean something, with types, sizes and attributes that do not fit."""
+    """Write a file with known names whose types, sizes and attributes do not fit."""
     with netCDF4.Dataset(path, "w", format=draw.choice(["NETCDF4", "NETCDF4", "NETCDF3_CLASSIC"])) as file:
         old = file.data_model != "NETCDF4"
-        large = draw.choice(DIMENSIONS)  # two would make variables of gigabytes
+        large = draw.choice(DIMENSIONS)  # two large dimensions would make variables of gigabytes
         for name in DIMENSIONS:
             size = draw.choice([1, 2, 3, 5, 7] if old else [0, 1, 2, 3, 5, 7])
             file.createDimension(name, 20_000 if name == large else size)
@@ -212,7 +212,7 @@ def _variable(file: netCDF4.Dataset, name: str, draw: random.Random, old: bool) 
             [1, -1, 2, 100, np.nan, 1e300]
         )
         variable.set_auto_maskandscale(False)
-        with suppress(RuntimeError):  # what the library cannot store stays unwritten
+        with suppress(RuntimeError):  # the library does not store every value
             variable[...] = np.nan_to_num(values).astype(made) if made[0] != "f" else values
 
 
@@ -224,7 +224,7 @@ def _attribute(holder: object, name: str, draw: random.Random) -> None:
 
 
 def check(seed: int) -> str | None:
-    """Open one damaged or hostile file through every door."""
+    """Open one damaged or hostile file by every reader."""
     draw = random.Random(seed)
     path = Path.cwd() / draw.choice(["file.nc", "file.nc", "file.mat"])
     if draw.random() < 0.7:
@@ -249,7 +249,7 @@ def check(seed: int) -> str | None:
 
 
 def _refusal(door: Door, path: Path) -> str | None:
-    """Return what is wrong with how a door refuses a file; any other error comes out."""
+    """Return the problem of a reader's refusal; any other error propagates."""
     try:
         door(path)
     except VibroimpactError as refusal:

@@ -1,4 +1,4 @@
-"""A program that drives an output is interrupted, or killed, at a random moment: no jump, and the output at 0 V."""
+"""A program that drives an output is interrupted or killed at a random moment: no jump, and the output at 0 V."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from support.places import ROOT
 from support.rig_bench import opened_bench
 
 CASES = 40
-"""20 of Ctrl-C and 20 of SIGKILL."""
+"""Half of the cases are Ctrl-C, half SIGKILL."""
 SAMPLE = 1
 SECONDS = 120.0
 SPEED = 0.5
-"""Of the rig, so that cases beside it starve no output."""
+"""Speed of the rig's clock: at half speed, parallel cases starve no output."""
 WITHIN = 1.0
-"""Time of the rig from a kill to the output at 0 V, s."""
+"""Largest time of the rig from a kill to the output at 0 V, s."""
 
 
 def check(seed: int) -> str | None:
-    """Drive, interrupt or kill, and look at every sample that was put out."""
+    """Drive, interrupt or kill, and check every output sample."""
     chance, killed = random.Random(seed), bool(seed % 2)
     with opened_bench(ROOT / "examples" / "rig" / "oscillator.toml", lockstep=False) as bench:
         bench.control.pace(speed=SPEED)

@@ -1,4 +1,4 @@
-"""Random bodies, stops and forcing as exported FMUs: FMPy, with nothing set, makes of them what the scene's run is."""
+"""Random bodies, stops and forcing as exported FMUs: FMPy, with no value set, reproduces the scene's run."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ CASES, SAMPLE = 1000, 2
 SECONDS = 60.0
 SAMPLES = 200
 MOST_IMPACTS = 6
-"""Impacts up to which two runs that step in other places are compared: beyond, rounding grows in chaotic motion."""
+"""Impacts up to which two runs with different steps are compared: beyond, rounding grows in chaotic motion."""
 TOLERANCE = 1e-7
 OUTPUTS = ("displacement", "velocity", "acceleration")
 
 
 def check(seed: int) -> str | None:
-    """Return what is wrong with the export of a random scene; None where nothing is."""
+    """Return the fault of the export of a random scene; None without one."""
     draw = random.Random(seed)
     tables = drawn_tables(draw)
     try:
@@ -65,7 +65,7 @@ def _difference(done: Any, samples: Any, stops: int, tables: dict[str, Any]) -> 
     for output in OUTPUTS:
         ours, theirs = samples[output].values[:length], done[output][:length]
         scale = float(np.abs(ours).max(initial=1e-300))
-        # a velocity jumps at an impact: a sample at one is before it or after it
+        # a velocity jumps at an impact: a sample there shows the value before it or after it
         apart = np.sort(np.abs(ours - theirs) / scale)[: length - 2 * MOST_IMPACTS]
         if len(apart) and not float(apart[-1]) <= TOLERANCE:
             return f"{tables}: {output} differs by {apart[-1]:.2g} of its largest within {length} samples"
@@ -98,7 +98,7 @@ def drawn_tables(draw: random.Random) -> dict[str, Any]:
         record["recorded_periods"] = math.ceil(duration * angular_frequency / (2.0 * math.pi)) + 1
     else:
         record["recorded_time"] = duration
-    # a second stop is on the other side: of two on one side the farther is out of reach
+    # a second stop is on the other side: the farther of two on one side would be out of reach
     sides = draw.sample(("upper", "lower"), draw.randrange(3))
     gaps = (0.3, 0.8) if len(sides) == 2 else (0.0, 0.3, 0.8)
     tables["stop"] = [_stop(draw, side, draw.choice(gaps) * scale["length"], body, scale) for side in sides]

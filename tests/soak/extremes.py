@@ -1,4 +1,4 @@
-"""Example scenes with one or two numbers of extreme size: an outcome or one clear error, by their deadline."""
+"""Example scenes with one or two numbers of extreme size: an outcome or one clear error, before their deadline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.scene.sweep import expand
 SAMPLE = 12
 DEADLINE = 1.0
 GRACE = 1.5
-"""Processor time that reading a scene, starting it and the piece of work under way may take beyond the deadline, s."""
+"""Processor time beyond the deadline for reading a scene, its start and the piece of work under way, s."""
 LONGEST_MESSAGE = 4000
 
 SCENES = sorted(path for path in EXAMPLES.rglob("*.toml") if path.parent.name != "recordings")
@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"(?<![\w.\"-])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![
 
 
 def check(seed: int) -> str | None:
-    """Run the first point of a scene of this seed; None where it ended in time and said one thing."""
+    """Run the first point of a scene of this seed; None where it ended in time with one outcome or error."""
     draw = random.Random(seed)
     path = draw.choice(SCENES)
     text, changes = _changed(draw, path.read_text(encoding="utf-8"))
@@ -65,7 +65,7 @@ def _run_first(scene: Scene) -> None:
 
 
 def _changed(draw: random.Random, text: str) -> tuple[str, list[str]]:
-    """Replace one or two of the numbers that stand behind an equals sign."""
+    """Replace one or two of the numbers to the right of an equals sign."""
     lines, changes = text.splitlines(), []
     places = [i for i, line in enumerate(lines) if _numbers(line)]
     for i in draw.sample(places, min(len(places), draw.choice((1, 1, 2)))):

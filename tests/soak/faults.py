@@ -1,9 +1,9 @@
-"""Everything at once: a campaign of FMUs that misbehave, disturbed in every way, loses and doubles no innocent point.
+"""All faults at once: a campaign of misbehaving FMUs, disturbed in every way, loses and doubles no innocent point.
 
-One point of a hundred segfaults, one hangs, one gives NaN. Meanwhile workers are killed and stopped, the command is
-killed, its disk is full, parts are damaged and the scheduler is restarted; each time the same command goes on. What
-comes out is compared, bit for bit, with what nobody disturbed. A service that is killed gets as many points: of an
-oscillator, since it loads no FMUs of others.
+One point of a hundred segfaults, one hangs, one gives NaN. Meanwhile workers are killed and stopped, and the command is
+killed. Its disk is full, parts are damaged and the scheduler is restarted; each time the same command goes on. The
+result is compared, bit for bit, with an undisturbed one. A service that is killed gets as many points of an
+oscillator, since it loads no foreign FMUs.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 
 CASES = 2
 SAMPLE = 0
-"""None: `make test` has a campaign of a few hundred points of its own (`tests/end_to_end/test_fault_campaign.py`)."""
+"""0: `make test` has a campaign of a few hundred points of its own (`tests/end_to_end/test_fault_campaign.py`)."""
 SECONDS = 3600.0
 POINTS = 10_000
 SERVICE_TRANSIENT = 4_000
-"""Periods before the recording: a point of the service's takes some two milliseconds."""
+"""Forcing periods before the recording: a point of the service takes some two milliseconds."""
 POINTS_PER_SECOND = 60.0
-"""On an idle machine of two processors, hangs and crashes included: so long is a round before its command is killed."""
+"""Rate on an idle machine of two processors, with hangs and crashes; it sets the time of a round before its kill."""
 DEADLINE = 0.5
 STOPPED_SECONDS = 3.0 * DEADLINE
-"""How long a process is stopped: longer than a point may take."""
+"""Duration for which a process is stopped, s: longer than a point may take."""
 WAIT_SECONDS = 1800.0
 GUILTY = {4: Outcome.timeout, 7: Outcome.crash, 10: Outcome.error}
-"""What becomes of the inputs that leave these numbers of a hundred (`by_input` of Faulty)."""
+"""Outcomes of the inputs whose number modulo 100 is a key (`by_input` of Faulty)."""
 FULL = 1024
-"""Bytes that a file may have once the disk counts as full."""
+"""Largest size of a file once the disk counts as full, byte."""
 SCENE = """
 [scene]
 title = "guilty and innocent"
@@ -79,7 +79,7 @@ def check(seed: int) -> str | None:
 
 
 def disturbed(chance: random.Random, points: int, rounds: list[str]) -> str | None:
-    """Disturb a campaign in each of the ways named, in their order, let it end, and compare."""
+    """Disturb a campaign in each of the named ways, in order, let it end, and compare."""
     Path("scene.toml").write_text(
         SCENE.format(
             fmu=fmu_factory.faulty(Path.cwd(), "3.0").name, last=points - 1, points=points, deadline=DEADLINE
@@ -107,7 +107,7 @@ class Command:
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
                 start_new_session=True,
-                # Python itself writes compiled modules cut off where the disk is full
+                # Python itself leaves truncated compiled modules where the disk is full
                 env=os.environ | {"TMPDIR": str(Path("scratch").absolute()), "PYTHONDONTWRITEBYTECODE": "1"},
             )
 
@@ -127,7 +127,7 @@ class Command:
         return workers_of(self.process.pid)
 
     def runs_for(self, seconds: float) -> bool:
-        """Wait so long; return whether it still runs."""
+        """Wait for a number of seconds; return whether the command still runs."""
         try:
             self.process.wait(max(seconds, 0.0))
         except subprocess.TimeoutExpired:
@@ -135,11 +135,11 @@ class Command:
         return False
 
     def said(self) -> str:
-        """Return what it wrote to its standard error."""
+        """Return the text of its standard error."""
         return self._errors.read_text(encoding="utf-8")
 
     def end(self, *, by_force: bool) -> tuple[int | None, str]:
-        """Kill it, or wait for its end; return its exit code (None: it hung) and what it said."""
+        """Kill it, or wait for its end; return its exit code (None: it hung) and its messages."""
         if by_force:
             self.process.kill()
         try:
@@ -153,8 +153,8 @@ class Command:
         return (1, f"processes outlived it: {outlived}") if outlived else (code, self.said()[-2000:])
 
 
-def _begun(*options: str) -> Command:
-    """Start the command and wait until it has computed something."""
+def _started(*options: str) -> Command:
+    """Start the command and wait until it has computed some points."""
     before = _parts_there()
     command = Command(*options)
     wait_until(lambda: command.process.poll() is not None or _parts_there() - before != set())
@@ -165,12 +165,12 @@ def _parts_there() -> set[str]:
     return {part.name for part in Path("campaign", "parts").glob("branch-*.nc")}
 
 
-# ---- rounds: None, or a problem ----
+# ---- rounds: each returns None or a problem ----
 
 
 def _workers(chance: random.Random, seconds: float) -> str | None:
-    """Kill and stop workers and what they are forked from; stop all processes now and then, as Ctrl-Z and a lid do."""
-    command, end = _begun(), time.monotonic() + seconds
+    """Kill and stop workers and their fork server; stop all processes now and then, as Ctrl-Z and a closed lid do."""
+    command, end = _started(), time.monotonic() + seconds
     while command.runs_for(min(chance.expovariate(0.5), end - time.monotonic())):
         if time.monotonic() >= end:
             break
@@ -187,21 +187,21 @@ def _workers(chance: random.Random, seconds: float) -> str | None:
 
 
 def _client(_chance: random.Random, seconds: float) -> str | None:
-    command = _begun()
+    command = _started()
     command.runs_for(seconds)
     return _killed(command)
 
 
 def _killed(command: Command) -> str | None:
-    """Kill a command that has not ended by itself; one that has must have ended well."""
+    """Kill a command that still runs; a command that has ended must have ended well."""
     over = command.process.poll()
     code, said = command.end(by_force=True)
     return None if over in (None, 0) and code in (0, -signal.SIGKILL) else f"exit code {code}: {said}"
 
 
 def _disk(_chance: random.Random, seconds: float) -> str | None:
-    """Let the disk be full from some moment on: no file may grow."""
-    command = _begun()
+    """Fill the disk from some moment on: no file may grow."""
+    command = _started()
     command.runs_for(seconds)
     for process in command.session():
         process.rlimit(psutil.RLIMIT_FSIZE, (FULL, FULL))
@@ -213,7 +213,7 @@ def _disk(_chance: random.Random, seconds: float) -> str | None:
 
 
 def _parts(chance: random.Random, seconds: float) -> str | None:
-    """Damage parts: each is named. One that lost its hash and nothing else is whole, as those of version 0.1 are."""
+    """Damage parts: each is named. A part that lost only its hash is whole, as the parts of version 0.1 are."""
     parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
     damaged = chance.sample(parts, min(3, len(parts)))
     hurt = []
@@ -222,7 +222,7 @@ def _parts(chance: random.Random, seconds: float) -> str | None:
         part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, sound))
         if part.read_bytes() not in (sound, sound[:-LINE_LENGTH]):
             hurt.append(part)
-    command = _begun()
+    command = _started()
     command.runs_for(seconds)
     said = command.said()
     unnamed = [part.name for part in hurt if f"{part.name} was damaged and is removed" not in said]
@@ -230,11 +230,11 @@ def _parts(chance: random.Random, seconds: float) -> str | None:
 
 
 def _scheduler(chance: random.Random, seconds: float) -> str | None:
-    """Restart the scheduler of others in the middle, and kill one of its workers before."""
+    """Kill a worker of an external scheduler, then restart the scheduler in the middle of the campaign."""
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     with _external(port) as first:
-        command = _begun("--scheduler", address)
+        command = _started("--scheduler", address)
         command.runs_for(0.3 * seconds)
         chance.choice(first[1:]).kill()
         command.runs_for(0.3 * seconds)
@@ -255,7 +255,7 @@ def _free_port() -> int:
 
 @contextmanager
 def _external(port: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Start a scheduler and three workers that belong to nobody, and kill them."""
+    """Start a scheduler and three workers outside of the campaign; kill them at the end."""
     Path("external").mkdir(exist_ok=True)
     commands = [["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]]
     worker = ["worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
@@ -294,7 +294,7 @@ ROUNDS: dict[str, Callable[[random.Random, float], str | None]] = {
 }
 
 
-# ---- what comes out ----
+# ---- results ----
 
 
 def _compared(points: int) -> str | None:
@@ -310,7 +310,7 @@ def _compared(points: int) -> str | None:
 
 
 def _misjudged(rows: xr.Dataset, points: int) -> str | None:
-    """Name points that are lost, doubled, or blamed for what they have not done."""
+    """Name points that are lost, doubled, or blamed wrongly."""
     inputs = rows["u"].values
     if not np.array_equal(inputs, np.arange(float(points))):
         return f"{len(inputs)} rows, which are not the {points} points each once"
@@ -325,6 +325,6 @@ def _misjudged(rows: xr.Dataset, points: int) -> str | None:
 
 
 def _content(rows: xr.Dataset) -> Content:
-    """Return the bits of everything but the messages of those whose process died: what they say depends on where."""
+    """Return the bits of all variables, without the messages of failed points: their text depends on the place."""
     innocent = rows["outcome"].values == Outcome.ok
     return bits_of(rows.assign(message=rows["message"].where(innocent, "")))

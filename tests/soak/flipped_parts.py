@@ -1,8 +1,8 @@
-"""Damage to the files of a campaign: the dataset is bit for bit the undisturbed one, or one clear error says no.
+"""Damage to the files of a campaign: the dataset equals the undisturbed one bit for bit, or one clear error refuses it.
 
-A campaign of a few points is damaged at a seeded place of one file: a part, the rows kept from an earlier sweep, the
-manifest or the dataset. Then the same command is given. A damaged part must be computed again, and a damaged manifest
-made again; a damaged dataset may be refused.
+A campaign of a few points is damaged at a seeded place of one file, then the same command is given. The file is a
+part, the rows kept from an earlier sweep, the manifest or the dataset. A damaged part must be computed again, and a
+damaged manifest made again; a damaged dataset may be refused.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Files = dict[str, bytes]
 
 @lru_cache(maxsize=1)
 def folders() -> dict[str, tuple[str, Files]]:
-    """Return the files of a campaign at different times of its life, each with the scene that it goes on with."""
+    """Return the files of a campaign at different times of its life, each with the scene of its next command."""
     with TemporaryDirectory() as place, pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedule, "FIRST_POINTS", 2)
         patch.setattr(schedule, "MOST_POINTS", 2)
@@ -52,14 +52,14 @@ def folders() -> dict[str, tuple[str, Files]]:
 
 @lru_cache(maxsize=2)
 def undisturbed(text: str) -> xr.Dataset:
-    """Return the dataset of a scene that nothing disturbed."""
+    """Return the dataset of a scene without any disturbance."""
     with TemporaryDirectory() as place, pytest.MonkeyPatch.context() as patch:
         campaign_here(patch, text, Path(place, "campaign"), runner=RUNNER)
         return read_flat(Path(place, "campaign", "dataset.nc"))
 
 
 def check(seed: int) -> str | None:
-    """Damage one file of a campaign and go on with it."""
+    """Damage one file of a campaign and resume the campaign."""
     draw = random.Random(seed)
     text, files = folders()[draw.choice(sorted(folders()))]
     name = draw.choice(sorted(files))
@@ -138,7 +138,7 @@ def _flip(draw: random.Random, content: bytes) -> bytes:
 
 
 def _flip_at_an_end(draw: random.Random, content: bytes) -> bytes:
-    """Flip a bit where files say what they are: in their first and last bytes."""
+    """Flip a bit in the first or last bytes, which identify the file."""
     damaged = bytearray(content)
     place = draw.randrange(100)
     damaged[place if draw.random() < 0.5 else -1 - place] ^= 1 << draw.randrange(8)
@@ -174,7 +174,7 @@ def _repeat(draw: random.Random, content: bytes) -> bytes:
 
 
 def _digit(draw: random.Random, content: bytes) -> bytes:
-    """Change a digit, which text bears without being broken."""
+    """Change a digit, which leaves a text readable."""
     places = [place for place, byte in enumerate(content) if chr(byte).isdigit()]
     damaged = bytearray(content)
     if places:

@@ -1,8 +1,8 @@
-"""FMUs that may not be stepped anywhere, and FMUs with clocks: the right values, or a refusal that names why.
+"""FMUs with restricted steps, and FMUs with clocks: the right values, or a refusal that names the reason.
 
-Components that declare one size of steps (`canHandleVariableCommunicationStepSize = false`) or a grid of their own
-(`fixedInternalStepSize`) and punish every other step without a word, beside rates, contacts, events, impacts and clocks
-that would cut their steps. Input clocks of any interval, shift and variability.
+Some components declare one step size (`canHandleVariableCommunicationStepSize = false`) or an own grid
+(`fixedInternalStepSize`). They silently give wrong values for every other step. Rates, contacts, events, impacts and
+clocks beside them would cut their steps. Input clocks have any interval, shift and variability.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CASES, SAMPLE = 4000, 4
 SECONDS = 60.0
 
 EXACT, GRID, ONE_SIZE = 0.0, 3.0, 5.0
-"""Schemes of the Mass: its exact flow, Euler steps at multiples of its inner step, one size of steps."""
+"""Schemes of the Mass: its exact flow, Euler steps at multiples of its inner step, and one step size."""
 STIFFNESS = 4.0
 EVERY_SIZE = 'canHandleVariableCommunicationStepSize="true"'
 FLAGS = {
@@ -44,13 +44,13 @@ Floats = NDArray[np.float64]
 
 
 def check(seed: int) -> str | None:
-    """Return what is wrong with the run of this seed; None where its values or its refusal are right."""
+    """Return the fault of the run of this seed; None where its values or its refusal are right."""
     draw = random.Random(seed)
     return _clocks(draw) if draw.random() < 0.3 else _steps(draw)
 
 
 def _run(tables: Tables, judge: Callable[[RunRecord], str | None], reasons: list[str]) -> str | None:
-    """Run a scene; a refusal has to hold one of these reasons."""
+    """Run a scene; a refusal has to contain one of the given reasons."""
     try:
         runner = GeneralRunner(Scene.from_dict(tables, str(Path.cwd() / "scene.toml")))
         try:
@@ -91,9 +91,9 @@ def _steps(draw: random.Random) -> str | None:
     }
     reach = _cut(draw, tables, has_states)
     reasons = [] if scheme == EXACT else [FLAGS[scheme]]
-    if "ball" in tables["component"]:  # it has a grid too
+    if "ball" in tables["component"]:  # the ball has a grid too
         reasons.append(f"{FLAGS[GRID]}0.001")
-    if not has_states:  # what steps are repeated for needs states
+    if not has_states:  # a repeated step needs states
         reasons += (
             ["canGetAndSetFMU", "cannot restore", "state"] if "contact" in tables or "event" in tables else []
         )
@@ -103,7 +103,7 @@ def _steps(draw: random.Random) -> str | None:
 
 
 def _described_mass(fmi: str, scheme: float, step: float, has_states: bool) -> str:
-    """Write a Mass that declares how it steps; return its file."""
+    """Write a Mass that declares its stepping; return the name of its file."""
     mass = fmu_factory.mass(Path.cwd(), fmi, states=has_states)
     own = {
         ONE_SIZE: EVERY_SIZE.replace("true", "false"),
@@ -114,7 +114,7 @@ def _described_mass(fmi: str, scheme: float, step: float, has_states: bool) -> s
 
 
 def _cut(draw: random.Random, tables: Tables, has_states: bool) -> float:
-    """Add what may cut the steps of the mass; return the displacement up to which it moves freely, m."""
+    """Add something that may cut the steps of the mass; return its largest free displacement, m."""
     components = tables["component"]
     match draw.randrange(7):
         case 0:
@@ -154,13 +154,13 @@ def _cut(draw: random.Random, tables: Tables, has_states: bool) -> float:
 def _wrong_motion(
     record: RunRecord, scheme: float, step: float, macro_step: float, has_states: bool, reach: float
 ) -> str | None:
-    """Return how far samples are from the motion of the mass, which nothing drives; in a contact, from its energy."""
+    """Return the error of samples against the motion of the undriven mass; in a contact, the error of its energy."""
     assert record.samples is not None
     time, x, v = record.samples.T
     if reach < 0.5:
         energy = 0.5 * v**2 + 0.5 * STIFFNESS * x**2 + 250.0 * (x - reach).clip(0.0) ** 2
         off = np.abs(energy - 0.5)
-        # a force is held over each step of a contact, which ends with the right energy; bodies without states arrive
+        # each step of a contact holds its force constant, and ends with the right energy. Bodies without states arrive
         # late, and their samples between steps are interpolated
         inside = x > reach - macro_step
         allowed = np.where(inside, 0.02, 1e-6) if has_states else np.full(len(x), 0.2)
@@ -239,7 +239,7 @@ def _clocks(draw: random.Random) -> str | None:
 def _wrong_ticks(
     record: RunRecord, tick: tuple[float, float], late: tuple[float, float], is_fed: bool
 ) -> str | None:
-    """Return what is wrong with the ticks of both clocks, each an interval and a shift, and with what they count."""
+    """Return the fault of the ticks of both clocks (each an interval and a shift) or of their counts."""
     assert record.samples is not None
     time, y, ticks, late_ticks, total = record.samples.T
     apart = np.full(len(time), np.inf)
@@ -248,17 +248,17 @@ def _wrong_ticks(
         instants = shift + interval * np.arange(int(time[-1] / interval) + 2)
         expected = (instants[None] < time[:, None]).sum(axis=1)
         apart = np.minimum(apart, np.abs(instants[None] - time[:, None]).min(axis=1))
-        sure = (
+        clear = (
             np.abs(instants[None] - time[:, None]).min(axis=1) > 1e-9
-        )  # beside a tick it may be before or after
-        if (counted[sure] != expected[sure]).any():
-            return f"{name}: {counted[sure].tolist()} ticks for {expected[sure].tolist()}"
+        )  # a sample at a tick may come before or after it
+        if (counted[clear] != expected[clear]).any():
+            return f"{name}: {counted[clear].tolist()} ticks for {expected[clear].tolist()}"
         expected_total += (time[:, None] - instants[None]).clip(0.0).sum(axis=1)
     if not np.allclose(total, expected_total, rtol=0.0, atol=1e-8):
         return f"sum off by {float(np.abs(total - expected_total).max()):.2g}"
     last = tick[1] + tick[0] * (ticks - 1.0)
     expected_y = np.where(ticks > 0, 10.0 * ticks + (last if is_fed else 0.0), 0.0)
-    sure = apart > 1e-9
-    if not np.allclose(y[sure], expected_y[sure], rtol=0.0, atol=1e-9):
-        return f"y off by {float(np.abs(y - expected_y)[sure].max()):.2g}"
+    clear = apart > 1e-9
+    if not np.allclose(y[clear], expected_y[clear], rtol=0.0, atol=1e-9):
+        return f"y off by {float(np.abs(y - expected_y)[clear].max()):.2g}"
     return None

@@ -1,6 +1,6 @@
 """Parquet and Feather files of drawn columns, types and packing: read equal; odd and damaged ones: read or refused.
 
-Parquet may have a CRC-32 of each page: such a file, damaged within its pages, is refused or read equal.
+Parquet may have a CRC-32 of each page: a file damaged within such pages is refused or read equal.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FOOTER = 12
 
 
 def drawn_table(draw: random.Random) -> tuple[pa.Table, files.Truth]:
-    """Return a table, and what is to be read of it."""
+    """Return a table, and its expected reading."""
     signals = files.drawn_signals(draw)
     headings = [
         f"{name} [{unit}]" if unit else name for name, unit in zip(signals.names, signals.units, strict=True)
@@ -80,7 +80,7 @@ def _write(draw: random.Random, table: pa.Table, path: Path, *, summed: bool = F
 
 
 def _odd(draw: random.Random) -> pa.Table:
-    """Return a table with names and types that fit no recording."""
+    """Return a table with names and types unfit for a recording."""
     rows = draw.choice((0, 1, 2, 30))
     arrays, names = [], []
     for _ in range(draw.randint(0, 6)):

@@ -46,7 +46,7 @@ STRANGE = ("<!-- a comment -->", "<?a b?>", "\n\n", "  ")
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable as it is written; `start` is None where there is none."""
+    """A variable as written in the file; `start` is None where there is none."""
 
     name: str
     reference: int
@@ -58,7 +58,7 @@ class Variable:
 
 
 def drawn_variables(draw: random.Random) -> list[Variable]:
-    """Return variables of names and references of their own."""
+    """Return variables with unique names and references."""
     found = []
     for place, name in enumerate(draw.sample(NAMES, draw.randint(1, 8)), 1):
         kind = draw.choice(list(TYPES))

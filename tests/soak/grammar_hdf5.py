@@ -14,7 +14,7 @@ from soak import _drawn_files as files
 
 CASES, SAMPLE = files.CASES, files.SAMPLE
 SECONDS = 3.0 * files.SECONDS
-"""Values that nobody wrote take no space: the process that reads may meet 400 MB of them twice within its own 10 s."""
+"""Thrice the usual limit: unwritten values take no space; a reader may meet 400 MB of them twice in its own 10 s."""
 
 TYPES = ("f8", "f8", "f4", ">f8", "i2", "i4", "u1", ">i2")
 HEAD = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
@@ -36,7 +36,7 @@ CLASSES = ("double", "single", "int16", "char", "struct", "cell", "logical")
 
 
 def _layout(draw: random.Random, values: Any) -> dict[str, Any]:
-    """Return how a dataset is stored."""
+    """Return the storage options of a dataset."""
     if draw.random() < 0.5:
         return {}
     packing = draw.choice(({}, {"compression": "gzip"}, {"compression": "lzf"}, {"shuffle": True}))
@@ -82,7 +82,7 @@ def _sound(draw: random.Random, path: Path, *, matlab: bool) -> files.Truth:
 
 
 def _in_order(truth: files.Truth, names: list[str]) -> files.Truth:
-    """Return the truth with its channels in the order of their names, in which HDF5 lists them."""
+    """Return the truth with its channels in the order of their names, as HDF5 lists them."""
     order = sorted(range(len(names)), key=lambda at: names[at])
     return files.Truth(
         [truth.values[at] for at in order],

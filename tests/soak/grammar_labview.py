@@ -38,13 +38,13 @@ KEYS = (
     "X_Dimension",
     "Y_Unit_Label",
 )
-"""Entries that mean something."""
+"""Entries with a meaning."""
 END = "***End_of_Header***"
 
 
 @dataclass(frozen=True)
 class Form:
-    """How a file is written: its separator, decimal sign and columns of instants."""
+    """Style of a file: its separator, decimal sign and columns of instants."""
 
     name: str
     decimal: str
@@ -55,12 +55,12 @@ class Form:
         return SEPARATORS[self.name]
 
     def written(self, value: float) -> str:
-        """Return a number as the file has it."""
+        """Return a number in the file's style."""
         return f"{value:.6f}".replace(".", self.decimal)
 
 
 def drawn_file(draw: random.Random) -> tuple[list[str], Form, files.Truth]:
-    """Return the lines of a file, its form, and what is to be read."""
+    """Return the lines of a file, its style, and its expected reading."""
     name = draw.choice(list(SEPARATORS))
     form = Form(
         name, draw.choice((".", ",")) if name != "Comma" else ".", draw.choice(("No", "One", "Multi"))
@@ -122,7 +122,7 @@ def _rows(draw: random.Random, form: Form, signals: files.Signals, values: list[
 
 
 def odd_entries(draw: random.Random, lines: list[str], mark: str) -> list[str]:
-    """Return a file whose header says odd things."""
+    """Return a file with an odd header."""
     ends = [place for place, line in enumerate(lines) if line.startswith(END)]
     for _ in range(draw.choice((1, 2, 5))):
         cells = [

@@ -35,7 +35,7 @@ ODD: tuple[Any, ...] = (
 
 
 def _changed(draw: random.Random, content: bytes) -> bytes:
-    """Return the JSON with odd values, without keys, or damaged; its hash stays what it was."""
+    """Return the JSON with odd values, without keys, or damaged; its hash stays."""
     if draw.random() < 0.4:
         return files.damaged(draw, content)
     document = json.loads(content)

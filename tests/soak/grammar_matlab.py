@@ -20,7 +20,7 @@ TYPES = ("f8", "f8", "f4", "i2", "i4", "u1", "u2")
 
 
 def drawn_variables(draw: random.Random) -> tuple[dict[str, Any], files.Truth]:
-    """Return variables by name, and what is to be read of them."""
+    """Return variables by name, and their expected reading."""
     signals = files.drawn_signals(draw)
     values = [_as(draw.choice(TYPES), one) for one in signals.values]
     shape = draw.choice(((-1, 1), (1, -1)))
@@ -52,7 +52,7 @@ def _as(kind: str, values: files.Floats) -> Any:
 
 
 def _odd_element(draw: random.Random, depth: int = 0) -> bytes:
-    """Return an array whose class, size, names and numbers are odd here and there."""
+    """Return an array with some odd class, size, name or number."""
     count = draw.choice((0, 1, 2, 5))
     dims = [
         files.bounded(files.number(draw, count, 1, 1), 32, signed=True)
@@ -74,7 +74,7 @@ def _odd_element(draw: random.Random, depth: int = 0) -> bytes:
 
 
 def _odd_matrix(draw: random.Random) -> bytes:
-    """Return a matrix of version 4 whose head is odd here and there."""
+    """Return a matrix of version 4 with a partly odd header."""
     count = draw.choice((0, 1, 5))
     kind = files.bounded(files.number(draw, 0, 0, 10, 20, 1, 2, 1000), 32, signed=True)
     rows, columns = (files.bounded(files.number(draw, usual), 32, signed=True) for usual in (count, 1))
@@ -105,7 +105,7 @@ def check(seed: int) -> str | None:
     if kind < 0.8:
         return files.sound(path, truth)
     content = path.read_bytes()
-    # each variable that is packed ends with an Adler-32
+    # each packed variable ends with an Adler-32
     path.write_bytes(_flipped_inside(draw, content) if is_packed else files.damaged(draw, content))
     return files.odd(path, equal=truth if is_packed else None, crashes=True)
 

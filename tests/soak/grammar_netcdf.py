@@ -51,7 +51,7 @@ def _sound(draw: random.Random, path: Path, version: str) -> files.Truth:
 def _variable(
     draw: random.Random, file: netCDF4.Dataset, name: str, unit: str, values: files.Floats
 ) -> files.Floats:
-    """Write one variable, packed or with missing values here and there; return what it holds."""
+    """Write one variable, sometimes packed or with missing values; return its values."""
     kind = draw.choice(TYPES)
     packed = kind[0] == "i"
     options = (
@@ -82,7 +82,7 @@ def _variable(
 
 
 def _odd_classic(draw: random.Random) -> bytes:
-    """Return a file of the classic format whose sizes, types and places are odd here and there."""
+    """Return a file of the classic format with some odd sizes, types and places."""
 
     def whole(usual: int) -> int:
         return usual if draw.random() < 0.85 else files.bounded(files.number(draw), 32, signed=True)
@@ -119,7 +119,7 @@ def _odd_classic(draw: random.Random) -> bytes:
 
 
 def _odd(draw: random.Random, path: Path) -> None:
-    """Write a file whose attributes do not fit."""
+    """Write a file with unfit attributes."""
     with netCDF4.Dataset(path, "w", format=draw.choice(VERSIONS)) as file:
         file.createDimension("time", draw.choice((0, 1, 2, 40)))
         for name in draw.sample(("time", "t", "base", "time_2"), draw.randint(1, 4)):

@@ -1,7 +1,7 @@
 """Requests to the application of a service, in this process: drawn heads, queries and bodies are answered or refused.
 
-No answer is an error of the service, each refusal is a short problem detail, and a head that a stranger draws opens
-nothing. The network around it has kinds of its own: `service_requests` and `service_strangers`.
+No answer is an error of the service, each refusal is a short problem detail, and no drawn head opens anything. The
+network around it has kinds of its own: `service_requests` and `service_strangers`.
 """
 
 from __future__ import annotations
@@ -125,13 +125,13 @@ TEXTS = (
 
 
 def _home() -> Path:
-    """Return a folder that outlives a case, where there is one."""
+    """Return a folder that outlives a case, if there is one."""
     return Path(os.environ.get("VIBROIMPACT_CACHE", "."))
 
 
 @functools.cache
 def service() -> tuple[Guarded, Sessions, Store]:
-    """Return an application that nobody runs the jobs of, its sessions, and its store."""
+    """Return an application without workers, its sessions, and its store."""
     folder = _home().absolute() / f"service-{os.getpid()}"
     folder.mkdir(parents=True)
     store, sessions = Store(folder), Sessions(TOKEN)
@@ -198,7 +198,9 @@ def _heads(draw: random.Random, body: bytes, sessions: Sessions) -> list[tuple[b
     return [(name.encode(), value.encode("utf-8", "surrogatepass")) for name, value in given.items()]
 
 
-async def _asked(app: Guarded, scope: dict[str, Any], body: bytes) -> tuple[int, dict[bytes, bytes], bytes]:
+async def _answered(
+    app: Guarded, scope: dict[str, Any], body: bytes
+) -> tuple[int, dict[bytes, bytes], bytes]:
     """Return status, headers and content of an answer."""
     waiting = [{"type": "http.request", "body": body, "more_body": False}]
     status, headers, content = 0, dict[bytes, bytes](), bytearray()
@@ -219,7 +221,7 @@ async def _asked(app: Guarded, scope: dict[str, Any], body: bytes) -> tuple[int,
 
 
 def check(seed: int) -> str | None:
-    """Ask one request."""
+    """Send one request."""
     draw = random.Random(seed)
     app, sessions, _ = service()
     path = draw.choice(PATHS).replace("ID", draw.choice(("0" * 32, *TEXTS)))
@@ -246,13 +248,13 @@ def check(seed: int) -> str | None:
         "extensions": {},
     }
     with files.bounded_memory() as grown:
-        status, headers, content = asyncio.run(_asked(app, scope, body))
+        status, headers, content = asyncio.run(_answered(app, scope, body))
     problem = _wrong(status, headers, content, method) or _opened(status, path, dict(heads))
     return (problem and f"{method} {path[:80]}?{query[:80]}: {problem}") or grown()
 
 
 def _wrong(status: int, headers: dict[bytes, bytes], content: bytes, method: str) -> str | None:
-    """Return what is wrong with an answer."""
+    """Return the problem of an answer; None without one."""
     if not 200 <= status < 600 or (status >= 500 and status != HTTPStatus.SERVICE_UNAVAILABLE):
         return f"status {status}: {content[:300]!r}"
     if len(content) > LONGEST_ANSWER:
@@ -266,7 +268,7 @@ def _wrong(status: int, headers: dict[bytes, bytes], content: bytes, method: str
 
 
 def _opened(status: int, path: str, heads: dict[bytes, bytes]) -> str | None:
-    """Say that one without token and session was let in."""
+    """Return a problem if a request without token and session was let in."""
     token = heads.get(b"authorization", b"").strip().lower() == f"bearer {TOKEN}".encode()
     if token or b"cookie" in heads or path in OPEN_PATHS:
         return None

@@ -1,6 +1,6 @@
 """Files of rigs: journals, calibrations, import settings and descriptions of virtual rigs.
 
-What was drawn is read equal. A damaged journal gives back whole records as they were written, or is refused.
+Drawn content is read equal. A damaged journal gives back whole records as they were written, or is refused.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _journal(draw: random.Random) -> str | None:
 
 
 def _odd_journal(draw: random.Random, content: bytes, channels: int) -> bytes:
-    """Return a journal that is damaged, or that goes on with records of odd sizes and places."""
+    """Return a damaged journal, or one that goes on with records of odd sizes and places."""
     if draw.random() < 0.6:
         return files.damaged(draw, content)
     for _ in range(draw.choice((1, 3, 30))):
@@ -75,7 +75,7 @@ def _odd_journal(draw: random.Random, content: bytes, channels: int) -> bytes:
         kind = draw.choice((b"NOTE", b"NOTE", b"SAMP"))
         first = files.bounded(files.number(draw), 64)
         if kind == b"SAMP" and inner and len(inner) % (8 * channels) == 0:
-            first = 2**60  # beyond what is taken: no sample is new, whatever a sound checksum says of it
+            first = 2**60  # beyond the limit: no sample is new, even below a sound checksum
         length = len(inner) if draw.random() < 0.7 else files.bounded(files.number(draw), 32)
         head = HEAD.pack(kind, length, first, 0)[:-4]
         content += head + zlib.crc32(inner, zlib.crc32(head)).to_bytes(4, "little") + inner
@@ -83,7 +83,7 @@ def _odd_journal(draw: random.Random, content: bytes, channels: int) -> bytes:
 
 
 def _not_written(found: list[Block], written: list[Block], *, all_of_them: bool) -> str | None:
-    """Return which samples that were read were never written, or were written and not read."""
+    """Return the samples that were read but never written, or written but not read."""
     known = {block.first + at: block.volts[:, at] for block in written for at in range(block.volts.shape[1])}
     read = {block.first + at: block.volts[:, at] for block in found for at in range(block.volts.shape[1])}
     for place, volts in read.items():
@@ -148,7 +148,7 @@ def _rig(draw: random.Random) -> tuple[dict[str, Any], Any]:
 
 
 def _toml(draw: random.Random) -> str | None:
-    """Read a settings file of one kind: as it was drawn, or with odd values and lines."""
+    """Read a settings file of one kind: as drawn, or with odd values and lines."""
     tables, read = draw.choice((_calibration, _settings, _rig))(draw)
     text, path = Spelling(draw).text(tables), Path("file.toml")
     is_sound = draw.random() < 0.5

@@ -63,8 +63,8 @@ def _values(draw: random.Random, *, sound: bool) -> str | None:
     if not sound:
         return None
     got = {one.name: one.value for one in found}
-    wanted = {name: value for name, (_, value) in drawn.items()}
-    return None if got == wanted else f"{got} for {wanted}"
+    expected = {name: value for name, (_, value) in drawn.items()}
+    return None if got == expected else f"{got} for {expected}"
 
 
 def _mappings(draw: random.Random, *, sound: bool) -> str | None:

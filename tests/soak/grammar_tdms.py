@@ -67,7 +67,7 @@ def _as(kind: str, values: files.Floats) -> Any:
 
 
 def _odd(draw: random.Random) -> bytes:
-    """Return segments whose fields are odd here and there."""
+    """Return segments with some odd fields."""
     return b"".join(_odd_segment(draw) for _ in range(draw.choice((1, 1, 2, 4))))
 
 
@@ -102,7 +102,7 @@ def _odd_segment(draw: random.Random) -> bytes:
 
 
 def bounded(draw: random.Random, bits: int, usual: int) -> int:
-    """Return a number of so many bits that is nearly always the usual one."""
+    """Return a number of `bits` bits, nearly always the usual one."""
     return usual if draw.random() < 0.9 else files.bounded(files.number(draw), bits)
 
 

@@ -87,7 +87,7 @@ SINCE = datetime(2026, 7, 30, 10, 11, 12)
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a table is written."""
+    """Style of a table."""
 
     mark: str
     decimal: str
@@ -101,7 +101,7 @@ class Dialect:
     minus: str
 
     def cell(self, value: float) -> str:
-        """Return a number as it is written."""
+        """Return a number in the table's style."""
         text = self.form.format(value).replace("-", self.minus)
         if self.decimal == ",":
             text = text.replace(",", " ").replace(".", ",").replace(" ", ".")
@@ -114,7 +114,7 @@ class Dialect:
 
 
 def drawn_dialect(draw: random.Random) -> Dialect:
-    """Return a dialect that the general reader takes."""
+    """Return a dialect that the general reader accepts."""
     mark = draw.choice(MARKS)
     decimal = "," if mark != "," and draw.random() < 0.4 else "."
     forms = ["{:.5f}", "{:.6e}", "{:.9g}", "{:.12f}", "{:+.4E}"] + ["{:,.3f}"] * (decimal == ",")
@@ -134,7 +134,7 @@ def drawn_dialect(draw: random.Random) -> Dialect:
 
 
 def drawn_table(draw: random.Random) -> tuple[list[str], Dialect, files.Truth, dict[str, Any]]:
-    """Return the lines of a table, its dialect, what is to be read, and the settings that it needs."""
+    """Return the lines of a table, its dialect, its expected reading, and the settings that it needs."""
     dialect, signals = drawn_dialect(draw), files.drawn_signals(draw)
     cells = [[dialect.cell(value) for value in values] for values in signals.values]
     values = [
@@ -153,7 +153,7 @@ def drawn_table(draw: random.Random) -> tuple[list[str], Dialect, files.Truth, d
     truth = files.truth_of(signals, start=start)
     truth = files.Truth(values, truth.units, truth.interval, start, truth.names)
     settings: dict[str, Any] = {"rate": 1.0 / signals.interval} if clock is None else {}
-    if len(columns) == 1:  # one comma in each row may be between two columns
+    if len(columns) == 1:  # a single comma in each row may separate two columns
         settings["decimal"] = dialect.decimal
     return [*before, dialect.row(head), *rows, *after], dialect, truth, settings
 
@@ -165,7 +165,7 @@ def _headed(dialect: Dialect, name: str, unit: str) -> str:
 def _leave_out(
     draw: random.Random, dialect: Dialect, cells: list[list[str]], values: list[files.Floats]
 ) -> None:
-    """Let some samples be missing, within the columns."""
+    """Remove some samples within the columns."""
     if draw.random() < 0.8:
         return
     can_be_empty = dialect.mark != " " and (len(cells) > 1 or dialect.clock != "rate")
@@ -180,7 +180,7 @@ def _leave_out(
 
 
 def _clock(dialect: Dialect, signals: files.Signals) -> tuple[str, list[str]] | None:
-    """Return heading and cells of the instants; None where the user says the rate."""
+    """Return heading and cells of the instants; None where the user gives the rate."""
     if dialect.clock == "rate":
         return None
     if dialect.clock == "stamps" and dialect.mark != " " and signals.interval > 1e-3:
@@ -202,7 +202,7 @@ def _written(lines: Sequence[str], dialect: Dialect) -> bytes:
 
 
 def odd_lines(draw: random.Random, lines: Sequence[str], mark: str) -> list[str]:
-    """Return lines with cells and lines that are odd, doubled, dropped or exchanged."""
+    """Return lines with cells or lines made odd, doubled, dropped or exchanged."""
     changed = list(lines)
     for _ in range(draw.choice((1, 1, 2, 5, 40))):
         place = draw.randrange(len(changed))
@@ -230,7 +230,7 @@ def check(seed: int) -> str | None:
     kind = draw.random()
     if kind < 0.5:
         path.write_bytes(_written(lines, dialect))
-        return _told(files.sound(path, truth, settings), dialect)
+        return _with_dialect(files.sound(path, truth, settings), dialect)
     if kind < 0.6 and dialect.encoding != "utf-16":
         path.write_bytes(_written(lines, dialect)[: -draw.randint(1, 60)])
         return _cut(path, truth, settings)
@@ -242,7 +242,7 @@ def check(seed: int) -> str | None:
     return files.odd(path, settings if draw.random() < 0.5 else None)
 
 
-def _told(problem: str | None, dialect: Dialect) -> str | None:
+def _with_dialect(problem: str | None, dialect: Dialect) -> str | None:
     return problem and f"{problem} ({dialect})"
 
 
@@ -255,7 +255,7 @@ def _cut(path: Path, truth: files.Truth, settings: dict[str, Any]) -> str | None
 
 
 def _export(draw: random.Random) -> str | None:
-    """Read an export of an instrument as it is, or with odd cells."""
+    """Read an export of an instrument, unchanged or with odd cells."""
     kind = draw.choice(sorted(EXPORTS))
     export = EXPORTS[kind][1](draw.randrange(2**31))
     path = Path("export.csv")

@@ -1,4 +1,4 @@
-"""TOML of drawn spellings: documents are read equal, and keys found in place; so are scenes."""
+"""TOML of drawn spellings: documents and scenes are read equal, and their keys are found in place."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _drawn_value(draw: random.Random, depth: int) -> Any:
 
 
 class Spelling:
-    """Writes documents, each value and table in one of the ways that TOML has; knows the lines of keys."""
+    """Writes documents, each value and table in one of TOML's spellings; knows the lines of keys."""
 
     def __init__(self, draw: random.Random) -> None:
         self._draw = draw
@@ -99,7 +99,7 @@ class Spelling:
         return "{ " + ", ".join(f"{_key(draw, key)} = {self._flat(one)}" for key, one in value.items()) + " }"
 
     def _flat(self, value: Any) -> str:
-        """Return a value on one line, as an inline table has it."""
+        """Return a value on one line, as in an inline table."""
         written = self._value(value)
         while "\n" in written:
             written = self._value(value)
@@ -107,7 +107,7 @@ class Spelling:
 
 
 def _is_apart(value: Any) -> bool:
-    """Whether a value can be written as tables of their own."""
+    """Whether a value can be written as separate tables."""
     return isinstance(value, dict) or (
         isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
     )
@@ -152,7 +152,7 @@ def _document(draw: random.Random) -> str | None:
 
 
 def _scene(draw: random.Random) -> str | None:
-    """Read a scene that is spelled anew; it is the scene of its tables."""
+    """Read a scene in another spelling; it equals the scene of its tables."""
     tables = body_tables(draw)
     known = Scene.from_dict(tables)
     path = Path("scene.toml")

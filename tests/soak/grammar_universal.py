@@ -39,7 +39,7 @@ SETS = ("15", "55", "58", "58b", "82", "151", "164", "2411", "2414", "0", "-1", 
 
 
 def _sound(draw: random.Random, path: Path) -> files.Truth:
-    """Write a file; return what is to be read of it."""
+    """Write a file; return its expected reading."""
     signals = files.drawn_signals(draw)
     kind = draw.choice(("text", "pyuff", "binary"))
     if kind == "text":
@@ -137,7 +137,7 @@ def _odd(draw: random.Random) -> bytes:
 
 
 def _whole_file(path: Path) -> str | None:
-    """Read all that a universal file holds."""
+    """Read the whole content of a universal file."""
     try:
         read_universal(path)
     except VibroimpactError as refusal:

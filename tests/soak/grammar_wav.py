@@ -21,7 +21,7 @@ OTHERS = (b"LIST", b"fact", b"bext", b"JUNK", b"cue ", b"id3 ", b"PAD ")
 
 
 def _sound(draw: random.Random) -> tuple[bytes, files.Truth]:
-    """Return a file, and what is to be read: integers as parts of full scale."""
+    """Return a file and its expected reading: integers as parts of full scale."""
     many, count, rate = (
         draw.randint(1, 4),
         draw.randint(12, files.LONGEST_FILE),
@@ -52,7 +52,7 @@ def _sound(draw: random.Random) -> tuple[bytes, files.Truth]:
 
 
 def _whole(parts: files.Floats, bits: int, order: str) -> tuple[bytes, files.Floats]:
-    """Return samples of so many bits, and their values as parts of full scale."""
+    """Return samples of `bits` bits, and their values as parts of full scale."""
     scale = 2.0 ** (bits - 1)
     numbers = np.clip(np.round(parts * min(scale, 2.0**52)), -scale, min(scale - 1, 2.0**52)).astype(np.int64)
     if bits == 8:
@@ -73,7 +73,7 @@ def _format(draw: random.Random, many: int, rate: int, bits: int, *, is_float: b
 
 
 def _odd(draw: random.Random) -> bytes:
-    """Return chunks whose sizes and fields are odd here and there."""
+    """Return chunks with some odd sizes and fields."""
 
     def whole(bits: int, *usual: int) -> int:
         return draw.choice(usual) if draw.random() < 0.85 else files.bounded(files.number(draw), bits)

@@ -1,4 +1,4 @@
-"""Processes of a campaign that are killed at random times, the command among them, change no bit of its dataset."""
+"""Kills of a campaign's processes at random times, the command among them, change no bit of its dataset."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ CASES = 60
 SAMPLE = 0
 SECONDS = 400.0
 WAIT_SECONDS = 150.0
-"""Wall time of one command; on an idle machine it takes four."""
+"""Longest wall time of one command, s; on an idle machine it takes 4 s."""
 MOST_COMMANDS = 6
-"""Of one case: all but the last may be killed."""
+"""Most commands of one case: all but the last may be killed."""
 POINTS = {"independent": 120, "up-down": 60}
 MILLISECONDS = 8.0
 LOST_MANIFESTS = 0.3
@@ -32,7 +32,7 @@ STAMPS = ("history", "date_created", "creation_date")
 
 
 def check(seed: int) -> str | None:
-    """Kill at random, resume until it is done, and compare with a campaign that nothing disturbed."""
+    """Kill at random, resume to the end, and compare with an undisturbed campaign."""
     chance = random.Random(seed)
     path = chance.choice(sorted(POINTS))
     expected = _undisturbed(path)
@@ -61,7 +61,7 @@ Content = tuple[dict[str, tuple[str, bytes]], dict[str, str]]
 
 @lru_cache(maxsize=2)
 def _undisturbed(path: str) -> Content:
-    """Return what a campaign that nobody disturbs gives, made once in each process."""
+    """Return the content of an undisturbed campaign, made once in each process."""
     folder = Path(f"undisturbed-{path}")
     folder.mkdir()
     scene = folder / "scene.toml"
@@ -73,12 +73,12 @@ def _undisturbed(path: str) -> Content:
 
 
 def content(dataset: Path) -> Content:
-    """Return what is in a file, without what tells one computation from another."""
+    """Return the content of a file, without attributes that differ between two computations."""
     return bits_of(read_flat(dataset))
 
 
 def bits_of(flat: xr.Dataset) -> Content:
-    """Return the bits of each variable, and the attributes, without what tells one computation from another."""
+    """Return the bits of each variable, and the attributes that two computations share."""
     bits = {
         str(name): (
             str({key: str(value) for key, value in variable.attrs.items()}),
@@ -101,7 +101,7 @@ def difference(expected: Content, got: Content) -> str | None:
 
 
 def _command(scene: str, folder: str, scratch: Path, chance: random.Random | None) -> tuple[int | None, str]:
-    """Run a campaign and kill processes of it by chance; return its exit code (None: it hung) and what it said."""
+    """Run a campaign and kill some of its processes; return its exit code (None: it hung) and its messages."""
     arguments = ["BusyRunner", "campaign", scene, "-o", folder, "--workers", "2"]
     with subprocess.Popen(
         [sys.executable, "-c", BUSY, *arguments],
@@ -151,7 +151,7 @@ def _kill(process: int) -> None:
 
 
 def _still_there(session: int) -> list[int]:
-    """Return the processes of a session that do not end by themselves within seconds."""
+    """Return the processes of a session that are still alive after some seconds."""
     deadline = time.monotonic() + 20.0
     while (left := _session(session)) and time.monotonic() < deadline:
         time.sleep(0.05)

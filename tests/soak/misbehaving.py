@@ -1,4 +1,4 @@
-"""FMUs that misbehave: any fault in any call, of either version, in a guarded run between innocent points."""
+"""Misbehaving FMUs: any fault in any call, of either version, in a guarded run between innocent points."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ CASES = 5000
 SAMPLE = 2
 SECONDS = 30.0
 
-#: Faults and places by their numbers in the model descriptions of Faulty; the event fault is one of FMI 3.0 alone.
+#: Numbers of faults and places in the model descriptions of Faulty; the event fault exists only in FMI 3.0.
 FAULTS, PLACES, ENDLESS_EVENTS, HANGS = range(1, 31), 11, 13, (4, 30)
 #: A million lines in a step take about as long as the deadline.
 FLOODS = (5, 6)
-#: Of these what happens shows later: a damaged heap, closed files, a killed parent.
+#: Faults with a late effect: a damaged heap, closed files, a killed parent.
 AT_A_DISTANCE = (26, 28, 29)
 MARK = "VIBROIMPACT_SOAK_MARK"
 DEADLINE = 1.0
@@ -54,7 +54,7 @@ deadline = {deadline}
 
 
 def check(seed: int) -> str | None:
-    """Return what is wrong with a guarded run of a misbehaving FMU; None where all is as it must be."""
+    """Return the problem of a guarded run of a misbehaving FMU; None without one."""
     draw = random.Random(seed)
     fmi = draw.choice(("2.0", "3.0"))
     fault = draw.choice([f for f in FAULTS if (fmi, f) != ("2.0", ENDLESS_EVENTS)])
@@ -69,9 +69,9 @@ def check(seed: int) -> str | None:
         early=draw.randrange(2),
         deadline=DEADLINE,
     )
-    told = draw.choice([""] * 9 + ["VIBROIMPACT_FAULTY_LOAD", "VIBROIMPACT_FAULTY_INSTANTIATE"])
-    with _environment({MARK: f"{os.getpid()} {seed}"} | ({told: str(fault)} if told else {}), fault):
-        problem = _loaded(text) if told else _tried(text, [0, fault, 0])
+    variable = draw.choice([""] * 9 + ["VIBROIMPACT_FAULTY_LOAD", "VIBROIMPACT_FAULTY_INSTANTIATE"])
+    with _environment({MARK: f"{os.getpid()} {seed}"} | ({variable: str(fault)} if variable else {}), fault):
+        problem = _loaded(text) if variable else _tried(text, [0, fault, 0])
         return problem or _left_behind(f"{os.getpid()} {seed}")
 
 
@@ -89,7 +89,7 @@ def _environment(values: dict[str, str], fault: int) -> Iterator[None]:
 
 
 def _loaded(text: str) -> str | None:
-    """Faults while loading: an error that names the file of a component, or a run that goes well."""
+    """Return the problem of a fault while loading: a good error names the file of a component."""
     try:
         runner = open_scene(parse_scene(text, str(Path.cwd() / "scene.toml")))
     except ComponentError as error:
@@ -132,9 +132,9 @@ def _point(runner: Runner, fault: int, slope: float) -> str | None:
         return _wrong_values(record, slope, whole=not fault)
     if not fault:
         return f"an innocent point is lost: {record.outcome.name}: {record.message}"
-    # one that attacks its process or the processes around it may strike while another component is called
+    # a fault that attacks its process or others may strike during the call of another component
     blamed = ("culprit", "bystander", "guard: ") if fault in AT_A_DISTANCE else ("culprit", "guard: ")
-    if fault in FLOODS:  # each call returns: the time may be up between two of them
+    if fault in FLOODS:  # each call returns: the deadline may pass between two of them
         blamed += ("deadline: ",)
     named = record.message.startswith(blamed)
     return (
@@ -158,7 +158,7 @@ def _wrong_values(record: RunRecord, slope: float, *, whole: bool) -> str | None
 
 
 def _left_behind(mark: str) -> str | None:
-    """Processes of the case that still live."""
+    """Return the processes of the case that still live."""
     end = time.monotonic() + 10.0
     while found := [p for p in psutil.process_iter() if _is_marked(p, mark)]:
         if time.monotonic() > end:

@@ -1,4 +1,4 @@
-"""Damaged and hostile recordings of every format: imported or refused in one line, and no wrong end of one cut off."""
+"""Damaged and hostile recordings of every format: imported or refused in one line; a cut file has no wrong end."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ MAKERS: dict[str, Callable[[], bytes]] = {
 
 @lru_cache(maxsize=1)
 def whole() -> dict[str, bytes]:
-    """Return a sound file of each kind."""
+    """Return a sound file of each format."""
     return {name: text.encode() for name, text in TEXTS.items()} | {
         name: make() for name, make in MAKERS.items()
     }
@@ -170,7 +170,7 @@ def damaged(draw: random.Random, content: bytes) -> bytes:
 
 
 def imported(path: Path) -> Recording | str:
-    """Return the recording, or the refusal; any other error comes out."""
+    """Return the recording, or the refusal; any other error propagates."""
     try:
         return import_recording([path])
     except (DatasetError, UsageError) as refusal:
@@ -178,13 +178,13 @@ def imported(path: Path) -> Recording | str:
 
 
 def wrong_end(recording: Recording) -> str | None:
-    """Return the channel of a file that was cut off with a sample that is wrong, where nothing is said of it."""
+    """Return the channel of a cut-off file with a wrong sample; None where a remark names the cut end."""
     if "the text ends with" in "\n".join(recording.remarks):
         return None
     columns = list(recording.channels.values())
     for channel, known in zip(columns, (BASE, BOARD), strict=False):
         values = channel.values[: len(known)]
-        # 5 digits: what `{:g}` leaves of a number
+        # `{:g}` keeps six digits
         right = np.isnan(values) | np.isclose(values, known[: len(values)], rtol=1e-5, atol=1e-5)
         if len(columns) == 2 and not right.all():
             place = int(np.argmin(right))
@@ -195,7 +195,7 @@ def wrong_end(recording: Recording) -> str | None:
 
 
 def check(seed: int) -> str | None:
-    """Import one file that was cut off, or damaged in another way."""
+    """Import one file that was cut off or damaged otherwise."""
     draw = random.Random(seed)
     name = draw.choice(sorted(whole()))
     content, cut = whole()[name], draw.random() < 0.4
@@ -208,7 +208,7 @@ def check(seed: int) -> str | None:
         )
     try:
         write_recording(found, Path("imported.nc"))
-    except DatasetError as refusal:  # of numbers that no measurement has
+    except DatasetError as refusal:  # the recording holds numbers that no measurement has
         return wrong_message(str(refusal))
     said = "\n".join(found.remarks)
     return (wrong_message(said) if said else None) or (wrong_end(found) if cut else None)

@@ -23,12 +23,12 @@ SAMPLE = 1
 SECONDS = 120.0
 RIG = ROOT / "examples" / "rig" / "oscillator.toml"
 ROUND, RATE = 8000, 8000.0
-"""Samples of a ramp that goes round on the output, by which each sample of the input is known from the one before."""
+"""Samples of a periodic ramp on the output: each sample of the input follows from the sample before."""
 RAMP = np.arange(ROUND) * (6.0 / ROUND) - 3.0
 
 
 def check(seed: int) -> str | None:
-    """Record, end it at a random moment in a random way, recover, and look for each sample."""
+    """Record, end the recording at a random moment in a random way, recover, and look for each sample."""
     chance = random.Random(seed)
     with served(read_rig(RIG)) as server, daqmx.open_channel(server.address) as channel:
         options = daqmx.nidaqmx.GrpcSessionOptions(channel, "")
@@ -57,12 +57,12 @@ def _ended(chance: random.Random, rig: str) -> str | None:
 
 
 def _problem(path: Path, count: int | None) -> str | None:
-    """Say what is wrong with a recording; samples that are lost or there twice break the ramp."""
+    """Return the problem of a recording; lost or doubled samples break the ramp."""
     back = open_recording(path).channel("back")
     if count is not None and len(back.values) != count:
         return f"{len(back.values)} samples are recovered of {count}"
     steps = np.diff(back.values)
-    # at the end of the ramp it begins anew; the converter rounds
+    # the ramp restarts at its end; the converter rounds
     steps = np.where(steps < -3.0, steps + 6.0, steps)
     off = np.abs(steps - 6.0 / ROUND) > 2.0 * 5.0 / 2**15
     return f"the ramp is broken at {np.flatnonzero(off)[:5]} of {len(steps)}" if off.any() else None

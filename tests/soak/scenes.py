@@ -1,6 +1,6 @@
 """Any text as a scene: valid examples with keys, values and structure changed, or bytes of any kind.
 
-A scene or one clear refusal; what is valid is run for a moment, and ends.
+Each text is a scene or one clear refusal; a valid scene is run for a moment, and ends.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def case(draw: random.Random) -> bytes:
 
 
 def wrong_message(text: str) -> str | None:
-    """Return what is wrong with a message."""
+    """Return the problem of a message; None without one."""
     if len(text) > LONGEST_MESSAGE:
         return f"a message of {len(text)} characters"
     shown = printable(text)
@@ -139,7 +139,7 @@ def run_shortly(scene: Scene) -> str | None:
     )
     try:
         limited = parse_scene(text, scene.source)
-    except SceneError:  # written in a way that takes no further table
+    except SceneError:  # the text's spelling takes no further table
         return None
     with open_scene(limited) as runner:
         if run_count(limited.sweep) >= 10_000:

@@ -1,4 +1,4 @@
-"""A service, its jobs, a scheduler, killed at random moments: what was accepted ends bit for bit as undisturbed."""
+"""A service, its jobs and a scheduler, killed at random moments: accepted jobs end bit for bit as undisturbed."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ SECONDS = 300.0
 WAIT_SECONDS = 120.0
 POINTS = {"independent": 240, "up-down": 120}
 TRANSIENT = 20_000
-"""Periods before the recording: a point takes some ten milliseconds."""
+"""Forcing periods before the recording: a point takes some ten milliseconds."""
 MOST_KILLS = 4
 SCHEDULED = 0.3
-"""Part of the cases in which the workers are those of a scheduler, which is killed too."""
+"""Share of the cases whose workers belong to a scheduler, which is killed too."""
 
 
 def check(seed: int) -> str | None:
-    """Submit, kill, start again, and compare with a campaign that nothing disturbed."""
+    """Submit, kill, start again, and compare with an undisturbed campaign."""
     chance = random.Random(seed)
     path = chance.choice(sorted(POINTS))
     return disturbed(chance, path, POINTS[path], TRANSIENT)
 
 
 def disturbed(chance: random.Random, path: str, points: int, transient: int) -> str | None:
-    """Do it with a sweep of so many points, each after so many periods."""
+    """Disturb a service with a sweep of `points` points, each after `transient` periods."""
     expected = _undisturbed(path, points, transient)
     scene, folder = Path("scene.toml"), Path("service").absolute()
     scene.write_text(sweep_text(points, transient, path))

@@ -1,4 +1,4 @@
-"""Random requests of every route (schemathesis): each is answered as the OpenAPI document of the service says."""
+"""Random requests of every route (schemathesis): each answer follows the OpenAPI document of the service."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ CASES = 10
 SAMPLE = 1
 SECONDS = 400.0
 EXAMPLES = 3
-"""Random requests of each route, beside those that its description itself suggests: some 200 in a case."""
+"""Random requests of each route, on top of those from its description: some 200 in a case."""
 FEWEST = 100
 REQUEST_SECONDS = 60
-"""Before a request counts as unanswered, on a machine that is busy with other cases too."""
+"""Time after which a request counts as unanswered, on a machine that is busy with other cases too, s."""
 CHECKS = (
     *("not_a_server_error", "status_code_conformance", "content_type_conformance"),
     *("response_headers_conformance", "response_schema_conformance", "unsupported_method"),
 )
-"""That what fits the schema is accepted is left out: TOML is a text to JSON schema."""
+"""Checks of an answer. Acceptance of all input that fits the schema is no check: TOML is a text to JSON schema."""
 
 
 def check(seed: int) -> str | None:
-    """Ask a service of its own."""
+    """Send the requests to a service that belongs to the case."""
     served = Served(Path("service").absolute(), "--allow-fmu-upload")
     try:
         token = (served.folder / "token").read_text(encoding="utf-8").strip()

@@ -31,7 +31,7 @@ LOOK_SECONDS = 0.2
 ANSWER_SECONDS = 1.0
 """Time in which each question is answered, s, on two cores."""
 PATIENCE_SECONDS = 10.0
-"""Time after which a question counts as not answered, s."""
+"""Time after which a question counts as unanswered, s."""
 MOST_GROWTH = 200 * 2**20
 """Growth of the memory of the service above which the case has a problem, byte."""
 MOST_LOG = 2**20
@@ -43,7 +43,7 @@ END_SECONDS = 10.0
 
 
 def check(seed: int) -> str | None:
-    """Serve jobs while strangers do what they can."""
+    """Serve jobs while strangers attack."""
     chance = random.Random(seed)
     ways = chance.sample(sorted(WAYS), chance.randint(1, len(WAYS)))
     served = Served(Path("service").absolute())
@@ -59,21 +59,21 @@ def check(seed: int) -> str | None:
 
 
 class Watch:
-    """Asks a service what others ask it, and notes the longest time of each question and the largest memory.
+    """Asks a service the usual questions, and notes the longest time of each question and the largest memory.
 
     Parameters
     ----------
     served : Served
     job : RemoteJob
-        One of its jobs, whose status is asked for.
+        One of its jobs, for the question of a status.
 
     Attributes
     ----------
     slowest : dict
         Longest time of an answer by question, s.
     work : float
-        Most processor time that the service used while one question waited, s: what is left of `slowest` where
-        other programs keep the cores busy.
+        Most processor time that the service used while one question waited, s. It bounds the service's own part of
+        `slowest` where other programs keep the cores busy.
     growth : int
         Largest growth of the memory of the service since the watch began, byte.
     """
@@ -123,7 +123,7 @@ def _place(served: Served) -> Place:
 
 
 def _ask(place: Place, path: str, headers: dict[str, str]) -> None:
-    """Ask on a new connection, which the service cannot know before its head has come."""
+    """Ask on a new connection, which the service cannot recognize before its head has come."""
     connection = http.client.HTTPConnection(*place, timeout=PATIENCE_SECONDS)
     try:
         connection.request("GET", path, headers=headers)
@@ -136,7 +136,7 @@ def _ask(place: Place, path: str, headers: dict[str, str]) -> None:
 
 
 def attacked(served: Served, jobs: Sequence[RemoteJob], ways: list[str], seed: int) -> str | None:
-    """Watch a service while strangers are at its port; return its problem, or why nothing was tried."""
+    """Watch a service while strangers attack its port; return its problem, or the reason why nothing was tried."""
     if jobs[-1].refresh().status["state"] != "queued":
         return "no job waited when the strangers came"
     watch, came = Watch(served, jobs[0]), time.time()
@@ -157,12 +157,12 @@ def attacked(served: Served, jobs: Sequence[RemoteJob], ways: list[str], seed: i
 def strangers(
     place: Place, ways: list[str], seed: int, seconds: float = ATTACKED_SECONDS
 ) -> Iterator[Sequence[int]]:
-    """Let strangers attack a port until they have ended; yield how many connections they opened in each of `WAYS`.
+    """Let strangers attack a port until they have ended; yield their numbers of connections in each of `WAYS`.
 
     Raises
     ------
     RuntimeError
-        A stranger ended in an error: the port was not attacked as it should.
+        A stranger ended in an error: the attack was incomplete.
     """
     forked = multiprocessing.get_context("fork")
     opened = RawArray("q", len(WAYS))
@@ -185,7 +185,7 @@ def strangers(
 
 
 def lost(jobs: Sequence[RemoteJob]) -> str | None:
-    """Wait for the end of all jobs; return those that are not done at the first attempt."""
+    """Wait for the end of all jobs; return the jobs that were not done at the first attempt."""
     end = time.monotonic() + WAIT_SECONDS
     while any(job.refresh().status["state"] in ("queued", "running") for job in jobs):
         if time.monotonic() > end:
@@ -196,7 +196,7 @@ def lost(jobs: Sequence[RemoteJob]) -> str | None:
 
 
 def logged(log: Path) -> str | None:
-    """Return what is wrong with the log of a service."""
+    """Return the problem of the log of a service; None without one."""
     if (size := log.stat().st_size) > MOST_LOG:
         return f"the log has {size} byte"
     return "the log has a traceback" if "Traceback" in log.read_text(encoding="utf-8") else None

@@ -1,7 +1,7 @@
-"""Parameters of SSP systems that nothing has: misspelt, wildcards, of other elements, twice: each is said or refused.
+"""Unknown parameters of SSP systems: misspelt, wildcards, of other elements, twice: each is reported or refused.
 
-A system of up to three bodies, some in a system of its own, gets parameters at every level. A model of its own says
-which variable takes each: the scene has these values and no other, and all other names are in the notes.
+A system of up to three bodies, some in a system of its own, gets parameters at every level. An own model predicts
+the variable of each parameter. The scene has exactly the predicted values, and all other names are in the notes.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ NOBODYS = (
     "ä",
     ".",
 )
-"""Names that are no settable variable of a body."""
+"""Names of no settable variable of a body."""
 SAID = "parameters of no variable, which were left out: "
 
 
 @functools.cache
 def body_fmu() -> bytes:
-    """Return an FMU of a body that nobody says is ours."""
+    """Return an FMU of a body without a mark of this package."""
     return export_fmu("oscillator", Path.cwd() / "body.fmu", fmi="2.0").read_bytes()
 
 
 def check(seed: int) -> str | None:
-    """Return which parameter of the system of this seed is taken wrongly, or left out without a word."""
+    """Return a parameter of the system of this seed that is assigned wrongly, or dropped without a note."""
     draw = random.Random(seed)
     names, rig = draw.sample(["a", "b", "c.d"], draw.randrange(1, 4)), draw.choice(("", "", "rig."))
     taken: dict[str, float] = {}
@@ -66,7 +66,7 @@ def check(seed: int) -> str | None:
     if rig:
         elements = system("rig", elements)
     inside = [f"{rig}{name}.{key}" for name in names for key in (*SETTABLE, *NOBODYS)]
-    # the outer system's values go before those of the components
+    # the outer system's values take precedence over those of the components
     outer, doubled = _bindings(draw, [*inside, "*", "x.mass", "rig", "mass"], "", names, rig, taken, lost)
     description = ssd(elements, bindings=outer)
     path = archive(Path.cwd() / "system.ssp", description, {"resources/body.fmu": body_fmu()})
@@ -82,7 +82,7 @@ def _bindings(
     taken: dict[str, float],
     lost: list[str],
 ) -> tuple[str, bool]:
-    """Return up to two bindings as XML, and whether one gives two values to a name; note what they mean."""
+    """Return up to two bindings as XML, and whether one gives a name two values; record the prediction."""
     text, is_doubled = "", False
     settable = {f"{rig}{name}.{key}" for name in names for key in SETTABLE}
     for _ in range(draw.randrange(3)):
@@ -107,14 +107,14 @@ def _problem(path: Path, taken: Mapping[str, float], lost: Sequence[str], *, is_
     try:
         imported = load_system(path)
     except VibroimpactError as refusal:
-        told = is_doubled and "expected one value of each parameter" in str(refusal)
-        return None if told else f"refused: {refusal}"
+        is_named = is_doubled and "expected one value of each parameter" in str(refusal)
+        return None if is_named else f"refused: {refusal}"
     if is_doubled:
         return "two values of one parameter, and no word on it"
     found: dict[str, float] = {}
     for each in imported.scene.components:
         found |= {f"{each.name}.{key}": float(value) for key, value in each.parameters.items()}
-    # names of components are those of their paths, with other signs for dots
+    # components are named by their paths, with other signs for dots
     expected = {_plain(name): value for name, value in taken.items()}
     if {_plain(name): value for name, value in found.items()} != expected:
         return f"parameters {found}, expected {dict(taken)}"

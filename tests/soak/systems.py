@@ -1,4 +1,4 @@
-"""Hostile SSP archives: a scene, or one refusal, and nothing written outside; and random scenes, there and back."""
+"""Hostile SSP archives: a scene or one refusal, and no file outside; random scenes survive export and import."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.ssp import export_system, load_system
 CASES, SAMPLE = 3000, 6
 SECONDS = 30.0
 LONGEST_MESSAGE = 12_000
-"""A scene that is made of a damaged system may have fifty problems."""
+"""Longest message: a scene made of a damaged system may have fifty problems."""
 
 WORDS = (
     *(
@@ -88,7 +88,7 @@ def tables(draw: random.Random) -> dict[str, Any]:
 
 
 def there_and_back(draw: random.Random) -> str | None:
-    """Return what a scene lacks, or has too much, after it has travelled."""
+    """Return the difference between a scene and its import after export; None without one."""
     scene = Scene.from_dict(tables(draw))
     path = export_system(
         scene,
@@ -113,7 +113,7 @@ def whole() -> bytes:
 
 
 def odd(content: bytes, draw: random.Random) -> bytes:
-    """Return XML with attributes that lie, elements that are not there, or twice."""
+    """Return XML with wrong attributes, or with elements missing or doubled."""
     for _ in range(draw.choice([1, 1, 2, 5])):
         kind, pattern = draw.random(), ATTRIBUTE if draw.random() < 0.7 else ELEMENT
         found = list(pattern.finditer(content))
@@ -133,7 +133,7 @@ def odd(content: bytes, draw: random.Random) -> bytes:
 
 
 def archive(draw: random.Random) -> bytes:
-    """Return an archive with odd XML, odd members, or without some that it needs."""
+    """Return an archive with odd XML or odd members, or without some required members."""
     spoilt = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(whole())) as source, zipfile.ZipFile(spoilt, "w") as target:
         for name in source.namelist():
@@ -146,7 +146,7 @@ def archive(draw: random.Random) -> bytes:
                 content = odd(content, draw)
             target.writestr(name, content)
         if draw.random() < 0.1:
-            # two of one name are wanted
+            # two members of one name are intended
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 target.writestr(member(draw), b"x")
@@ -155,7 +155,7 @@ def archive(draw: random.Random) -> bytes:
 
 
 def check(seed: int) -> str | None:
-    """Return what is wrong with how an archive is read; None where nothing is."""
+    """Return the problem of the reading of an archive; None without one."""
     draw = random.Random(seed)
     if draw.random() < 0.3:
         return there_and_back(draw)

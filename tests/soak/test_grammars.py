@@ -1,4 +1,4 @@
-"""A few files by each grammar, in this process: `test_sample` has more, in processes of their own."""
+"""A few files by each grammar, in this process: `test_sample` tries more, in separate processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BASE_SEED, SEEDS = 11_000_000, 4
 
 @pytest.fixture(autouse=True)
 def _closed_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Give what outlives a case a folder, and close the service that answers requests."""
+    """Give files that outlive a case a folder, and close the service that answers requests."""
     monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
     yield
     if grammar_requests.service.cache_info().currsize:

@@ -53,7 +53,7 @@ def check(seed):
 
 @pytest.fixture
 def kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Make a package of two kinds, one of them bad in all ways."""
+    """Make a package of two kinds, one of them bad in every way."""
     name = f"kinds_{tmp_path.name}"
     package = tmp_path / "packages" / name
     package.mkdir(parents=True)
@@ -104,36 +104,36 @@ def _words(process: psutil.Process) -> str:
 
 
 def test_a_run_goes_on_where_it_ended_and_tries_nothing_twice(kinds: str, tmp_path: Path) -> None:
-    path, told = tmp_path / "journal.jsonl", []
+    path, reported = tmp_path / "journal.jsonl", []
     first = Journal(path)
     assert run([kind("good", kinds)], {"good": 3}, 0, first, 60.0, processes=1)
     first.close()
-    # as a machine leaves it that went off in the middle of a line
+    # the file of a machine that lost power in the middle of a line
     path.write_text(path.read_text() + '{"kind": "good", "ca')
     second = Journal(path)
-    assert run([kind("good", kinds)], {"good": 5}, 0, second, 60.0, processes=1, tell=told.append)
+    assert run([kind("good", kinds)], {"good": 5}, 0, second, 60.0, processes=1, report=reported.append)
     second.close()
-    assert [entry.case for entry in told] == [3, 4]
+    assert [entry.case for entry in reported] == [3, 4]
     third = Journal(path)
     third.close()
     assert [entry.case for entry in third.of("good")] == [0, 1, 2, 3, 4]
 
 
 def test_kinds_advance_by_equal_shares_and_the_end_of_the_time_is_said(kinds: str, tmp_path: Path) -> None:
-    journal, told = Journal(tmp_path / "journal.jsonl"), list[Tried]()
+    journal, reported = Journal(tmp_path / "journal.jsonl"), list[Tried]()
     both = [kind("good", kinds), kind("bad", kinds)]
-    assert not run(both, {"good": 8, "bad": 8}, 5, journal, 0.0, processes=1, tell=told.append)
-    assert told == []
-    assert run(both, {"good": 2, "bad": 1}, 5, journal, 60.0, processes=1, tell=told.append)
-    assert [entry.kind for entry in told] == ["bad", "good", "good"]
+    assert not run(both, {"good": 8, "bad": 8}, 5, journal, 0.0, processes=1, report=reported.append)
+    assert reported == []
+    assert run(both, {"good": 2, "bad": 1}, 5, journal, 60.0, processes=1, report=reported.append)
+    assert [entry.kind for entry in reported] == ["bad", "good", "good"]
     journal.close()
 
 
 def test_cases_that_measure_time_come_first_and_alone(kinds: str, tmp_path: Path) -> None:
-    journal, told = Journal(tmp_path / "journal.jsonl"), list[Tried]()
+    journal, reported = Journal(tmp_path / "journal.jsonl"), list[Tried]()
     both = [kind("bad", kinds), replace(kind("good", kinds), is_alone=True)]
-    assert run(both, {"good": 3, "bad": 1}, 5, journal, 60.0, processes=2, tell=told.append)
-    assert [entry.kind for entry in told] == ["good"] * 3 + ["bad"]
+    assert run(both, {"good": 3, "bad": 1}, 5, journal, 60.0, processes=2, report=reported.append)
+    assert [entry.kind for entry in reported] == ["good"] * 3 + ["bad"]
     journal.close()
     assert kind("service_strangers").is_alone
 
@@ -141,15 +141,15 @@ def test_cases_that_measure_time_come_first_and_alone(kinds: str, tmp_path: Path
 def test_few_long_cases_wait_for_no_more_than_their_share_of_many_short_ones(
     kinds: str, tmp_path: Path
 ) -> None:
-    journal, told = Journal(tmp_path / "journal.jsonl"), list[Tried]()
+    journal, reported = Journal(tmp_path / "journal.jsonl"), list[Tried]()
     both = [kind("good", kinds), replace(kind("good", kinds), name="better")]
     (tmp_path / "packages" / kinds / "better.py").write_text(
         "def check(seed):\n    return None\n", encoding="utf-8"
     )
-    assert run(both, {"good": 400, "better": 4}, 0, journal, 120.0, processes=1, tell=told.append)
+    assert run(both, {"good": 400, "better": 4}, 0, journal, 120.0, processes=1, report=reported.append)
     journal.close()
-    places = [place for place, entry in enumerate(told) if entry.kind == "better"]
-    assert len(told) == 404
+    places = [place for place, entry in enumerate(reported) if entry.kind == "better"]
+    assert len(reported) == 404
     assert all(abs(place - 100 * number) <= 8 for number, place in enumerate(places))
 
 

@@ -11,13 +11,13 @@ from soak._kinds import kind, names
 from soak._runner import run
 
 BASE_SEED = 11
-# of seconds of processor time a case, tests/unit has shorter tests of each; grammars have `test_grammars`
-DEAR = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests", "service_strangers"}
+# a case of these takes seconds of processor time; tests/unit has shorter tests of each, `test_grammars` of grammars
+SLOW = {"attractors", "drives", "rig_recordings", "service_kills", "service_requests", "service_strangers"}
 
-DEAR |= {name for name in names() if name.startswith("grammar_")}
+SLOW |= {name for name in names() if name.startswith("grammar_")}
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n in DEAR)) for n in names()])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n in SLOW)) for n in names()])
 def test_a_sample_of_each_kind_finds_no_problem(name: str, tmp_path: Path) -> None:
     one, journal = kind(name), Journal(tmp_path / "journal.jsonl")
     try:

@@ -1,4 +1,4 @@
-"""The kind `service_strangers` sees a service that is slow, grows, talks or loses jobs, and idle strangers."""
+"""The kind `service_strangers` detects idle strangers, and a service that is slow, grows, logs or loses jobs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Job:
 
 
 class Service(ThreadingHTTPServer):
-    """A service of two paths; `late` says after how many seconds each is answered."""
+    """A service of two paths; `late` gives the delay of each answer, s."""
 
     daemon_threads = True
 
@@ -55,14 +55,14 @@ class Answer(BaseHTTPRequestHandler):
     server: Service
 
     def do_GET(self) -> None:
-        """Answer, late where the test says so."""
+        """Answer, late where the test wants it."""
         time.sleep(self.server.late.get(self.path, 0.0))
         known = self.path == "/healthz" or self.headers["Authorization"] == f"Bearer {TOKEN}"
         self.send_response(200 if known else 401)
         self.end_headers()
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Write no log."""
 
 
 @pytest.fixture

@@ -1,1 +1,1 @@
-"""What several tests stand on: references of their own, makers of scenes, records and FMUs, tolerances, places."""
+"""Shared test helpers: independent references, makers of scenes, records and FMUs, tolerances, places."""

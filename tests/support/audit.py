@@ -1,6 +1,6 @@
-"""`make audit`: known holes in the versions that are installed, and in the lowest ones that pyproject.toml allows.
+"""`make audit`: known vulnerabilities in the installed versions, and in the lowest versions of pyproject.toml.
 
-pip-audit asks the database of advisories. Where that cannot be reached, one line says so, and nothing is refused.
+pip-audit asks the database of advisories. If the database cannot be reached, one line says so, and the audit passes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
 UNREACHABLE = ("ConnectionError", "Could not connect", "Max retries exceeded", "ServiceError", "HTTPError")
-"""What pip-audit says where it gets no answer."""
+"""Message of pip-audit without an answer from the database."""
 REMARK = "make audit: the database of advisories could not be reached. Nothing is known of {}."
 
 
@@ -27,33 +27,33 @@ def lowest() -> Iterator[str]:
     lists = [project["dependencies"], *project["optional-dependencies"].values()]
     found: dict[str, str] = {}
     for requirement in map(Requirement, (line for each in lists for line in each)):
-        wanted = requirement.marker is None or requirement.marker.evaluate()
-        if requirement.name != project["name"] and wanted:
+        applies = requirement.marker is None or requirement.marker.evaluate()
+        if requirement.name != project["name"] and applies:
             (bound,) = (one.version for one in requirement.specifier if one.operator in (">=", "=="))
             found[requirement.name] = f"{requirement.name}=={bound}"
     yield from sorted(found.values(), key=str.lower)
 
 
 def audited(what: str, *options: str) -> int:
-    """Ask about some packages; return 1 where one has a known hole, or where pip-audit itself fails."""
+    """Ask about some packages; return 1 if one has a known vulnerability, or if pip-audit itself fails."""
     command = [sys.executable, "-m", "pip_audit", "--progress-spinner", "off", "--format", "json", *options]
     done = subprocess.run(command, capture_output=True, text=True)
     try:
-        asked = json.loads(done.stdout)["dependencies"]
+        answers = json.loads(done.stdout)["dependencies"]
     except (ValueError, KeyError):
         if any(word in done.stderr for word in UNREACHABLE):
-            asked = []
+            answers = []
         else:
             print(f"{what}: {done.stderr.strip()}", file=sys.stderr)
             return 1
-    answered = [one for one in asked if "vulns" in one]
+    answered = [one for one in answers if "vulns" in one]
     holes = [one for one in answered if one["vulns"]]
     for one in holes:
         print(f"{what}: {one['name']} {one['version']}: {', '.join(hole['id'] for hole in one['vulns'])}")
     if answered:
-        print(f"{what}: {len(answered)} of {len(asked)} packages are known, {len(holes)} with a hole.")
+        print(f"{what}: {len(answered)} of {len(answers)} packages are known, {len(holes)} with a hole.")
     else:
-        # a mirror of packages alone knows of none, and pip-audit calls that "no known vulnerabilities"
+        # a package mirror has no advisories, and pip-audit reports its silence as "no known vulnerabilities"
         print(REMARK.format(what), file=sys.stderr)
     return int(bool(holes))
 

@@ -1,7 +1,7 @@
-"""Seventy scenes of every kind, and the bits that version 0.2 made of them.
+"""Seventy scenes of every kind, and the bits of their results in version 0.2.
 
-`PYTHONPATH=tests python -m support.bits_of_scenes` writes `bits_of_scenes.json` anew: only where bits are meant to
-change.
+`PYTHONPATH=tests python -m support.bits_of_scenes` writes `bits_of_scenes.json` anew: only for an intended change of
+bits.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ LANES = (
     "sweep of drawn values",
     "campaign of two keys",
 )
-"""Scenes whose points go in the lanes of the vector registers."""
+"""Scenes whose points run in the lanes of the vector registers."""
 
 
 def scene_of(name: str) -> Scene:
@@ -187,7 +187,7 @@ def scene_of(name: str) -> Scene:
 
 
 def dataset_of(name: str) -> xr.Dataset:
-    """Return what a scene of the table gives: a run, a campaign in this process, or a replay."""
+    """Return the dataset of a scene of the table: a run, a campaign in this process, or a replay."""
     scene = scene_of(name)
     with tempfile.TemporaryDirectory() as folder:
         if name.startswith("replay"):
@@ -200,7 +200,7 @@ def dataset_of(name: str) -> xr.Dataset:
 
 
 def digest(dataset: xr.Dataset) -> str:
-    """Return a fingerprint of all numbers of a dataset but the times that its points took."""
+    """Return a fingerprint of all numbers of a dataset, except for the times of its points."""
     found = hashlib.sha256()
     for name in sorted(map(str, dataset.variables)):
         values = dataset[name].values
@@ -212,9 +212,9 @@ def digest(dataset: xr.Dataset) -> str:
 
 
 def fingerprint() -> str:
-    """Return the compiler of the C core, numpy, scipy, and the bits of this machine's sines, powers and linear algebra.
+    """Return a hash of the C core's compiler, numpy, scipy, and the bits of sines, powers and linear algebra here.
 
-    All of them differ between machines, and the last bits of motions or of what replays compare with them.
+    All of them differ between machines, and change the last bits of motions or of a replay's comparison.
     """
     x = np.linspace(0.1, 20.0, 4001)
     parts = [np.sin(x), np.cos(x), np.exp(-x), np.log(x), np.sqrt(x), x**0.3, np.sinh(x), np.arctan2(x, 2.0)]
@@ -229,13 +229,13 @@ def fingerprint() -> str:
 
 
 def kept() -> Mapping[str, str]:
-    """Return the digests that were kept on a machine like this one; empty where none was."""
+    """Return the saved digests of a machine like this one; empty without such digests."""
     machines: dict[str, dict[str, str]] = json.loads(KEPT.read_text(encoding="ascii"))
     return machines.get(fingerprint(), {})
 
 
 def main() -> None:
-    """Write the digests of all scenes as this machine makes them; those of other machines go."""
+    """Write the digests of all scenes from this machine; digests of other machines are removed."""
     digests = {name: digest(dataset_of(name)) for name in SCENES}
     KEPT.write_text(json.dumps({fingerprint(): digests}, indent=1) + "\n", encoding="ascii")
 

@@ -1,4 +1,4 @@
-"""A scene of steady impacts for the FMU of each body, and what that FMU refuses."""
+"""A scene of steady impacts for the FMU of each body, and the parameters that this FMU rejects."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ class BodyScene:
     Attributes
     ----------
     end : float
-        Time in s by which it has hit the stop more than three times.
+        Time in s by which the body has hit the stop more than three times.
     intervals : tuple of float
-        Communication intervals in s; the last one is the whole run.
+        Communication intervals in s; the last interval is the whole run.
     fixed : str
-        A parameter that stays as it is once the body moves.
+        A parameter that cannot change once the body moves.
     load : str
         Its first input.
     laws : list of dict
-        Stops in place of the first, for saved states, and an angular frequency.
+        Stops that replace the first stop, for saved states, and an angular frequency.
     bad : list
-        Parameters, a wrong value of each, and what its rule says.
+        Parameters, a wrong value of each, and the words of its rule.
     together : dict
-        Wrong values that do not depend on each other.
+        Wrong values that are independent of each other.
     """
 
     component: str
@@ -49,7 +49,7 @@ class BodyScene:
 
     @property
     def coupled(self) -> dict[str, float]:
-        """Its scene with an importer that answers the impacts."""
+        """The body's scene, for an importer that answers the impacts."""
         return {**self.parameters, **stop(self.position, law=EXTERNAL)}
 
     def fmu(self, parameters: dict[str, float] | None = None, **options: Any) -> ComponentFmu:

@@ -1,4 +1,4 @@
-"""The borders between motions in a uniform map, and which of them an adaptive one has found."""
+"""The borders between motions in a uniform map, and the borders that an adaptive map has found."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Borders:
     ----------
     pairs : int
     bracketed : int
-        Those of which the adaptive map has both points.
+        Pairs whose both points are in the adaptive map.
     unseen : int
-        Of the others, those at an island: a region of one motion in which no first value of the adaptive map lies.
+        Other pairs at an island: a region of one motion in which no first value of the adaptive map lies.
     """
 
     pairs: int
@@ -32,19 +32,19 @@ class Borders:
 
     @property
     def missed(self) -> int:
-        """Pairs at regions that the first values see, which the adaptive map has not found."""
+        """Pairs that the adaptive map has not found, at regions that its first values see."""
         return self.pairs - self.bracketed - self.unseen
 
 
 def borders_found(adaptive: xr.Dataset, uniform: xr.Dataset, cuts: int) -> Borders:
-    """Return which borders of a uniform map an adaptive one has found, whose finest cells are those of the uniform one.
+    """Return the borders of a uniform map that an adaptive map has found; its finest cells are the uniform ones.
 
     Parameters
     ----------
     adaptive : xarray.Dataset
-        Of two adaptive axes, along `point`.
+        Map of two adaptive axes, along `point`.
     uniform : xarray.Dataset
-        Of the same two, with `2**cuts` steps for each of the first values.
+        Map of the same axes, with `2**cuts` steps for each of the first values.
     cuts : int
     """
     dims = uniform["outcome"].dims
@@ -68,14 +68,14 @@ def borders_found(adaptive: xr.Dataset, uniform: xr.Dataset, cuts: int) -> Borde
 
 
 def _places(values: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Return the places of values among evenly spaced ones."""
+    """Return the indices of values among evenly spaced values."""
     places: np.ndarray = np.rint((values - along[0]) / (along[-1] - along[0]) * (along.size - 1)).astype(int)
     np.testing.assert_allclose(along[places], values, rtol=1e-12)
     return places
 
 
 def _unseen(label: np.ndarray, step: int) -> np.ndarray:
-    """Return where a map lies in regions of one class that hold none of its every `step`-th points."""
+    """Return a mask of a map: regions of one class that contain none of its every `step`-th points."""
     region, count = np.zeros(label.shape[:2], dtype=int), 0
     for kind in np.unique(label.reshape(-1, 3), axis=0):
         own, number = ndimage.label((label == kind).all(axis=-1))

@@ -1,4 +1,4 @@
-"""Chromium, as a person's browser: found, started, signed in, asked about accessibility."""
+"""Chromium as the browser of a user: found, started, signed in, checked for accessibility."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ ARGUMENTS = (
     "--disable-sync",
 )
 MUST = "VIBROIMPACT_BROWSER"
-"""Variable that, where it is set, makes tests of the page fail instead of being skipped: `.ci/run`."""
+"""Variable that makes tests of the page fail instead of being skipped, once it is set: `.ci/run`."""
 VIOLATED = """
 window.violated = [];
 document.addEventListener("securitypolicyviolation", (event) => window.violated.push(event.violatedDirective));
 """
-"""Script that notes what the page tried against its Content-Security-Policy."""
+"""Script that notes the page's violations of its Content-Security-Policy."""
 MOST_MILLISECONDS = 120_000
-"""That anything may take on a machine that has other work: each process of a job imports everything."""
+"""Longest wait of a test, on a machine that has other work: each process of a job imports everything."""
 RULES = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice")
 
 
 def need_browser() -> Any:
-    """Return what starts a browser; skip the test, with the reason, where there is none."""
+    """Return the starter of browsers; skip the test, with the reason, without a browser."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -62,14 +62,14 @@ def browser() -> Iterator[Any]:
 
 
 class PageSession:
-    """A page of a service in a context of its own; at its end nothing may have gone wrong in it.
+    """A page of a service in a context of its own; an error in the page fails the test at its end.
 
     Parameters
     ----------
     chromium : browser
     served : Served
     **how
-        Of the context: `color_scheme`, `viewport`, ...
+        Options of the context: `color_scheme`, `viewport`, ...
     """
 
     def __init__(self, chromium: Any, served: Served, **how: Any) -> None:
@@ -92,7 +92,7 @@ class PageSession:
         assert kind or [*self.wrong, *found] == []
 
     def _note_message(self, message: Any) -> None:
-        # of requests that are refused, which each test knows of, the browser tells here too
+        # the browser also reports refused requests here; each test knows its own
         if message.type == "error" and "Failed to load resource" not in message.text:
             self.wrong.append(message.text)
 
@@ -108,12 +108,12 @@ class PageSession:
         self.page.get_by_role("navigation").wait_for()
 
     def show(self, view: str) -> Any:
-        """Return the page with one of its views."""
+        """Return the page after opening one of its views."""
         self.page.goto(f"{self._served.url}/#/{view}")
         return self.page
 
     def show_job(self, job: RemoteJob) -> Any:
-        """Return the page with a job."""
+        """Return the page after opening a job."""
         return self.show(f"campaign/{job.id}")
 
 
@@ -122,7 +122,7 @@ def token_of(served: Served) -> str:
 
 
 def violations(page: Any) -> list[str]:
-    """Return what axe-core finds wrong with what a page shows."""
+    """Return the violations that axe-core finds in the current page."""
     from axe_playwright_python.sync_playwright import Axe
 
     found = Axe().run(page, options={"runOnly": list(RULES)}).response["violations"]

@@ -9,9 +9,9 @@ import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.orchestrator.commands import cli
 
 CHUNK_SECONDS = 0.25
-"""Shorter than usual, so that a campaign of two seconds has as many parts as a long one."""
+"""Duration of a part, shorter than usual: a campaign of two seconds has as many parts as a long one."""
 HERE = "@here"
-"""End of the name of a runner with which a campaign without workers stays in its process."""
+"""End of a runner's name; a campaign with such a runner and without workers stays in its process."""
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
-"""A stand-in for the point runner: points of a stated length, results that depend on every input.
+"""A substitute for the point runner: points of a stated duration, results that depend on every input.
 
-It lets the campaign engine be tested and timed without any component. `BusyRunner` is a map with carried
-state; each of its points takes about the number of milliseconds in `body.mass`. They sleep: a component leaves the
-interpreter to others as well, and the processors are for what is tested.
+With it the campaign engine is tested and timed without any component. `BusyRunner` is a map with carried state; each
+point takes about `body.mass` milliseconds. Points sleep: a component, too, leaves the interpreter to others, and the
+processors are for the code under test.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class BusyRunner(Runner):
         self.periods = scene.record.recorded_periods or 1
 
     def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
-        """Run one point: a contraction towards a point that the swept values decide."""
+        """Run one point: a contraction towards a point that depends on the swept values."""
         began = time.perf_counter()
         scene = self.scene.at(values)
         time.sleep(scene.body.mass * 1e-3)
@@ -67,11 +67,11 @@ class BusyRunner(Runner):
         )
 
     def target(self, scene: Scene, values: Mapping[str, float]) -> float:
-        """Return the number that tells points apart."""
+        """Return a number that identifies the point."""
         return math.fsum(values.values())
 
     def close(self) -> None:
-        """Hold nothing."""
+        """Do nothing: there is nothing to close."""
 
 
 def run_busy(scene: Scene, path: Path) -> None:
@@ -80,16 +80,16 @@ def run_busy(scene: Scene, path: Path) -> None:
 
 
 class SceneRunner(BusyRunner):
-    """Knows its scene only, as a real runner: which of its numbers are swept makes no difference."""
+    """Depends only on its scene, like a real runner: swept and fixed values give the same result."""
 
     def target(self, scene: Scene, values: Mapping[str, float]) -> float:
-        """Return the number that tells points apart."""
+        """Return a number that identifies the point."""
         keys = ("body.mass", "forcing.amplitude", "forcing.angular_frequency", "stop[1].restitution")
         return math.fsum(map(scene.value, keys))
 
 
 class OtherBuildRunner(SceneRunner):
-    """The same of another build."""
+    """The same runner from another build."""
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         super().__init__(scene, execution=execution)
@@ -97,7 +97,7 @@ class OtherBuildRunner(SceneRunner):
 
 
 class UnhurriedRunner(Runner):
-    """The real runner of a scene, asleep for a while at each point: time to kill what runs it."""
+    """The real runner of a scene, asleep for a while at each point: time to kill its process."""
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self._runner, self.scene = open_scene(scene, execution=execution), scene
@@ -116,9 +116,9 @@ class UnhurriedRunner(Runner):
 
 
 def unhurried_lanes(scene: Scene, *, execution: str = "auto") -> PointRunner:
-    """Return the real runner of a scene that goes by lanes, which sleep before each chunk as long as points may take.
+    """Return the real runner of a scene in lanes, which sleep before each chunk for the time that points may take.
 
-    Chunks are short then and often cut: the time of one is over when its first points begin.
+    Chunks are short then and often cut: the time of a chunk is over when its first points start.
     """
     runner = open_scene(scene, execution=execution)
     assert isinstance(runner, PointRunner)
@@ -131,7 +131,7 @@ def unhurried_lanes(scene: Scene, *, execution: str = "auto") -> PointRunner:
         time.sleep(0.01 * len(points))
         return at_once(loop, points, deadline, alone)
 
-    lanes_rows.run_in_lanes = later  # of this process, a worker
+    lanes_rows.run_in_lanes = later  # in this process, a worker
     return runner
 
 
@@ -156,7 +156,7 @@ class DeadlyRunner(BusyRunner):
 
 
 class HuntedRunner(BusyRunner):
-    """Is taken away at every point whose forcing amplitude is negative, as long as it runs in a worker."""
+    """Is killed at every point whose forcing amplitude is negative, as long as it runs in a worker."""
 
     def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
         """Run one point, or die."""
@@ -175,13 +175,13 @@ def _is_worker() -> bool:
 
 
 class OtherMachineRunner(BusyRunner):
-    """The same on another kind of processor."""
+    """The same runner on another kind of processor."""
 
     instruction_set = "other"
 
 
 class UnlikeRunner(BusyRunner):
-    """Says another instruction set in every process."""
+    """Reports another instruction set in every process."""
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         super().__init__(scene, execution=execution)
@@ -192,7 +192,7 @@ class OnceDeadlyRunner(BusyRunner):
     """Kills its process once, at the first point after the file named by VIBROIMPACT_TEST_KILL appeared."""
 
     def run(self, values: Mapping[str, float], start: State | None = None) -> RunRecord:
-        """Run one point, or die if the file is there and this process is the one to take it away."""
+        """Run one point, or die if the file exists and this process removes it first."""
         wish = Path(os.environ["VIBROIMPACT_TEST_KILL"])
         try:
             wish.unlink()
@@ -203,18 +203,18 @@ class OnceDeadlyRunner(BusyRunner):
 
 
 def die_while(folder: str) -> int:
-    """Take a file out of a folder and kill this process; with none left return its number."""
+    """Remove a file from a folder and kill this process; without a file return the process number."""
     for wish in Path(folder).iterdir():
         try:
             wish.unlink()
         except FileNotFoundError:
-            continue  # another process took it
+            continue  # another process removed it
         os.kill(os.getpid(), signal.SIGKILL)
     return os.getpid()
 
 
 def freeze_once(wish: str) -> str:
-    """Stop this process for good while the file is there, and take it away before."""
+    """Stop this process for good while the file exists, and remove the file first."""
     if Path(wish).exists():
         Path(wish).unlink()
         os.kill(os.getpid(), signal.SIGSTOP)
@@ -222,11 +222,11 @@ def freeze_once(wish: str) -> str:
 
 
 def keep_the_interpreter(seconds: int) -> int:
-    """Let no other thread of this process run for so long, as an import of a large library does."""
+    """Block all other threads of this process for a time, as the import of a large library does."""
     ctypes.PyDLL(None).sleep(seconds)
     return seconds
 
 
 def same(value: int) -> int:
-    """Return a number."""
+    """Return the given number."""
     return value

@@ -1,4 +1,4 @@
-"""A campaign as a person starts it: a process of its own, in a session of its own, that can be killed."""
+"""A campaign as a user starts it: a process of its own, in a session of its own, that can be killed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from support.places import TESTS
 BUSY = f"import sys; sys.path.insert(0, {str(TESTS)!r}); from support.busy_command import main; main()"
 """The command line with a point runner from `busy_runner`, which is the first argument."""
 WAIT_SECONDS = 180.0
-"""Ten times what a campaign of these tests takes: other tests may keep the processors busy."""
+"""Ten times the duration of a campaign of these tests, s: other tests may keep the processors busy."""
 
 
 def workers_of(command: int) -> list[psutil.Process]:
@@ -29,7 +29,7 @@ def workers_of(command: int) -> list[psutil.Process]:
 
 
 def fork_servers_of(command: int) -> list[psutil.Process]:
-    """Return the living processes that workers of a campaign are forked from: one, or none yet."""
+    """Return the living fork servers of a campaign's workers: one, or none yet."""
     return _children(command, "multiprocessing.forkserver")
 
 
@@ -42,7 +42,7 @@ def _children(parent: int, kind: str) -> list[psutil.Process]:
 
 
 def _living_command(process: psutil.Process) -> str:
-    """Return the command line of a process; nothing of one that has ended."""
+    """Return the command line of a process; nothing if the process has ended."""
     try:
         return "" if process.status() == psutil.STATUS_ZOMBIE else " ".join(process.cmdline())
     except psutil.NoSuchProcess:
@@ -79,7 +79,7 @@ class CampaignProcess:
         return sorted((self.folder / "parts").glob("branch-*.nc"))
 
     def wait_for_parts(self, count: int) -> None:
-        """Wait until so many parts are there."""
+        """Wait for a number of parts."""
         wait_until(lambda: len(self.parts()) >= count or self.process.poll() is not None)
         assert self.process.poll() is None, self.process.communicate()
 
@@ -95,7 +95,7 @@ class CampaignProcess:
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = WAIT_SECONDS) -> None:
-    """Wait until something is so, or the time is over."""
+    """Wait until a condition holds, or the time is over."""
     deadline = time.monotonic() + seconds
     while not condition() and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -69,7 +69,7 @@ def scene_of(text: str) -> Scene:
 
 
 def assert_same_rows(first: Path, second: Path) -> None:
-    """Assert that two datasets are bit-identical but for their timing."""
+    """Assert that two datasets are bit-identical except for their timing."""
     one, other = read_flat(first).drop_vars(TIMING), read_flat(second).drop_vars(TIMING)
     for dataset in (one, other):
         dataset.attrs = {}
@@ -78,5 +78,5 @@ def assert_same_rows(first: Path, second: Path) -> None:
     xr.testing.assert_identical(one, other)
     for name, variable in one.variables.items():
         if variable.dtype.kind == "f":
-            # assert_identical takes -0.0 for 0.0.
+            # assert_identical does not distinguish -0.0 from 0.0.
             assert np.array_equal(variable.values.view(np.int64), other[name].values.view(np.int64)), name

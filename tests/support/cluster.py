@@ -1,6 +1,6 @@
-"""A Dask scheduler with workers, as another command would start them.
+"""A Dask scheduler with workers, started as by another command.
 
-`cluster` is one for the whole session: campaigns that neither start nor lose workers are computed there.
+The fixture `cluster` lasts for the whole session, for campaigns that neither start nor lose workers.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ DASK = "from dask.cli import run_cli; run_cli()"
 
 
 def free_port() -> int:
-    """Return a port at which nobody listens."""
+    """Return a free port."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return int(listener.getsockname()[1])
@@ -29,11 +29,11 @@ def free_port() -> int:
 
 @contextmanager
 def started_cluster(address: str = "", *options: str, workers: int = 2) -> Iterator[str]:
-    """Start a scheduler and workers, at a port that is free by default; yield the address."""
+    """Start a scheduler and workers, at a free port by default; yield the address."""
     address = address or f"tcp://127.0.0.1:{free_port()}"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), *filter(None, sys.path)])}
     place = ("--host", "127.0.0.1", "--port", address.rpartition(":")[2])
-    # it ends by itself where the tests are killed
+    # the scheduler ends by itself if the tests are killed
     commands = [("scheduler", *place, "--no-dashboard", "--idle-timeout", "1 hour", *options)]
     commands += [("worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *options)] * workers
     processes = [
@@ -50,7 +50,7 @@ def started_cluster(address: str = "", *options: str, workers: int = 2) -> Itera
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
-    """Keep one cluster for all tests that ask for it; workers of tests are forked when it is there."""
+    """Keep one cluster for all tests that need it; it starts before the tests' workers are forked."""
     with ExitStack() as stack:
         if not session.config.option.collectonly and any(
             "cluster" in _fixtures(item) for item in session.items
@@ -66,5 +66,5 @@ def _fixtures(item: pytest.Item) -> list[str]:
 
 @pytest.fixture(scope="session")
 def cluster(pytestconfig: pytest.Config) -> str:
-    """Return the address of a scheduler with two workers, which stay."""
+    """Return the address of a scheduler with two workers that last for the session."""
     return pytestconfig.stash[ADDRESS]

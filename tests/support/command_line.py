@@ -1,4 +1,4 @@
-"""The command line as tests use it: in a process of its own, as a person does, or in this one, which is quicker."""
+"""The command line for tests: in a process of its own, as by a user, or in this process, which is quicker."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ ENVIRONMENT = {"COLUMNS": "200"}
 
 
 def vibroimpact(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the command `vibroimpact` and return its exit code and what it printed."""
+    """Run the command `vibroimpact`; return its exit code and its output."""
     return warm.run(ENTRY, *arguments, cwd=cwd, env=os.environ | ENVIRONMENT)
 
 
 def in_this_process(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """Do the same without starting Python and importing everything anew, which takes longer than most commands."""
+    """Run the command in this process; a new Python with its imports takes longer than most commands."""
     given, out, err = [*map(str, arguments)], io.StringIO(), io.StringIO()
     code: object = 0
     with (

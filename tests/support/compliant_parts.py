@@ -1,4 +1,4 @@
-"""Parts of coupled scenes with stops that yield, and the plain importers that they are compared to."""
+"""Parts of coupled scenes with compliant stops, and plain importers for comparison."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 
-#: Stops of about the same contact time for a unit mass at 1 m/s.
+#: Stops with about the same contact time for a unit mass at 1 m/s.
 LAWS: dict[str, dict[str, float]] = {
     "kelvin_voigt": {"stiffness": 1e4, "damping": 20.0},
     "hertz": {"stiffness": 1e6},
     "hunt_crossley": {"stiffness": 1e6, "damping": 0.2, "exponent": 1.5},
 }
 ANSWERS = ("applied_restitution", "applied_force", "applied_stiffness", "applied_damping")
-#: A free unit mass that comes to a stop at 1 m after 1 s, at 1 m/s.
+#: A free unit mass that reaches a stop at 1 m after 1 s, at 1 m/s.
 FREE: dict[str, Value] = {"stiffness": 0.0, "velocity_start": 1.0}
 
 
@@ -40,7 +40,7 @@ def yielding_stop(
     side: str = "upper",
     version: str = "3.0",
 ) -> ComponentSpec:
-    """Return an ImpactStop with a law of force."""
+    """Return an ImpactStop with a force law."""
     own: dict[str, Value] = {"law": law, "position": position, "side": side, **parameters}
     return ComponentSpec(name, fmu_path("ImpactStop", version), own)
 
@@ -48,7 +48,7 @@ def yielding_stop(
 def yielding_contact(
     body_name: str, stop_name: str, k: int = 1, *, slopes: bool = True
 ) -> list[ConnectionSpec]:
-    """Connect a contact of a body with a stop that yields, both ways; with its slopes or without."""
+    """Connect a contact of a body with a compliant stop, both ways; with its slopes or without."""
     port = f"{body_name}.contact[{k}]"
     answers = ANSWERS if slopes else ANSWERS[:2]
     return [
@@ -58,7 +58,7 @@ def yielding_contact(
 
 
 class Coupled(NamedTuple):
-    """A body with one stop that yields."""
+    """A body with one compliant stop."""
 
     importer: Importer
     energy: InterfaceEnergy
@@ -81,7 +81,7 @@ def coupled(
     side: str = "upper",
     **settings: object,
 ) -> Coupled:
-    """Return a begun importer of body `b` and stop `s`."""
+    """Return an initialized importer of body `b` and stop `s`."""
     links = yielding_contact("b", "s", slopes=slopes)
     importer = Importer(
         [
@@ -100,7 +100,7 @@ def coupled(
 def contact_energy_error(
     law: str, parameters: Mapping[str, float], **settings: object
 ) -> tuple[float, float]:
-    """Return the relative energy error of one elastic contact of a free mass, and its residual as reported."""
+    """Return the relative energy error of one elastic contact of a free mass, and the reported residual."""
     run = coupled(law, parameters, **settings)  # type: ignore[arg-type]
     run.importer.advance(2.0)
     (velocity,) = run.values("velocity")
@@ -110,7 +110,7 @@ def contact_energy_error(
 
 
 def contact_time(law: str, stiffness: float) -> float:
-    """Time of an elastic contact of a unit mass at 1 m/s, s: equations.md 6.9 and 6.10."""
+    """Return the duration of an elastic contact of a unit mass at 1 m/s, s: equations.md 6.9 and 6.10."""
     return math.pi / math.sqrt(stiffness) if law == "kelvin_voigt" else 3.218065 / stiffness**0.4
 
 
@@ -122,7 +122,7 @@ def plain_energy_error(exchange: str, steps: int, stiffness: float = 1e4, law: s
 def plain_contact(exchange: str, steps: int, stiffness: float, law: str) -> tuple[float, float]:
     """Return the relative energy error of one elastic contact with a plain importer, and the seconds of its steps.
 
-    No events, no slopes: the stop's force is held over a step as a force on the mass, which starts at the surface.
+    No events, no slopes: the mass has a constant force from the stop over each step, and starts at the surface.
     `jacobi`: both sides have the inputs of the step's start. `gauss_seidel`: the stop has the mass's motion at its end.
     """
     mass = Component(ComponentSpec("mass", fmu_path("Oscillator"), FREE))

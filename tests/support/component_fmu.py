@@ -1,4 +1,4 @@
-"""Any FMU of the package in both versions, driven by FMPy as any tool would: an independent importer."""
+"""Any FMU of the package in both versions, driven by FMPy: an independent importer."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def unpacked(path: Path) -> tuple[Path, ModelDescription]:
 
 
 def each(name: str, values: Iterable[float]) -> dict[str, float]:
-    """Return an array parameter, element by element, numbered from 1."""
+    """Return an array parameter as scalar parameters, numbered from 1."""
     return {f"{name}[{i}]": float(value) for i, value in enumerate(values, start=1)}
 
 
@@ -68,13 +68,13 @@ MESSAGES2: dict[int, list[str]] = {}
 
 @fmi2CallbackLoggerTYPE
 def LOGGER2(environment: int | None, _: bytes, __: int, ___: bytes, message: bytes) -> None:
-    # FMPy's proxy keeps one logger for the whole process, and for good: so this one lives as long
+    # FMPy's proxy keeps one logger for the whole life of the process: so this logger lives as long
     if environment in MESSAGES2:
         MESSAGES2[environment].append(message.decode())
 
 
 class ComponentFmu:
-    """One initialized instance of a component or of an exported file; its time is that of the last step."""
+    """One initialized instance of a component or of an exported file; its time is the end of the last step."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class ComponentFmu:
         self.free()
 
     def free(self) -> None:
-        """Give the instance's memory back."""
+        """Free the instance."""
         self.fmu.freeInstance()
         MESSAGES2.pop(id(self), None)
 
@@ -159,11 +159,11 @@ class ComponentFmu:
         self._accessor("set", name)([self.reference(name)], [value])
 
     def get_each(self, name: str, count: int) -> NDArray[np.float64]:
-        """Return name[1] to name[count], where `name` has {} in the place of the index."""
+        """Return name[1] to name[count]; `name` has {} in the place of the index."""
         return np.array([self.get(name.format(k + 1)) for k in range(count)])
 
     def start_values(self) -> dict[str, float]:
-        """Return the start value of every parameter and input, as described, by name."""
+        """Return the start value of every parameter and input, from the model description, by name."""
         described = [v for v in self._variables.values() if v.start is not None and not v.dimensions]
         kinds = {"Boolean": lambda text: text == "true", "Float64": float, "Real": float}
         return {v.name: kinds.get(v.type, int)(v.start) for v in described}
@@ -176,7 +176,7 @@ class ComponentFmu:
         return rows
 
     def step(self, size: float) -> float:
-        """Advance by `size`; returns the time reached."""
+        """Advance by `size`; return the time reached."""
         if self.version == "2.0":
             self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
             self.time += size
@@ -201,7 +201,7 @@ class ComponentFmu:
         self.fmu.enterEventMode()
 
     def answer(self, restitution: float, k: int = 1) -> None:
-        """Answer the contact that waits in event mode, and go on in step mode."""
+        """Answer the contact that waits in event mode, and return to step mode."""
         self.set(f"contact[{k}].applied_restitution", restitution)
         self.fmu.updateDiscreteStates()
         self.fmu.enterStepMode()
@@ -214,7 +214,7 @@ class ComponentFmu:
         return [self.get(f"contact[{k}].{name}") for name in names]
 
     def serialized(self) -> bytes:
-        """Return the present state as bytes."""
+        """Return the current state as bytes."""
         state = self.fmu.getFMUState()
         try:
             return bytes(self.fmu.serializeFMUState(state))
@@ -222,7 +222,7 @@ class ComponentFmu:
             self.fmu.freeFMUState(state)
 
     def restore(self, data: bytes) -> None:
-        """Go back to a state from `serialized`."""
+        """Restore a state from `serialized`."""
         state = self.fmu.deserializeFMUState(data)
         self.fmu.setFMUState(state)
         self.fmu.freeFMUState(state)
@@ -245,7 +245,7 @@ def simulate(
     version: str = "3.0",
     **options: Any,
 ) -> np.ndarray:
-    """Run the FMU alone by FMPy's `simulate_fmu`; returns its structured result."""
+    """Run the FMU alone by FMPy's `simulate_fmu`; return its structured result."""
     folder, description = unpacked(fmu_path(component, version))
     result: np.ndarray = simulate_fmu(
         str(folder),

@@ -1,4 +1,4 @@
-"""A scene of components, and single mistakes in it with what is said of each (as in `scene_mistakes`)."""
+"""A scene of components, and single mistakes in it with the message of each (as in `scene_mistakes`)."""
 
 from __future__ import annotations
 

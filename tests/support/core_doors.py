@@ -1,6 +1,6 @@
-"""The C core with the doors that only tests go through (`doors/`): bodies of many modes.
+"""The C core with test-only entry points (`doors/`): bodies of many modes.
 
-Made once for each state of the sources; what is built lies in `build/`, which `make clean` removes.
+The library is built once for each state of the sources; it lies in `build/`, which `make clean` removes.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ CORE = NATIVE / "core"
 @lru_cache(maxsize=1)
 def library_with_doors() -> ctypes.CDLL:
     """Return the library, loaded once."""
-    # of the package that is imported: `python -m mutants` puts faults into another one's core
+    # built for the imported package: `python -m mutants` puts faults into the core of another package
     built = package_folder() / "built" / f"{CORE_LIBRARY}{library_suffix()}"
-    # the core library exports all that the doors call; elsewhere a library is not linked to by its path
+    # the core library exports all functions that the doors call; a link to it by path works only on Linux
     is_linked = sys.platform == "linux" and is_current()
     core = [built] if is_linked else sorted(CORE.rglob("*.c"))
     key = digest(*LANGUAGE, *WARNINGS, content_of([*core, *CORE.rglob("*.h"), *DOORS.glob("*.[ch]")]))
@@ -34,10 +34,10 @@ def library_with_doors() -> ctypes.CDLL:
 
 
 def compile_with_doors(target: Path, core: Path) -> None:
-    """Compile a core, of these sources or of others like them, with the doors."""
+    """Compile a core, from these sources or from similar ones, with the test-only entry points."""
     _compile(target, sorted(core.rglob("*.c")), core)
 
 
 def _compile(target: Path, core: list[Path], headers: Path) -> None:
-    # a linker that takes what is needed only wants those that need it first
+    # a linker that takes only needed objects wants the doors, which need the core, first
     compile_library(target, [*sorted(DOORS.glob("*.c")), *core], [headers, DOORS], export_all=True)

@@ -24,7 +24,7 @@ P11_PHASE, P11_VELOCITY = 0.3665212101960540571, 0.7910497883492130773
 
 
 def external(position: float, side: str = "upper", k: int = 1) -> dict[str, Value]:
-    """Return the parameters of a contact that another FMU answers."""
+    """Return the parameters of a contact whose impacts another FMU answers."""
     port = f"contact[{k}]"
     return {f"{port}.law": "external", f"{port}.position": position, f"{port}.side": side}
 
@@ -76,7 +76,7 @@ class Impact(NamedTuple):
 
 
 class ImpactLog:
-    """The impacts of one contact, read after each step; a body meets a stop of another FMU once in a step."""
+    """The impacts of one contact, read after each step; a body meets a stop of another FMU at most once in a step."""
 
     def __init__(self, importer: Importer, body_name: str, k: int = 1) -> None:
         port = f"contact[{k}]"
@@ -95,7 +95,7 @@ class ImpactLog:
             self._impacts.append(Impact(*map(float, self._last.get())))
 
     def take(self) -> list[Impact]:
-        """Return all impacts up to now."""
+        """Return all impacts so far."""
         self._look(0.0, 0.0)
         return self._impacts
 

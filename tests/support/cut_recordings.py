@@ -1,4 +1,4 @@
-"""Runs that are recorded whole and in parts: where to cut them, and whether the events of the parts add up."""
+"""Runs that are recorded whole and in parts: the places of cuts, and the sum of the parts' events."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from vibroimpact.orchestrator.scene import Scene
 Floats = NDArray[np.float64]
 
 AGREEMENT = {"fused": 1e-5, "coupled": 1e-3}
-"""Difference of the times of one event in two runs, relative to the run: rounding, multiplied by some impacts; a cut
-makes other steps of the contact with another FMU's stop."""
+"""Largest difference of one event's time in two runs, relative to the duration. Impacts multiply rounding; with the
+stop of another FMU, a cut also changes the steps of a contact."""
 ROOM = 1e-12
-"""Time beyond a border at which an event counts as at it, s: `body/landing.c` for coupled runs, else rounding."""
+"""Time from a border within which an event counts as on it, s: `body/landing.c` for coupled runs, else rounding."""
 MOST_EVENTS = 40
-"""Events of a run beyond which chaos may have multiplied rounding by anything."""
+"""Number of events of a run beyond which chaos may have multiplied rounding by any factor."""
 FAINT = 1e-5
-"""Velocity of an impact after time 0, m/s, below which rounding decides whether it is one; motions have .1 to 3 m/s."""
+"""Impact velocity after time 0, m/s, below which rounding decides whether it is an impact; motions have .1 to 3 m/s."""
 TIME, VELOCITY, CONTACT_OF_IMPACT, DURATION, CONTACT_OF_STICK = 0, 2, 4, 6, 2
 """Columns of impacts and sticks."""
 
 
 class Events(NamedTuple):
-    """What a recording has: impacts, shape (n, 7), and sticks, shape (n, 3), of `RecordedBody`."""
+    """Events of a recording: impacts, shape (n, 7), and sticks, shape (n, 3), of `RecordedBody`."""
 
     impacts: Floats
     sticks: Floats
@@ -47,13 +47,13 @@ def recorded(driver: RecordedBody, scene: Scene, begin: float, end: float) -> Ev
 
 
 def is_faint(events: Events) -> bool:
-    """Say whether an impact of a run is a graze, which may be none in the same run with other steps."""
+    """Whether an impact of a run is a graze, which may vanish in the same run with other steps."""
     later = events.impacts[events.impacts[:, TIME] > 0.0, VELOCITY]
     return bool((later < FAINT).any())
 
 
 def in_one_run(driver: RecordedBody, scene: Scene, edges: Sequence[float]) -> list[Events]:
-    """Return the events of successive recordings of one run, between instants, s, of which the first is 0."""
+    """Return the events of successive recordings of one run, between instants, s; the first instant is 0."""
     driver.begin(float_parameters(scene, None), None)
     parts: list[Events] = []
     for end in edges[1:]:
@@ -65,7 +65,7 @@ def in_one_run(driver: RecordedBody, scene: Scene, edges: Sequence[float]) -> li
 
 
 def cuts_of(whole: Events, end: float, share: float) -> list[float]:
-    """Return where to cut a run: at a share of it, and at, in and after one of its contacts and one of its rests."""
+    """Return cuts of a run: at a share of it, and at, in and after one of its contacts and one of its rests."""
     cuts = [share * end]
     if len(whole.impacts):
         row = whole.impacts[int(share * len(whole.impacts))]
@@ -81,20 +81,20 @@ def cuts_of(whole: Events, end: float, share: float) -> list[float]:
 def problem_of_cuts(
     scene: Scene, how: str, share: float, end: float, *, all_at_once: bool = False
 ) -> str | None:
-    """Return what does not add up where a run is cut, as `cuts_of` says; None where all does.
+    """Return the first difference between a run and its parts, cut by `cuts_of`; None without one.
 
     Parameters
     ----------
     scene : Scene
-        Of the short form.
+        A scene of the short form.
     how : str
         `fused` or `coupled`.
     share : float
-        Where the run is cut, 0 to 1.
+        Place of the cut, as a part of the run, 0 to 1.
     end : float
-        Of the run, s.
+        End of the run, s.
     all_at_once : bool
-        Whether one run is cut at all these instants too, beside two runs for each instant.
+        Whether one more run is cut at all these instants; each instant alone has two runs.
     """
     driver = driver_of(scene, how)
     driver.watch(contacts=len(scene.stops))
@@ -102,7 +102,7 @@ def problem_of_cuts(
         whole = recorded(driver, scene, 0.0, end)
         times = np.sort(np.concatenate([rows[:, TIME] for rows in whole]))[:MOST_EVENTS]
         if len(times) == MOST_EVENTS:
-            # between two events: rounding may move one that is at the end beyond it
+            # the end is moved between two events: rounding may move an event at the end beyond it
             longest = int(np.diff(times).argmax())
             end = float(times[longest : longest + 2].mean())
             whole = recorded(driver, scene, 0.0, end)
@@ -110,7 +110,7 @@ def problem_of_cuts(
         for edges in [[0.0, cut, end] for cut in cuts] + (
             [[0.0, *sorted(set(cuts)), end]] if all_at_once else []
         ):
-            # from time 0 each, an event at a border of two later recordings would be in both, or none, by rounding
+            # several cuts are made in one run: two later recordings would both have, or lose, an event at their border
             is_one_run = len(edges) > 3
             windows = pairwise(edges)
             parts = (
@@ -127,16 +127,16 @@ def problem_of_cuts(
 
 
 def difference(parts: Sequence[Events], edges: Sequence[float], whole: Events, allowed: float) -> str | None:
-    """Return how the events of successive recordings differ from those of the whole; None where they do not.
+    """Return the difference between the events of successive recordings and of the whole; None without one.
 
     Parameters
     ----------
     parts : sequence of Events
     edges : sequence of float
-        Where they begin and end, s; one more than there are parts.
+        Borders of the parts, s; one more than there are parts.
     whole : Events
     allowed : float
-        Difference of times, s.
+        Largest difference of times, s.
     """
     for name, rows_of, number in (("impacts", 0, CONTACT_OF_IMPACT), ("sticks", 1, CONTACT_OF_STICK)):
         for part, (begin, end) in zip(parts, pairwise(edges), strict=True):
@@ -158,13 +158,13 @@ def difference(parts: Sequence[Events], edges: Sequence[float], whole: Events, a
 def _wrongly_open(
     parts: Sequence[Events], edges: Sequence[float], whole: Events, allowed: float
 ) -> str | None:
-    """Say which contact or rest is open at the end of its recording though it has ended, or the other way round."""
+    """Return contacts or rests that are open at the end of their recording although over, or closed although open."""
     ends = np.concatenate(
         [np.full(len(part.impacts), end) for part, end in zip(parts, edges[1:], strict=True)]
     )
     is_open = np.isnan(np.concatenate([part.impacts for part in parts])[:, DURATION])
     last = whole.impacts[:, TIME] + whole.impacts[:, DURATION]
-    lasts = ~(last < ends - allowed)  # also open at the end of the whole
+    lasts = ~(last < ends - allowed)  # open at the end of the whole run, too
     over = ~np.isnan(last) & (last < ends + allowed)
     if (wrong := (is_open & ~lasts) | (~is_open & ~over)).any():
         return f"contacts at {whole.impacts[wrong, TIME].tolist()} s are open, or not, though they are not, or are"
@@ -181,7 +181,7 @@ def _wrongly_open(
 
 
 def counts_differ(parts: Sequence[Sequence[int]], whole: Sequence[int]) -> str | None:
-    """Return how the counts of successive recordings, of several points, differ from those of the whole.
+    """Return the difference between the counts of successive recordings and of the whole, for several points.
 
     Examples
     --------

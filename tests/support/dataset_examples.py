@@ -15,7 +15,7 @@ PERIODS = 3
 
 
 def impact_rows(number: int, start: float) -> NDArray[np.float64]:
-    """Return impacts that follow each other from a time on; velocities tell them apart."""
+    """Return successive impacts from a start time; each has its own velocity."""
     rows = np.ones((number, 7))
     rows[:, 0] = start + np.arange(number)
     rows[:, 1] = np.linspace(0.0, 6.0, number)
@@ -27,7 +27,7 @@ def impact_rows(number: int, start: float) -> NDArray[np.float64]:
 
 
 def record(value: float, impacts: int = 0, sticks: int = 0, samples: int = 0) -> RunRecord:
-    """Return a run whose every number can be traced back to `value`."""
+    """Return a run whose numbers all derive from `value`."""
     periods = np.column_stack(
         [np.full(PERIODS, value + k) for k in (1.0, -1.0, 0.5, 0.25)] + [np.zeros(PERIODS)]
     )
@@ -67,7 +67,7 @@ def failed(message: str) -> RunRecord:
     )
 
 
-#: Units of swept parameters of these examples; a scene's fields say them otherwise.
+#: Units of swept parameters of these examples; a real scene takes them from its fields.
 UNITS = {
     "angular_frequency": "rad s-1",
     "body_mass": "kg",
@@ -111,9 +111,9 @@ COUPLED_UNITS = {"body.displacement": "m", "body.velocity": "m/s"}
 
 
 def coupled_record(value: float, events: int = 0, samples: int = 0) -> RunRecord:
-    """Return a run of a coupled scene whose every number can be traced back to `value`.
+    """Return a run of a coupled scene whose numbers all derive from `value`.
 
-    Two events at a time: of component 1 with index 0, then of component 2 with index 1.
+    Events come in pairs at a time: of component 1 with index 0, then of component 2 with index 1.
     """
     place = np.arange(events)
     return RunRecord(

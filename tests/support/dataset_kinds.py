@@ -1,7 +1,7 @@
-"""Every kind of file that is written: a command that makes a small one, and its variables and attributes as text.
+"""Every kind of written file: a command that makes a small one, and its variables and attributes as text.
 
-Values that a user's program may stand on are in the text too: units, meanings of flags, the name of the kind. Sizes,
-results and what differs between machines are not.
+The text also has the values on which a user's program may depend: units, meanings of flags, the name of the kind. It
+leaves out sizes, results, and facts that differ between machines.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ KINDS = {
     "resonances": "resonances forced.toml "
     "--set sweep={'forcing.angular_frequency'={start=0.5,stop=1.7,points=13}}",
     "classes": "classify [sweep of paths]",
-    # recordings and what is found in them
+    # recordings and their analyses
     "recording": "import signal.csv --rate 20 --unit m",
     "two signals": "import two.csv --rate 1000 --unit m/s^2 --unit m/s^2",
     "recorded run": "rig record --rig RIG --channel tip=Dev1/ai0,5 --rate 1000 --duration 0.2",
@@ -111,22 +111,22 @@ KINDS = {
     "replay that is fitted": "replay board.toml hit.nc --fit body.damping_ratio --score again.nc",
 }
 FOLDERS = {"campaign": "campaign", "measured sweep": "measured"}
-"""Kinds that are the `dataset.nc` of a folder."""
-DEAR = ("accuracy",)
-"""Kinds that take seconds."""
+"""Kinds whose file is the `dataset.nc` of a folder."""
+SLOW = ("accuracy",)
+"""Kinds that take seconds to make."""
 
 KEPT_ATTRIBUTES = (
     *("Conventions", "dataset_schema", "recording_schema", "results_schema", "results_kind", "history"),
     *("units_system", "execution", "engine", "engine_version", "map", "quantity"),
 )
-"""Attributes of a file whose values are in the text; of all others it has name and type."""
+"""Attributes of a file whose values are in the text; the text has only name and type of all others."""
 
 VARYING = ("trigger",)
-"""Attributes of variables whose values differ from run to run, beside numbers that are not whole."""
+"""Attributes of variables whose values differ from run to run, in addition to non-integer numbers."""
 
 
 class KindsOfDataset:
-    """A folder with a file of each kind, made when it is asked for."""
+    """A folder with a file of each kind, made on first use."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -155,7 +155,7 @@ class KindsOfDataset:
         return path
 
     def arguments(self, kind: str, rig: str = "") -> list[str | Path]:
-        """Return the words of the command that makes a kind; files that it needs are made."""
+        """Return the words of the command that makes a kind, after making the files that it needs."""
         words = re.findall(r"(?:\[[^\]=]+\]|\S)+", KINDS[kind])
         return [rig if word == "RIG" else self._word(word) for word in words]
 
@@ -167,12 +167,12 @@ class KindsOfDataset:
 
     @contextmanager
     def _rig(self) -> Iterator[str]:
-        """Yield the address of a rig whose time goes on while a call waits for it, however busy the machine is."""
+        """Yield the address of a rig whose clock runs only while a call waits for it, however busy the machine is."""
         with opened_bench(self._folder / "oscillator.toml") as bench:
             yield f"grpc://{bench.server.address}"
 
     def _word(self, word: str) -> str | Path:
-        """Return a word of a command, a file of this folder as its path."""
+        """Return a word of a command; a file of this folder becomes its path."""
         if word.startswith("["):
             return self.file(word[1:-1])
         path = self._folder / word
@@ -180,13 +180,13 @@ class KindsOfDataset:
 
 
 def _release(scene: Path) -> None:
-    """Let the body of a rig begin away from its rest, so that there is something to be measured."""
+    """Start the body of a rig away from its rest, so that its motion can be measured."""
     text = scene.read_text(encoding="utf-8")
     scene.write_text(text.replace("[body]", "[body]\ndisplacement_start = -0.003"), encoding="utf-8")
 
 
 def _write_signals(folder: Path) -> None:
-    """Write a decay, a drive with its response, and a hit, as files that are imported or read."""
+    """Write a decay, a drive with its response, and a hit, as files for import or reading."""
     decay = (f"{0.99**n * math.cos(0.3 * n)}\n" for n in range(400))
     (folder / "signal.csv").write_text("signal\n" + "".join(decay))
     base = np.random.default_rng(1).normal(size=2000)
@@ -198,7 +198,7 @@ def _write_signals(folder: Path) -> None:
 
 
 def described(path: Path) -> str:
-    """Return the attributes and variables of a file; a list of coordinates that several have is said once."""
+    """Return the attributes and variables of a file; a list of coordinates shared by several variables appears once."""
     with netCDF4.Dataset(path) as data:
         lines = [f"{name}: {_of_file(name, data.getncattr(name))}" for name in sorted(data.ncattrs())]
         lists = sorted(

@@ -22,14 +22,14 @@ class Damped:
     cubic: float = 0.0
 
     def slope(self, state: Floats, way: float) -> list[float]:
-        """Return velocity and acceleration while the body moves one way (+1 or -1)."""
+        """Return velocity and acceleration while the body moves in the direction `way` (+1 or -1)."""
         place, speed = state
         spring = -(self.omega**2) * place * (1.0 + self.cubic * place**2)
         loss = 2.0 * self.viscous * speed + way * (self.coulomb + self.quadratic * speed**2)
         return [speed, spring - loss]
 
     def motion(self, start: float, time: Floats) -> Floats:
-        """Return the displacement after a release from rest at time 0, to 1e-10 of the start."""
+        """Return the displacement after a release from rest at time 0, with an error of 1e-10 of the start."""
         place, clock, moved = start, 0.0, np.empty(len(time))
         while True:
             holding = abs(self.slope(np.array([place, 0.0]), 0.0)[1]) <= self.coulomb

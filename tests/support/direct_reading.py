@@ -1,4 +1,4 @@
-"""Imports whose files are read in this process: the readers are tried, not what confines them."""
+"""Imports whose files are read in this process: they test the readers, not the reading process around them."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Oscillators with sweeps that hypothesis draws, as texts of scenes."""
+"""Scenes of oscillators with sweeps, drawn by hypothesis, as texts."""
 
 from __future__ import annotations
 
 from hypothesis import strategies as st
 
 MOST_IMPACTS = 300
-"""Of one point: many of the drawn scenes come to it."""
+"""Limit of the impacts of one point; many of the drawn scenes reach it."""
 
 OSCILLATOR = """
 [body]
@@ -35,7 +35,7 @@ FORCED = (
 FREE = ("transient_time = 1.0\nrecorded_time = 9.0", "recorded_time = 5.0\nimpacts = false")
 SWEPT = ("body.mass", "stop[1].position", "body.velocity_start")
 STARTS = ("body.velocity_start", "forcing.phase")
-"""Keys along which no branch goes."""
+"""Keys that cannot be the direction of a branch."""
 SWEPT_FORCED = (*SWEPT, "forcing.amplitude", "forcing.phase")
 
 

@@ -1,4 +1,4 @@
-"""A random force and the displacement of one mode or of two, with what makes them: exact for the band-limited force."""
+"""A random force and the displacement of one or two modes, with their parameters: exact for the band-limited force."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.analysis.recording import Channel, TimeAxis
 
 RATE = 400.0
 BEFORE = 25_536
-"""Samples of the force before the record: with 40,000 of the record they have a fast transform."""
+"""Samples of the force before the record: together with its 40,000 samples they have a fast transform."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def driven(
 
 
 def drawn_modes(case: int, rng: np.random.Generator) -> tuple[tuple[Mode, ...], float]:
-    """Return the modes of a case and its noise: one mode of 20 Hz, in two cases of three a neighbour beside it."""
+    """Return the modes of a case and its noise: one mode of 20 Hz, in two cases of three with a close second mode."""
     ratio = 10.0 ** rng.uniform(-3.0, np.log10(0.05))
     mode = Mode(20.0, ratio)
     noise = (0.0, 0.01, 0.05, 0.1)[int(rng.integers(4))]

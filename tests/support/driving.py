@@ -1,4 +1,4 @@
-"""An observer of an output: an input that is wired to it, started with it."""
+"""An observer of an output: an input that is wired to the output and starts with it."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from vibroimpact.hardware.rig.opening import Rig
 from vibroimpact.hardware.virtual_rig.control import RigControl
 
 LOOP = Input("loop", "Dev1/ai2", 10.0)
-"""Wired to Dev1/ao0 in examples/rig/oscillator.toml."""
+"""Input that is wired to Dev1/ao0 in examples/rig/oscillator.toml."""
 STEP = 20.0 / 2**16
-"""V, of an output and of an input: what rounding adds to a jump, twice."""
+"""Resolution of an output and of an input, V: rounding changes a jump by up to two of them."""
 
 
 class Observer:
-    """Records what is put out, from a trigger or at once until it is left.
+    """Records the output, from a trigger or at once, until its block ends.
 
     Attributes
     ----------
     began : float
-        Time of the rig when it started, s; with a trigger, when it was armed.
+        Time of the rig at the start, s; with a trigger, when it was armed.
     volts : ndarray of float, shape (sample,)
-        When it has ended.
+        Voltages, once the observer has ended.
     """
 
     began: float
@@ -68,20 +68,20 @@ class Observer:
 
     @property
     def steepest(self) -> float:
-        """The largest jump, V/s, without what rounding adds."""
+        """Largest slope of the output, V/s, without the share of rounding."""
         return float((np.abs(np.diff(self.volts)).max() - 2.0 * STEP) * self._rate)
 
 
 SINE = ("--output", "Dev1/ao0", "--frequency", "5.3", "--amplitude", "2", "--ramp", "0.2")
 RATE = 10_000.0
 STEEPEST = 2.0 * (2.0 * np.pi * 5.3 + 0.5 * np.pi / 0.05)
-"""Of that sine with its ramps, and of the fall from 2 V in 50 ms, V/s: far below the default limit."""
+"""Largest slope of that sine with its ramps plus the fall from 2 V in 50 ms, V/s: far below the default limit."""
 SECONDS = 30.0
-"""For what should happen at once, on a machine that does other things too."""
+"""Longest wait for an immediate event, s, on a machine with other work."""
 
 
 class Driven:
-    """The program `vibroimpact rig sine` on a rig that is served here, its guardian, and an observer.
+    """The program `vibroimpact rig sine` on a rig served by this process, its guardian, and an observer.
 
     Attributes
     ----------
@@ -102,20 +102,20 @@ class Driven:
         return float(self.bench.control.state()["time"])
 
     def drive(self, seconds: float) -> float:
-        """Let the program drive for a time of the rig; return what that is then."""
+        """Let the program drive for `seconds` of the rig's time; return the time of the rig then, s."""
         end = self.now() + seconds
         while (now := self.now()) < end:
             time.sleep(0.002)
         return now
 
     def ended(self) -> tuple[int, str, str]:
-        """Wait until program and guardian have ended; return exit code and what they said."""
+        """Wait until program and guardian have ended; return exit code, output and error output."""
         out, err = self.program.communicate(timeout=SECONDS)
         self.guardian.wait(SECONDS)
         return self.program.returncode, out, err
 
     def problem_at_rest(self) -> str | None:
-        """Return what is wrong with the end: the output, or tasks that remain."""
+        """Return the problem of the end state: the output, or remaining tasks."""
         truth, tasks = self.bench.control.truth(), self.bench.control.state()["tasks"]
         if truth["outputs"][0] != 0.0:
             return f"the output is at {truth['outputs'][0]} V"
@@ -124,14 +124,14 @@ class Driven:
         return None
 
     def at_zero_after(self, since: float) -> float:
-        """Return the time of the rig from an instant to the last sample that was not 0, s."""
+        """Return the time of the rig from an instant to the last sample away from 0, s."""
         moving = np.flatnonzero(np.abs(self.seen.volts) > 1.5 * STEP)
         return self.seen.began + moving[-1] / RATE - since if moving.size else 0.0
 
 
 @contextmanager
 def driven(bench: Bench, *more: str) -> Iterator[Driven]:
-    """Let the program drive; what is left of it at the end of the block is ended."""
+    """Start the program; end it and its guardian at the end of the block."""
     rig = Rig("bench", bench.channel, bench.server.address)
     where = f"grpc://{bench.server.address}"
     program = warm.start(ENTRY, "rig", "sine", "--rig", where, *SINE, *more)

@@ -1,4 +1,4 @@
-"""Whether processes have ended, for tests that wait for it."""
+"""Waiting for the end of processes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 import psutil
 
 SECONDS = 60.0
-"""Patience with a machine that is busy."""
+"""Longest wait on a busy machine, s."""
 
 
 def ended(process: int) -> bool:
@@ -20,7 +20,7 @@ def ended(process: int) -> bool:
 
 
 def wait_until(happened: Callable[[], bool]) -> None:
-    """Wait until something has happened."""
+    """Wait until a condition holds."""
     deadline = time.monotonic() + SECONDS
     while not happened():
         assert time.monotonic() < deadline

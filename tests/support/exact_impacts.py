@@ -1,7 +1,7 @@
 """Impacts of linear bodies in 40 digits, on a rigid or a Kelvin-Voigt stop: flights and contacts by their own modes.
 
-When events are is found by the secant method from where a run has them, in as many digits as wanted: what is checked
-is the numbers of a run, not which impacts there are. No eigenvalue may be double.
+The secant method finds the time of each event in any number of digits, starting from the time in a run. So the
+reference checks the numbers of a run, not the list of its impacts. No eigenvalue may be double.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mpmath as mp
 
 DIGITS = 70
-"""So that 40 are left where a stop is grazed."""
+"""Working digits: 40 are left where a stop is grazed."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class ExactBody:
     ----------
     natural, damping, force : sequence of mpf
     shape : sequence of mpf
-        The displacement in front of the stop, which is also what is observed, is shape . q.
+        Shape of the observed point in front of the stop: its displacement is shape . q.
     angular_frequency : float
     start : sequence of mpf
         Modal displacements, then modal velocities.
@@ -62,7 +62,7 @@ class _Piece:
         return self._rest + wave.apply(mp.re)
 
     def flow(self, state: mp.matrix, start: mp.mpf, time: mp.mpf) -> mp.matrix:
-        """Return the state at a time from that at another."""
+        """Return the state at `time` from the state at `start`."""
         free = self._inverse * (state - self._forced(start))
         grown = mp.matrix([mp.exp(a * (time - start)) * x for a, x in zip(self._rates, free, strict=True)])
         return self._forced(time) + (self._vectors * grown).apply(mp.re)
@@ -100,14 +100,14 @@ class ExactMotion:
         return row
 
     def hit(self, near: float, duration: float = 0.0) -> tuple[mp.mpf, mp.mpf]:
-        """Go on past the impact closest to a time; return when it is and its velocity.
+        """Advance past the impact closest to a time; return time and velocity of this impact.
 
         Parameters
         ----------
         near : float
-            When a run has it, s.
+            Time of the impact in a run, s.
         duration : float
-            Of the contact in that run, where the stop yields, s.
+            Duration of the contact in that run, for a compliant stop, s.
         """
         with mp.workdps(DIGITS):
             self._go_on(self._free, lambda x: (self._gap * x)[0] - self._position, near)
@@ -125,13 +125,13 @@ class ExactMotion:
             return time, velocity
 
     def at(self, time: float) -> tuple[mp.mpf, mp.mpf]:
-        """Return displacement and velocity of the point in front of the stop, where no impact is before."""
+        """Return displacement and velocity of the point in front of the stop; no impact may lie in between."""
         with mp.workdps(DIGITS):
             state = self._free.flow(self.state, self.time, mp.mpf(time))
             return (self._gap * state)[0], (self._rate * state)[0]
 
     def _go_on(self, piece: _Piece, quantity: Callable[[mp.matrix], mp.mpf], near: float) -> None:
-        """Go on to the zero of a quantity of the state."""
+        """Advance to the zero of a quantity of the state."""
         start, state = self.time, self.state
 
         def at(time: mp.mpf) -> mp.mpf:

@@ -1,4 +1,4 @@
-"""Modes in many digits, by other roads than the components': cosh/sinh shapes of beams, eigenvectors of chains."""
+"""Modes in many digits, independent of the components' method: cosh/sinh shapes of beams, eigenvectors of chains."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def beam_shape(boundary: str, j: int, s: float, derivative: int) -> mp.mpf:
 def chain_modes(masses: Sequence[float], stiffnesses: Sequence[float]) -> tuple[list[mp.mpf], mp.matrix]:
     """Return angular frequencies and M-orthonormal shapes from M^-1/2 K M^-1/2, in 80 digits.
 
-    `stiffnesses` has one more entry than `masses`: the far spring. Signs: the first mass with more than 1e-8 of the
-    mode moves to the positive side.
+    `stiffnesses` has one more entry than `masses`: the far spring. Sign of a mode: its first mass with more than 1e-8
+    of the mode moves to the positive side.
     """
     with mp.workdps(80):
         n = len(masses)
@@ -66,7 +66,7 @@ def chain_modes(masses: Sequence[float], stiffnesses: Sequence[float]) -> tuple[
 def frequencies_below(
     masses: Sequence[float], stiffnesses: Sequence[float], frequency: float, factor: float
 ) -> int:
-    """Return how many natural frequencies of a chain are below a frequency times a factor.
+    """Return the number of natural frequencies of a chain below a frequency times a factor.
 
     These are the negative pivots of K - w^2 M (Sylvester), in 80 digits.
     """

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpmath import mp, mpf
 
-DIGITS = 90  # so that 40 are left where the two exponents (almost) coincide
+DIGITS = 90  # 40 are left where the two exponents (almost) coincide
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ def _exponents(o: Oscillator) -> tuple[mp.mpc, mp.mpc]:
     decay = mpf(o.damping) / (2 * mpf(o.mass))
     square = decay * decay - mpf(o.stiffness) / mpf(o.mass)
     if abs(square) < mpf(10) ** -60:
-        square = mpf(10) ** -60  # the two exponents apart by 1e-30: an error of 1e-60 in what they make
+        square = mpf(10) ** -60  # two exponents 1e-30 apart have an effect of 1e-60
     root = mp.sqrt(mp.mpc(square))
     return -decay + root, -decay - root
 
@@ -72,7 +72,7 @@ def exact_flow(
 def exact_next_contact(
     o: Oscillator, state: tuple[float, float], position: float, phase: float, near: float
 ) -> tuple[mpf, mpf]:
-    """Return the contact time closest to `near` and the velocity there, by Newton in 40 digits."""
+    """Return the contact time closest to `near` and the velocity there, by Newton's method in 40 digits."""
     with mp.workdps(DIGITS):
         time = mpf(near)
         for _ in range(60):

@@ -1,4 +1,4 @@
-"""An export of any component, the one that plays a recording among them."""
+"""An export of any component, including the one that plays a recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.fmus.packaging.replay_fmu import build_replay
 
 
 def exported(name: str, path: Path, *, fmi: str = "3.0", **options: Any) -> Path:
-    """Return an FMU for other tools, made once in a process where it has no options; a Replay has none."""
+    """Return an FMU for other tools; without options it is made once in a process. A Replay has no options."""
     if name != REPLAY and options:
         return export_fmu(name, path, fmi=fmi, **options)
     path.write_bytes(_plain(name, fmi))

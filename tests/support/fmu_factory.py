@@ -1,7 +1,7 @@
-"""FMUs that the test suite makes itself, from the C in `tests/support/fmus`: other people's FMUs, good and bad.
+"""FMUs made by the test suite from the C in `tests/support/fmus`: other people's FMUs, good and bad.
 
-They share nothing with the package's own C. Each is compiled once for each content of its sources and compiler;
-asking again only writes the file.
+They share no code with the package. Each is compiled once for each content of its sources and compiler; a second call
+only writes the file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 SOURCES = Path(__file__).with_name("fmus")
-#: The C file of each model; those with a description of a version can be made in that version.
+#: The C file of each model. A model exists in a version of FMI if it has a description of that version.
 MODELS = {
     "BouncingBall": "ball.c",
     "Buffer": "buffer.c",
@@ -33,7 +33,7 @@ MODELS = {
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
 }
-#: The token of an FMU that looks at none.
+#: Token of an FMU that accepts every token.
 ANY_TOKEN = "*"
 MADE = tuple(
     (name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (SOURCES / f"{name}.fmi{fmi[0]}.xml").exists()
@@ -54,15 +54,15 @@ guard = false
 
 
 def bouncing_ball(folder: Path, fmi: str = "2.0") -> Path:
-    """Write a ball that looks for the ground only where a step ends: has state, but no events.
+    """Write a ball that checks for the ground only at the end of a step: it has state, but no events.
 
-    Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`, and `landing`: what a bounce does to `h`.
+    Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`, and `landing`: the value of `h` after a bounce.
     """
     return _write("BouncingBall", fmi, folder)
 
 
 def stepped_ball(folder: Path, fmi: str = "3.0") -> Path:
-    """Write a ball that bounces inside steps, as that of FMI's Reference-FMUs; in FMI 3.0 with event mode.
+    """Write a ball that bounces inside steps, like the ball of FMI's Reference-FMUs; in FMI 3.0 with event mode.
 
     Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`.
     """
@@ -70,7 +70,7 @@ def stepped_ball(folder: Path, fmi: str = "3.0") -> Path:
 
 
 def buffer(folder: Path, fmi: str = "3.0") -> Path:
-    """Write a spring and a dashpot that begin at a position and never pull; it answers at the end of a step.
+    """Write a spring and a dashpot that start at a position and never pull; they answer at the end of a step.
 
     Inputs `d` (m), `u` (m/s); output `push` (N); parameters `k`, `c`, `gap`.
     """
@@ -78,43 +78,43 @@ def buffer(folder: Path, fmi: str = "3.0") -> Path:
 
 
 def clocked(folder: Path) -> Path:
-    """Write a sampler of FMI 3.0 with two input clocks, whose variables may be touched only while their clock ticks.
+    """Write a sampler of FMI 3.0 with two input clocks; a clock's variables are accessible only while it ticks.
 
-    Input `u`; outputs `y` (10 times the ticks, and `u`, of the last tick), `ticks`, `late_ticks`, `sum`; parameters
-    `interval` and `shift` (s) of its second clock.
+    Input `u`; outputs `y` (10 times the ticks plus `u` at the last tick), `ticks`, `late_ticks`, `sum`. Parameters
+    `interval` and `shift` (s) belong to its second clock.
     """
     return _write("Clocked", "3.0", folder)
 
 
 def single(folder: Path, fmi: str = "3.0") -> Path:
-    """Write an integrator y' = u of which a process may have one instance: `y` is one variable of the process."""
+    """Write an integrator y' = u whose `y` is one variable of the process: a process may have one instance."""
     return _write("Single", fmi, folder)
 
 
 def faulty(folder: Path, fmi: str = "3.0") -> Path:
-    """Write an integrator y' = u with the parameters `fault` (what goes wrong) and `fault_time`."""
+    """Write an integrator y' = u with the parameters `fault` (kind of fault) and `fault_time`."""
     return _write("Faulty", fmi, folder)
 
 
 def gain(folder: Path, token: str = "") -> Path:
     """Write y = k u + b in FMI 2.0: direct feedthrough, and no state that can be saved.
 
-    With `ANY_TOKEN` it makes an instance for every token, as FMUs of Hopsan and Amesim do.
+    With `ANY_TOKEN` it makes an instance for every token, like the FMUs of Hopsan and Amesim.
     """
     return _write("Gain", "2.0", folder, token)
 
 
 def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
-    """Write a mass on a spring that knows nothing of contacts, with states that can be kept or without.
+    """Write a mass on a spring without contacts, with saveable states or without.
 
-    Outputs `x` (m), `v` (m/s); input `f` (N), held over a step; parameters `m`, `k`, `load`, and `scheme` with
-    `inner_step`: how it integrates.
+    Outputs `x` (m), `v` (m/s); input `f` (N), constant over a step; parameters `m`, `k`, `load`, and `scheme` with
+    `inner_step`: the integration method.
     """
     return _write("Mass" if states else "StatelessMass", fmi, folder)
 
 
 def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
-    """Write an FMU with another description: each first text, which must be there, becomes the second."""
+    """Write an FMU with another description: each first text, which must occur, becomes the second."""
     with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as changed:
         for name in archive.namelist():
             content = archive.read(name)
@@ -162,15 +162,15 @@ def _compile(name: str, fmi: str, adapter: Path, token: str, library: Path) -> N
         (generated / "token.h").write_text(f'#define TOKEN "{token}"\n', encoding="ascii")
         rest = generated / "rest.c"
         rest.write_text(_functions_left_out([adapter, SOURCES / MODELS[name]], fmi), encoding="ascii")
-        # not strict: the headers' own empty parameter lists are a warning for some compilers
+        # not strict: some compilers warn about the empty parameter lists of the headers
         sources = [adapter, SOURCES / MODELS[name], rest]
         compile_library(library, sources, [SOURCES, generated, fmi_headers()], export_all=True, strict=False)
 
 
 def _functions_left_out(sources: Sequence[Path], fmi: str) -> str:
-    """Return C for the functions of the standard that no source has: they answer error, or no instance.
+    """Return C for the functions of the standard that no source defines: they answer error, or no instance.
 
-    They take no arguments, as they look at none: in C's calling conventions the caller clears them away.
+    They declare no parameters, since they use none; in C's calling conventions the caller clears the arguments away.
     """
     major = fmi[0]
     header = (fmi_headers() / f"fmi{major}Functions.h").read_text(encoding="utf-8", errors="replace")

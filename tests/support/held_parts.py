@@ -1,4 +1,4 @@
-"""Contacts of foreign masses with stops that yield: coupled, and their energy."""
+"""Contacts of foreign masses with compliant stops: coupled, and their energy."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopC
 
 
 class HeldRun(NamedTuple):
-    """A foreign mass `b` among stops, begun, with its energy residual and events."""
+    """A foreign mass `b` among stops, initialized, with its energy residual and events."""
 
     importer: Importer
     energy: InterfaceEnergy
     events: list[Event]
 
     def motion(self, end: float) -> tuple[float, float]:
-        """Advance to `end`, s; returns displacement and velocity of the mass."""
+        """Advance to `end`, s; return displacement and velocity of the mass."""
         self.importer.advance(end)
         displacement, velocity = values(self.importer, "b", "x", "v")
         return displacement, velocity
 
     def residual(self) -> float:
-        """Sum of the residuals of all contacts, J."""
+        """Return the sum of the residuals of all contacts, J."""
         return float(self.energy.residuals().sum())
 
 
@@ -49,7 +49,7 @@ def held(
     macro_step: float = 0.1,
     **options: Any,
 ) -> HeldRun:
-    """Return a foreign mass that meets stops, begun at time 0."""
+    """Return a foreign mass that meets stops, initialized at time 0."""
     fmu = fmu_factory.mass(folder, version, states=states)
     importer = Importer(
         [part("b", fmu, **body), *stops],

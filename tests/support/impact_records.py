@@ -11,7 +11,7 @@ from vibroimpact.analysis.estimation.physics import Forcing, Parameters
 from vibroimpact.analysis.recording import Channel, TimeAxis
 from vibroimpact.fmus.core import motion
 
-#: Thesis 4.2.5, figure 4.10: F is the static deflection (mm), as y_st = 2.3 mm of figure 4.5 says.
+#: Thesis 4.2.5, figure 4.10: F is the static deflection (mm), following y_st = 2.3 mm of figure 4.5.
 THESIS = Parameters(
     restitution=0.89,
     damping_ratio=0.1,
@@ -45,7 +45,7 @@ CHAOTIC = Parameters(
 
 @dataclass(frozen=True)
 class Record:
-    """A simulated displacement with its truth."""
+    """A simulated displacement with its true parameters."""
 
     time: np.ndarray
     values: np.ndarray
@@ -57,12 +57,12 @@ class Record:
         return float(np.max(np.abs(self.values)))
 
     def channel(self, noise: float = 0.0, seed: int = 0) -> Channel:
-        """Return it as a channel, with white noise given as a part of the peak."""
+        """Return the displacement as a channel; `noise` is white, relative to the peak."""
         errors = noise * self.peak * np.random.default_rng(seed).standard_normal(len(self.values))
         return channel_of(self.time, self.values + errors)
 
     def forcing(self, **changes: float | bool | None) -> Forcing:
-        """Return the force as known, but for the changes."""
+        """Return the known force, with changes."""
         known: dict[str, float | bool | None] = {
             "angular_frequency": self.truth.angular_frequency,
             "static_deflection": self.truth.static_deflection,
@@ -84,7 +84,7 @@ def record_of(
     settled: float = 60.0,
     start: tuple[float, float] = (0.0, -1.0),
 ) -> Record:
-    """Return a record after a transient; samples fall anywhere in a period, and time 0 is the first of them."""
+    """Return a record after a transient; samples fall anywhere in a period, and the first sample has time 0."""
     step = 2.0 * math.pi / parameters.angular_frequency / per_period
     time = np.arange(round(periods * per_period)) * step
     begin = (settled * per_period + 0.37) * step

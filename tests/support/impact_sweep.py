@@ -1,7 +1,7 @@
 """An up-down sweep of the impact oscillator by a textbook event simulation, independent of the C core.
 
 Free flight in closed form (thesis eqs. 2.12-2.31), the next contact by a step that cannot pass a root, Newton
-restitution. Slow and plain on purpose: it makes the data that the readings are tested with.
+restitution. Slow and plain on purpose: it makes the data for the tests of readers.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Oscillator:
         self.damped = math.sqrt(1 - ZETA**2)
 
     def flow(self, x: float, v: float, phase: float, u: float) -> tuple[float, float]:
-        """Return displacement and velocity a time u later, without contact."""
+        """Return displacement and velocity after a time u, without contact."""
         now = self.transfer * complex(math.cos(phase), math.sin(phase))
         later = self.transfer * complex(math.cos(phase + self.w * u), math.sin(phase + self.w * u))
         h, g = x - now.real, v + self.w * now.imag
@@ -77,7 +77,7 @@ class Oscillator:
         raise AssertionError("no contact found")
 
     def advance(self, impacts: list[list[float]] | None, start: float) -> NDArray[np.float64]:
-        """Go on for one forcing period; return its largest and smallest displacement and its impacts."""
+        """Advance by one forcing period; return its largest and smallest displacement and its impacts."""
         x, v, elapsed, hits = self.displacement, self.velocity, 0.0, 0
         extremes = [-math.inf, math.inf]
         while True:
@@ -96,7 +96,7 @@ class Oscillator:
 
 
 def run(oscillator: Oscillator, transient: int, recorded: int) -> RunRecord:
-    """Let transients die out, then record some periods."""
+    """Let transients decay, then record some periods."""
     for _ in range(transient):
         oscillator.advance(None, 0.0)
     impacts: list[list[float]] = []
@@ -120,7 +120,7 @@ def run(oscillator: Oscillator, transient: int, recorded: int) -> RunRecord:
 
 
 def up_down_sweep(points: int, transient: int, recorded: int) -> xr.Dataset:
-    """Sweep the angular frequency from 0.6 to 1.6 and back, each run going on from its neighbour."""
+    """Sweep the angular frequency from 0.6 to 1.6 and back; each run starts from the end of its neighbour."""
     grid = np.linspace(0.6, 1.6, points)
     records, state = [], (0.0, 0.0)
     for values in (grid, grid[::-1]):

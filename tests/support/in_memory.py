@@ -1,4 +1,4 @@
-"""Whether a run in memory is what the file of the same run gives, to types, order and bits."""
+"""Whether a run in memory equals the file of the same run, in types, order and bits."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from vibroimpact.orchestrator.scene import Scene
 
 
 def assert_memory_is_file(scene: Scene) -> xr.Dataset:
-    """Run a scene; compare what is made in memory with what its file gives; return the former."""
+    """Run a scene; compare the dataset in memory with the dataset of its file; return the former."""
     with opened_scene(scene) as opened:
         flat = run_whole(opened)
     found = opened_in_memory(flat)
     with TemporaryDirectory() as folder:
         write_dataset(flat, Path(folder, "run.nc"))
         with open_dataset(Path(folder, "run.nc")) as opened_file:
-            wanted = opened_file.load()
-    xr.testing.assert_identical(found, wanted)
-    assert list(found.variables) == list(wanted.variables)
-    assert list(found.dims) == list(wanted.dims)
-    assert types(found.attrs) == types(wanted.attrs)
-    for name, variable in wanted.variables.items():
+            expected = opened_file.load()
+    xr.testing.assert_identical(found, expected)
+    assert list(found.variables) == list(expected.variables)
+    assert list(found.dims) == list(expected.dims)
+    assert types(found.attrs) == types(expected.attrs)
+    for name, variable in expected.variables.items():
         own = found.variables[name]
         assert (own.dtype, type(own)) == (variable.dtype, type(variable)), name
         assert types(own.attrs) == types(variable.attrs), name

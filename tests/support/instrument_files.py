@@ -1,4 +1,4 @@
-"""Exports in the manner of instruments, with drawn content; each writer says what is to be read of it."""
+"""Exports in the style of instruments, with drawn content; each writer returns the expected reading."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Drawn:
         return self.start + self.interval * np.arange(self.count)
 
     def clocks(self, form: str = "%H:%M:%S.%f", digits: int = 3) -> list[str]:
-        """Return times of day of the samples with so many digits of a second (of 6)."""
+        """Return times of day of the samples with a number of decimal places of a second (of 6)."""
         steps = [SINCE + timedelta(seconds=self.interval * place) for place in range(self.count)]
         return [
             step.strftime(form)[: digits - 6 or None] if "%f" in form else step.strftime(form)
@@ -45,7 +45,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Export:
-    """A text, and what is to be read of it: names, units (CF) and values of the channels, one interval for each."""
+    """A text and its expected reading: names, units (CF) and values of the channels, one interval for each."""
 
     lines: Sequence[str]
     names: Sequence[str]
@@ -57,7 +57,7 @@ class Export:
 
 
 def drawn(seed: int, interval: float | None = None, channels: int | None = None) -> Drawn:
-    """Return drawn channels; an interval or a number of channels that the form of an export demands is kept."""
+    """Return drawn channels; an export may prescribe the interval or the number of channels."""
     generator = np.random.default_rng(seed)
     count = int(generator.integers(40, 90))
     many = channels or int(generator.integers(1, 4))

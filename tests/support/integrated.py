@@ -1,4 +1,4 @@
-"""An instance of our FMUs for model exchange, driven call by call through FMPy."""
+"""An instance of the package's FMUs for model exchange, driven call by call through FMPy."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Integrated:
         return float(reader([self.references[name]])[0])
 
     def begin(self) -> None:
-        """End initialization; the events of the start are over."""
+        """End initialization and handle the events of the start."""
         self.fmu.exitInitializationMode()
         self.update()
         self.fmu.enterContinuousTimeMode()

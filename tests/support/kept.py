@@ -1,4 +1,4 @@
-"""Files that tests make once for each content of what they are made from; `make clean` removes them with `build/`."""
+"""Files made by tests once for each content of their inputs; `make clean` removes them with `build/`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pathlib import Path
 from support.places import ROOT
 
 FOLDER = ROOT / "build" / "tests"
-#: Time after which a file that no run has asked for is removed, s; above it no run is still at work.
+#: Time after which an unused file is removed, s; no run is still at work after so long.
 UNUSED = 3600.0
 
 
 def digest(*parts: str | bytes) -> str:
-    """Return the SHA-256 of some parts; where one ends and the next begins counts."""
+    """Return the SHA-256 of some parts; the borders between parts count."""
     whole = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
@@ -28,51 +28,51 @@ def digest(*parts: str | bytes) -> str:
 
 
 def content_of(files: Iterable[Path]) -> str:
-    """Return the digest of files, their places included."""
+    """Return the digest of files, including their paths."""
     return digest(*(part for path in sorted(files) for part in (path.as_posix(), path.read_bytes())))
 
 
 @cache
 def compiler_identity(compiler: tuple[str, ...]) -> str:
-    """Return the command of a compiler and what it says of its version."""
+    """Return the command of a compiler and the text of its version."""
     said = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=True)
     return digest(*compiler, said.stdout)
 
 
 def kept(name: str, key: str, make: Callable[[Path], None], folder: Path = FOLDER) -> Path:
-    """Return a file that is made where no run has left it.
+    """Return a file; it is made unless an earlier run has left it.
 
     Parameters
     ----------
     name : str
         Its name in the folder, after the key.
     key : str
-        Digest of all that it is made from.
+        Digest of everything that goes into the file.
     make : callable
-        Writes it to the path that it is given. An error leaves nothing under the name; two runs may make it at once.
+        Function that writes the file to a given path. An error leaves no file; two runs may make it at once.
     folder : Path
 
     Returns
     -------
     Path
-        Its time of change is that of the last run that asked for it.
+        Its modification time is that of the last run that used it.
     """
     path = folder / f"{key[:24]}-{name}"
     try:
         os.utime(path)
     except FileNotFoundError:
         folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / f"{os.getpid()}-{threading.get_ident()}-{path.name}"
+        unfinished = folder / f"{os.getpid()}-{threading.get_ident()}-{path.name}"
         try:
-            make(beside)
-            beside.replace(path)
+            make(unfinished)
+            unfinished.replace(path)
         finally:
-            beside.unlink(missing_ok=True)
+            unfinished.unlink(missing_ok=True)
     return path
 
 
 def remove_unused(folder: Path = FOLDER, unused: float = UNUSED) -> None:
-    """Remove the files that no run has asked for in so many seconds, and those that a killed run left half made."""
+    """Remove files without a use in the last `unused` seconds, and half-made files of a killed run."""
     for path in folder.iterdir():
         if time.time() - path.stat().st_mtime > unused:
             path.unlink(missing_ok=True)

@@ -32,7 +32,7 @@ OF_CONTACTS = ("position", "direction", "restitution", "yield_velocity")
 
 @dataclass
 class Results:
-    """What the lanes made of points: columns of `LanesPoints`, and the rows of each point that has run."""
+    """Results of the lanes: columns of `LanesPoints`, and the rows of each point that has run."""
 
     columns: Columns
     rows: list[Array]
@@ -45,7 +45,7 @@ class Results:
         return ran
 
     def same_as(self, other: Results) -> bool:
-        """Whether both are the same, bit for bit."""
+        """Whether both results are equal, bit for bit."""
         columns = all(
             np.array_equal(column, other.columns[name], equal_nan=column.dtype == np.float64)
             for name, column in self.columns.items()
@@ -68,18 +68,18 @@ def run(
     room: int = 4096,
     most_seconds: float = 1e9,
 ) -> Results:
-    """Run points to their end, through all calls that it takes.
+    """Run points to their end, through as many calls as needed.
 
     Parameters
     ----------
     points : dict of str to ndarray
         Arrays of `LanesPoints.GIVEN`, the last axis over the points.
     impacts, extrema, periods, impact_limit, instructions
-        Of the plan.
+        Fields of the plan.
     room : int
-        For rows, in one call.
+        Number of rows that fit into one call.
     most_seconds : float
-        Of one call.
+        Longest duration of one call, s.
     """
     count, modes, contacts = (
         points["angular_frequency"].size,
@@ -118,21 +118,21 @@ def run(
 
 
 def taken(points: Columns, places: NDArray[np.int64]) -> Columns:
-    """Return some of the points."""
+    """Return the points at some places."""
     return {name: array[..., places] for name, array in points.items()}
 
 
 def drawn(
     count: int, modes: int, contacts: int, seed: int, *, transient: int = 3, recorded: int = 4
 ) -> Columns:
-    """Draw points: light to strong damping, critical damping among it; forced, from phases of all quarters.
+    """Draw points: light to strong damping, including critical damping; forced, from phases of all quarters.
 
     Parameters
     ----------
     count, modes, contacts : int
         Sizes.
     seed : int
-        Of the numbers.
+        Seed of the random numbers.
     transient, recorded : int
         Forcing periods before the recording, and in it.
     """
@@ -181,7 +181,7 @@ def oscillators(count: int, transient: int, recorded: int, **values: object) -> 
 
 
 def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Structure:
-    """Run one of the points by the scalar engine of bodies of many modes, recording from its start."""
+    """Run one of the points by the scalar engine of bodies of many modes, recorded from its start."""
     p = {name: array[..., place] for name, array in points.items()}
     natural = np.sqrt(p["stiffness"])
     modes = Modes(natural, p["decay"] / natural, p["force"], float(p["angular_frequency"]), float(p["phase"]))

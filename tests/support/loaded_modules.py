@@ -1,9 +1,9 @@
-"""A process that says which modules several commands, or lines of Python, load.
+"""A process that reports the modules loaded by several commands, or by lines of Python.
 
-It reads orders from standard input, JSON: modules to load beforehand, modules to look for, and groups of rows. A row is
-a command of `vibroimpact` (a list of words) or Python (a text). Each group runs in a child made by `fork` from this
-process, which has loaded nothing of vibroimpact. The answer has a line for each group: of each row its exit code, the
-modules that are loaded after it, and the end of what it printed.
+It reads orders from standard input as JSON: modules to load beforehand, modules to look for, and groups of rows. A row
+is a command of `vibroimpact` (a list of words) or Python (a text). Each group runs in a child made by `fork` from this
+process, which has loaded nothing of vibroimpact. The answer has one line for each group. For each row it has the exit
+code, the loaded modules among those looked for, and the end of the output.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Answer = tuple[int, list[str], str]
 
 
 def loaded_by(rows: Iterable[Row], looked_for: Collection[str]) -> str:
-    """Return the answers to a group of rows, JSON."""
+    """Return the answers to a group of rows, as JSON."""
     answers, answer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -37,7 +37,7 @@ def loaded_by(rows: Iterable[Row], looked_for: Collection[str]) -> str:
 
 
 def run(row: Row, looked_for: Collection[str]) -> Answer:
-    """Run a row; return its exit code, those of some modules that are loaded, and the end of what it printed."""
+    """Run a row; return its exit code, the loaded modules among those looked for, and the end of its output."""
     said, code = io.StringIO(), 0
     with redirect_stdout(said), redirect_stderr(said):
         try:
@@ -61,7 +61,7 @@ def answer_orders() -> None:
         for name in order["beforehand"]:
             importlib.import_module(name)
         assert "vibroimpact" not in sys.modules
-        # an old xarray brings scipy with it
+        # an old xarray loads scipy itself
         looked_for = [name for name in order["looked_for"] if name not in sys.modules]
         for rows in order["groups"]:
             print(loaded_by(rows, looked_for), flush=True)

@@ -1,4 +1,4 @@
-"""Ways that take memory as a library in C does, of which Python knows nothing."""
+"""Ways of simulating that take memory as a C library does, outside of Python's own count."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class OfC:
         self._size = size
 
     def run(self) -> Observation:
-        # not from malloc: it may hand out what was freed before, which is resident already
+        # mmap instead of malloc, which may return freed memory that is already resident
         if self._size:
             with mmap.mmap(-1, self._size) as block:
                 ctypes.memset(ctypes.addressof(ctypes.c_char.from_buffer(block)), 1, self._size)
@@ -30,7 +30,7 @@ class OfC:
 
 
 def memories_of_c(sizes: list[int]) -> list[int]:
-    """Return the memory that is found of ways of these sizes, one after the other, bytes."""
+    """Return the measured memory of ways of these sizes, one after the other, bytes."""
     return [memory_in_fork(_way_of(size)) for size in sizes]
 
 

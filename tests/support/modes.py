@@ -1,4 +1,4 @@
-"""What tests ask of modes beyond `fmus.core`: those of chains, and of beams what only the FMU uses."""
+"""Modes for tests, beyond `fmus.core`: modes of chains, and the beam quantities that only the FMU uses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 #: VI_MODES of the core library.
 MOST_MODES = 64
-#: Of a rectangular section in Timoshenko's theory.
+#: Shear coefficient of a rectangular section in Timoshenko's theory.
 SHEAR_COEFFICIENT = 5.0 / 6.0
 
 _ROW = ctypes.c_double * MOST_MODES
@@ -44,7 +44,7 @@ class _ChainModes(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainModes:
-    """Modes of a chain of N masses, as `chain_modes.h` says; matrices are (mass, mode) and (mode, mode)."""
+    """Modes of a chain of N masses, as in `chain_modes.h`; matrices are (mass, mode) and (mode, mode)."""
 
     natural: Array
     damping_ratio: Array
@@ -101,7 +101,7 @@ def static_stiffness(modes: BeamModes, point: float) -> float:
 
 
 def frequency_error(modes: BeamModes, slenderness: float, poisson_ratio: float = 0.3) -> Array:
-    """Return the relative errors of a beam's frequencies that its FMU warns of: equations.md 6.7."""
+    """Return the relative frequency errors of a beam, for which its FMU gives warnings: equations.md 6.7."""
     error, number = core_library().vi_beam_validity, ctypes.c_double
     error.restype, error.argtypes = number, [ctypes.c_int, ctypes.c_int, number, number, number]
     ratio, boundary = 2.0 * (1.0 + poisson_ratio), BOUNDARIES[modes.boundary]
@@ -115,7 +115,7 @@ def collocation(modes: BeamModes, points: ArrayLike, at: int) -> Array:
     Raises
     ------
     ValueError
-        The grid is singular: a point twice, a point on a support.
+        The grid is singular: a doubled point, or a point on a support.
     """
     s, pointer = np.ascontiguousarray(points, dtype=np.float64), ctypes.POINTER(ctypes.c_double)
     direction = np.empty(modes.eigenvalues.size)

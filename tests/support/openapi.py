@@ -19,7 +19,7 @@ PHRASES = {
     "Range Not Satisfiable": "Requested Range Not Satisfiable",
     "Unprocessable Content": "Unprocessable Entity",
 }
-"""What Python 3.13 calls a status, and what it was called before."""
+"""Name of an HTTP status in Python 3.13, and its earlier name."""
 
 
 def openapi() -> str:

@@ -27,7 +27,7 @@ def of_package(package: str) -> dict[str, type[Operation]]:
 
 
 def assert_sound(operation: type[Operation]) -> None:
-    """Assert that each argument has words, and that what is run takes the operation and keywords with defaults."""
+    """Assert that each argument has a help text, and that the function takes the operation and optional keywords."""
     assert all(field.words.help for field in operation.fields())
     if operation.study:
         assert issubclass(pkgutil.resolve_name(f"vibroimpact.{operation.study}"), Study)

@@ -1,4 +1,4 @@
-"""Bodies that hit each other: parts of coupled scenes, and what momentum and energy they have."""
+"""Bodies that hit each other: parts of coupled scenes, and their momentum and energy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ENERGIES = ("energy.kinetic", "energy.potential")
 
 
 def hit(name: str, model: str = "Oscillator", version: str = "3.0", **parameters: Value) -> ComponentSpec:
-    """Return a body that others may hit, at its port 1; `__` in the names of parameters stands for `.`."""
+    """Return a body with a contact at port 1 for other bodies; `__` in parameter names stands for `.`."""
     given = {key.replace("__", "."): value for key, value in parameters.items()}
     return ComponentSpec(name, fmu_path(model, version), {"contact[1].law": "pair", **given})
 
@@ -29,7 +29,7 @@ def pair(lower: str, upper: str, restitution: float = 1.0, clearance: float = 0.
 
 
 class PairRun(NamedTuple):
-    """Bodies that hit each other, begun, with their events."""
+    """Bodies that hit each other, initialized, with their events."""
 
     importer: Importer
     events: list[Event]
@@ -40,26 +40,26 @@ class PairRun(NamedTuple):
         return self
 
     def motion(self, name: str) -> tuple[float, float]:
-        """Displacement and velocity of an Oscillator."""
+        """Return displacement and velocity of an Oscillator."""
         displacement, velocity = values(self.importer, name, "displacement", "velocity")
         return displacement, velocity
 
     def momentum(self) -> float:
-        """Momentum of all Oscillators, N s."""
+        """Return the momentum of all Oscillators, N s."""
         return sum(m * v for m, v in (values(self.importer, name, "mass", "velocity") for name in self.names))
 
     def energy(self) -> float:
-        """Kinetic and elastic energy of all bodies, J."""
+        """Return the kinetic and elastic energy of all bodies, J."""
         return sum(sum(values(self.importer, name, *ENERGIES)) for name in self.names)
 
     @property
     def names(self) -> Sequence[str]:
-        """All components."""
+        """Return the names of all components."""
         return tuple(self.importer.components)
 
 
 def run_of(bodies: Sequence[ComponentSpec], pairs: Sequence[PairSpec], **options: Any) -> PairRun:
-    """Return bodies that hit each other, begun at time 0."""
+    """Return bodies that hit each other, initialized at time 0."""
     importer = Importer(bodies, pairs=pairs, **{"macro_step": 0.25, **options})
     run = PairRun(importer, events_of(importer))
     importer.begin()

@@ -1,4 +1,4 @@
-"""Runs of an importer with plain steps in C and without, and all that is seen of them."""
+"""Runs of an importer with plain steps in C and without, and all their observable facts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 
 
 class Run:
-    """A run of an importer, by plain steps in C or without, and all that is seen of it."""
+    """A run of an importer, by plain steps in C or without, and all its observable facts."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class Run:
         self.failure = ""
 
     def go(self, *ends: float) -> Run:
-        """Begin, and advance to each of these times; a failure ends that."""
+        """Initialize, and advance to each of these times; a failure ends the run."""
         self.importer.begin()
         try:
             for end in ends:
@@ -47,7 +47,7 @@ class Run:
         return self
 
     def facts(self) -> dict[str, Any]:
-        """All that another run must have likewise."""
+        """Return all facts that another run must share."""
         importer = self.importer
         found: dict[str, Any] = {
             "events": self.events,
@@ -72,7 +72,7 @@ class Run:
 def both(
     parts: Sequence[ComponentSpec], links: Sequence[ConnectionSpec], *ends: float, **options: Any
 ) -> Run:
-    """Run in C and without; returns the run in C, whose facts are those of the other."""
+    """Run in C and without; return the run in C, whose facts equal those of the other."""
     runs = [Run(parts, links, in_c=in_c, **options).go(*ends) for in_c in (True, False)]
     facts = [run.facts() for run in runs]
     assert facts[0] == facts[1]

@@ -1,6 +1,6 @@
-"""What users hold on to, as text: `python -P tests/support/public_names.py` writes all of it anew.
+"""The public interface as text: `python -P tests/support/public_names.py` writes all of it anew.
 
-Names have their signature and the first line of their description. Commands have the options that typer knows of: the
+Names have their signature and the first line of their description. Commands have the options known to typer: the
 boxes around them change with the versions of typer and rich. The service has its OpenAPI document, a scene its keys,
 a dataset its variables and attributes.
 """
@@ -33,7 +33,7 @@ DATASETS = TESTS / "end_to_end" / "datasets.txt"
 
 
 def names() -> str:
-    """Return each name of `vibroimpact` with its signature and first line, and those of its classes and modules."""
+    """Return each name of `vibroimpact` with signature and first line, and the names in its classes and modules."""
     return "".join(f"{line}\n" for name in dir(vi) for line in _lines_of(name, getattr(vi, name)))
 
 
@@ -47,7 +47,7 @@ def _lines_of(name: str, value: object) -> Iterator[str]:
 
 
 def _inner_names(value: object) -> list[str]:
-    """Return the names in a module, or those that a class of this package does not have from elsewhere."""
+    """Return the names in a module, or the members that a class of this package defines itself."""
     if isinstance(value, ModuleType):
         return sorted(value.__all__)
     if not inspect.isclass(value):
@@ -71,9 +71,9 @@ def _inner_signature(owner: Any, name: str) -> str:
 
 
 def _signature(value: Any) -> str:
-    """Return the arguments of what can be called.
+    """Return the arguments of a callable.
 
-    Exceptions and enumerations have those that Python gives them, a model of pydantic has its fields.
+    Exceptions and enumerations have the arguments that Python gives them; a model of pydantic has its fields.
     """
     if not callable(value) or (inspect.isclass(value) and issubclass(value, BaseException | enum.Enum)):
         return ""
@@ -107,7 +107,7 @@ def _lines_of_command(command: Any, name: str) -> Iterator[str]:
 
 
 def _parameter(given: Any, annotation: Any) -> str:
-    """Return an argument or option: its names, type, limits, default and help."""
+    """Return an argument or option as text: its names, type, limits, default and help."""
     kind, declared = typing.get_args(annotation)
     said = [
         getattr(kind, "__name__", "")
@@ -124,7 +124,7 @@ def _parameter(given: Any, annotation: Any) -> str:
 
 
 def first_lines() -> str:
-    """Return the first lines of the commands' help, which a list of commands shows."""
+    """Return the first lines of the commands' help, as in a list of commands."""
     lines = {words: _first_paragraph(_declared(place)) for words, place in table.paths().items()}
     return json.dumps(lines, indent=1) + "\n"
 
@@ -139,7 +139,7 @@ def _first_paragraph(declared: type) -> str:
 
 
 def main() -> None:
-    """Write each text into its file."""
+    """Write each text to its file."""
     sys.path.insert(0, str(TESTS))
     from support.dataset_kinds import datasets
     from support.openapi import openapi

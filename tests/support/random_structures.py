@@ -1,4 +1,4 @@
-"""Random bodies of many modes with random stops, and runs of them that can be compared."""
+"""Random bodies of many modes with random stops, and comparable runs of them."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ RIGID, COMPLIANT = ("restitution",), ("kelvin_voigt", "hertz", "hunt_crossley")
 ALL_LAWS = RIGID + COMPLIANT
 POWER = ("hertz", "hunt_crossley")
 MOST_IMPACTS = 3000
-"""Of one run: an elastic body pressed to its stop may bounce for ever; what comes later is not compared."""
+"""Largest number of impacts of one run: an elastic body pressed to its stop may bounce for ever. The rest is cut."""
 
 
 def depth_at(stop: Stop, q: Array) -> float:
-    """Return how far a stop is pressed in by these modal displacements, m."""
+    """Return the penetration of a stop at these modal displacements, m."""
     sign = 1.0 if stop.side == "upper" else -1.0
     return max(0.0, sign * (float(np.asarray(stop.shape) @ q) - stop.position))
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A body, its stops and its start, in numbers that can be mirrored, rescaled and reordered."""
+    """A body, its stops and its start, as numbers that can be mirrored, rescaled and reordered."""
 
     modes: Modes
     stops: tuple[Stop, ...]
@@ -37,17 +37,17 @@ class Scene:
     duration: float
 
     def body(self, *, energies: bool = False, extrema: bool = False) -> Structure:
-        """Make it, at time 0."""
+        """Return the body at time 0."""
         return Structure(self.modes, self.stops, self.q, self.p, energies=energies, extrema=extrema)
 
     def nudged(self, size: float) -> Scene:
-        """Return it with other start velocities: each mode's by `size` times the velocities there are."""
+        """Return the scene with start velocities changed by `size` times `speed`, with a sign alternating by mode."""
         signs = np.where(np.arange(len(self.p)) % 2 == 0, 1.0, -1.0)
         return replace(self, p=self.p + size * self.speed * signs)
 
     @property
     def speed(self) -> float:
-        """Size of modal velocities that this body reaches, m/s kg^(1/2)."""
+        """Size of the modal velocities of this body, m/s kg^(1/2)."""
         natural = np.asarray(self.modes.natural)
         pushed = np.abs(np.asarray(self.modes.force)).max() / max(1.0, natural.min())
         thrown = np.sqrt(2.0 * self.stored)
@@ -55,7 +55,7 @@ class Scene:
 
     @property
     def stored(self) -> float:
-        """Energy that the stops hold at the start, J."""
+        """Energy stored in the stops at the start, J."""
         energy = 0.0
         for stop in self.stops:
             exponent = {"hertz": 1.5, "hunt_crossley": stop.exponent}.get(stop.law, 1.0)
@@ -63,9 +63,9 @@ class Scene:
         return energy
 
     def disturbed(self, reached: Array, *, first: int) -> Scene:
-        """Return it with every other stop, from `first` on, moved out by `SHIFT` times the displacements there.
+        """Return the scene with every other stop, from `first` on, moved out by `SHIFT` times the displacements there.
 
-        Those with a power law are stiffer by `NUDGE_POWER`, too.
+        Stops with a power law are also stiffer by `NUDGE_POWER`.
         """
         stops = list(self.stops)
         for k in range(first, len(stops), 2):
@@ -79,13 +79,13 @@ class Scene:
 
 
 def no_less(value: float) -> float:
-    """Return a number with nothing between 0 and 1e-6: squares of less underflow, which is not what is tested."""
+    """Return a number without values between 0 and 1e-6: squares of smaller numbers underflow, outside of the tests."""
     return value if abs(value) >= 1e-6 else 0.0
 
 
 @st.composite
 def bodies(draw: st.DrawFn, *, forced: bool | None = None, most: int = 8) -> Modes:
-    """Modes of any frequencies and damping, forced or not (None: either)."""
+    """Draw modes of any frequencies and damping, forced or not (None: either)."""
     n = draw(st.integers(1, most))
     natural = sorted(draw(st.lists(st.floats(0.3, 15.0), min_size=n, max_size=n)))
     ratios = st.one_of(st.floats(0.0, 0.3).map(no_less), st.sampled_from([0.0, 0.02, 1.0, 3.0]))
@@ -93,7 +93,7 @@ def bodies(draw: st.DrawFn, *, forced: bool | None = None, most: int = 8) -> Mod
     coupling = None
     if (
         draw(st.integers(0, 3)) == 0
-    ):  # damping that couples the modes: any symmetric matrix that only takes energy
+    ):  # damping that couples the modes: any symmetric matrix that never adds energy
         entries = st.lists(st.floats(-0.6, 0.6).map(no_less), min_size=n * n, max_size=n * n)
         root = np.array(draw(entries)).reshape(n, n)
         coupling = root @ root.T
@@ -105,7 +105,7 @@ def bodies(draw: st.DrawFn, *, forced: bool | None = None, most: int = 8) -> Mod
 
 @st.composite
 def laws(draw: st.DrawFn, allowed: Sequence[str] = ALL_LAWS) -> dict[str, float | str]:
-    """Parameters of a stop's law."""
+    """Draw the parameters of a stop's law."""
     law = draw(st.sampled_from(list(allowed)))
     if law == "restitution":
         r = draw(st.one_of(st.floats(0.0, 0.95), st.sampled_from([0.0, 1.0])))
@@ -128,9 +128,9 @@ def scenes(
     most_stops: int = 3,
     elastic: bool = True,
 ) -> Scene:
-    """Bodies with one to `most_stops` stops in random places, started on their free sides (or on a stop).
+    """Draw bodies with one to `most_stops` stops in random places, started on their free sides (or on a stop).
 
-    `elastic` False leaves out the restitution of exactly 1.
+    `elastic` False excludes the restitution of exactly 1.
     """
     modes = draw(bodies(forced=forced, most=most_modes))
     n = len(np.asarray(modes.natural))
@@ -142,12 +142,12 @@ def scenes(
         shape, side = draw(vector), draw(st.sampled_from(["upper", "lower"]))
         shape[draw(st.integers(0, n - 1))] += draw(
             st.sampled_from([-1.5, 1.5])
-        )  # no stop without motion at it
-        # only the first may be touched at the start: whether two are hit together or one after the other is no
-        # continuous question, and rounding would answer it
+        )  # no stop at a point without motion
+        # only the first stop may be touched at the start. With two, a joint impact and two successive ones differ
+        # without a continuous transition, and rounding would decide between them
         gap = draw(st.one_of(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.1])))
         gap = gap if number == 0 else max(gap, 0.05)
-        # a hair on the free side: the sum in C may round to the other side of it
+        # slightly on the free side: the sum in C may round to the other side
         position = float(shape @ q) + (gap + 1e-14) * (1.0 if side == "upper" else -1.0)
         law = draw(laws(allowed))
         if not elastic and law.get("restitution") == 1.0:
@@ -158,7 +158,7 @@ def scenes(
 
 @dataclass
 class Run:
-    """What a body did: states at the times asked for, as far as the run went."""
+    """Result of a run: states at the given times, up to its end."""
 
     times: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
@@ -167,16 +167,16 @@ class Run:
 
 
 def follow(scene: Scene, times: Iterable[float], *, stepped: Sequence[float] = ()) -> Run:
-    """Run a scene and look at these times; `stepped`: further times at which a step ends."""
-    asked, run = sorted(set(times)), Run()
+    """Run a scene and store its states at these times; `stepped`: further times at which a step ends."""
+    instants, run = sorted(set(times)), Run()
     with scene.body() as body:
-        for time in sorted({*asked, *stepped}):
+        for time in sorted({*instants, *stepped}):
             if time <= body.time:
                 continue
             run.ended = body.advance(time - body.time, most_impacts=max(1, MOST_IMPACTS - len(body.impacts)))
             if run.ended == IMPACT_LIMIT:
                 return run
-            if time in asked:
+            if time in instants:
                 rows = body.impacts
                 run.times.append(time)
                 run.states.append(np.concatenate([body.displacement, body.velocity]))
@@ -185,23 +185,25 @@ def follow(scene: Scene, times: Iterable[float], *, stepped: Sequence[float] = (
 
 
 NUDGE = 1e-13
-"""A start velocity off by this, relative: some hundred times what rounding may do in a run."""
+"""Relative change of a start velocity: some hundred times the possible effect of rounding in a run."""
 NUDGE_POWER = 1e-10
-"""The same where a contact with a power law is followed to the default tolerance: a step's end changes its segments."""
+"""The same for power laws, solved to the default tolerance: the end of a step changes the segments of a contact."""
 
 
 SHIFT = 1e-15
-"""A stop out of its place by this, of the displacements that add up there: what rounding may do to each contact."""
+"""Shift of a stop over the displacements that add up there: the possible effect of rounding on each contact."""
 
 
 def apart(scene: Scene, one: Run, other: Run, times: Sequence[float]) -> list[tuple[float, float, float]]:
-    """Compare two runs that should agree but for rounding; returns (time, difference, largest allowed).
+    """Compare two runs that should agree up to rounding; return (time, difference, largest allowed).
 
-    Impacts amplify rounding, without bound where orbits diverge or graze. How much, the scene itself tells: it is run
-    again from starts nudged by `NUDGE` (`NUDGE_POWER`), and the two runs may differ by no more than thirty times what
-    that changes: of two nudges, neither may hit the direction that grows most. A plastic impact forgets how it was
-    started, and what is thrown by its stop hardly knows: runs that differ by more are compared with runs at disturbed
-    stops, too, which tells grazes, and stops almost at one place, from errors.
+    Impacts amplify rounding, without bound where orbits diverge or graze. The scene itself gives the amplification: it
+    runs again from starts nudged by `NUDGE` (`NUDGE_POWER`). The two runs may differ by thirty times the change due to
+    the nudges, since neither nudge may hit the direction that grows most.
+
+    A plastic impact forgets the start, and the motion of a body thrown by its stop hardly depends on it. So runs that
+    differ by more are also compared with runs at disturbed stops. These separate errors from grazes and from stops
+    that are almost at one place.
     """
     nudge = NUDGE_POWER if any(stop.law in POWER for stop in scene.stops) else NUDGE
     twins = [follow(scene.nudged(size), times) for size in (nudge, -nudge)]
@@ -218,7 +220,7 @@ def _compared(
     scene: Scene, one: Run, other: Run, twins: Sequence[Run], nudge: float
 ) -> list[tuple[float, float, float]]:
     natural = np.asarray(scene.modes.natural)
-    weights = np.concatenate([natural, np.ones_like(natural)])  # displacements as velocities
+    weights = np.concatenate([natural, np.ones_like(natural)])  # scales displacements to velocities
     found = []
     for i in range(min(len(run.states) for run in (one, other, *twins))):
         size = max(scene.speed, *(float(np.abs(weights * run.states[i]).max()) for run in (one, other)))

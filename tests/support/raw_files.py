@@ -30,7 +30,7 @@ class TdmsObject:
 
 
 def tdms_text(text: str) -> bytes:
-    """Return a text with its length before it."""
+    """Return a text after its length."""
     content = text.encode("utf-8", "surrogatepass")
     return struct.pack("<I", len(content)) + content
 
@@ -59,7 +59,7 @@ def tdms_segment(
     following: int | None = None,
     begin: int | None = None,
 ) -> bytes:
-    """Return a segment; `number`, `following` and `begin` are what it says of its own sizes."""
+    """Return a segment; `number`, `following` and `begin` are the sizes that it declares."""
     parts = [struct.pack("<I", len(objects) if number is None else number)]
     for one in objects:
         parts += [tdms_text(one.path), one.index, struct.pack("<I", len(one.properties))]
@@ -86,7 +86,7 @@ MAT_HEAD = b"MATLAB 5.0 MAT-file, Created on: Thu Jul 30 10:00:00 2026".ljust(12
 
 
 def mat_element(kind: int, content: bytes, size: int | None = None) -> bytes:
-    """Return a data element; `size` is what it says of its bytes."""
+    """Return a data element; `size` is its declared number of bytes."""
     head = struct.pack("<II", kind, len(content) if size is None else size)
     return head + content + bytes(-len(content) % 8)
 
@@ -102,7 +102,7 @@ def mat_array(name: str, content: bytes, dims: Sequence[int], *, kind: int = 6, 
 
 
 def mat_doubles(values: Iterable[float]) -> bytes:
-    """Return the element of doubles."""
+    """Return the element of an array of doubles."""
     return mat_element(9, np.fromiter(values, dtype="<f8").tobytes())
 
 
@@ -131,7 +131,7 @@ def mat4_matrix(
 
 
 def cdf_name(name: str, length: int | None = None) -> bytes:
-    """Return a name; `length` is what it says of its bytes."""
+    """Return a name; `length` is its declared number of bytes."""
     content = name.encode()
     return struct.pack(">i", len(content) if length is None else length) + content + bytes(-len(content) % 4)
 
@@ -163,7 +163,7 @@ def cdf_file(
     data: bytes = b"",
     records: int = 0,
 ) -> bytes:
-    """Return a file; the variables say where in it their data begin."""
+    """Return a file; the variables give the positions of their data in it."""
     head = b"CDF\x01" + struct.pack(">i", records)
     return head + cdf_list(10, dims) + cdf_list(12, attributes) + cdf_list(11, variables) + data
 
@@ -172,7 +172,7 @@ def cdf_file(
 
 
 def wav_chunk(name: bytes, content: bytes, size: int | None = None, order: str = "<") -> bytes:
-    """Return a chunk; `size` is what it says of its bytes."""
+    """Return a chunk; `size` is its declared number of bytes."""
     head = name + struct.pack(f"{order}I", len(content) if size is None else size)
     return head + content + bytes(len(content) % 2)
 
@@ -187,7 +187,7 @@ def wav_format(
     frame: int | None = None,
     more: bytes = b"",
 ) -> bytes:
-    """Return the chunk that says how the samples are written."""
+    """Return the chunk with the format of the samples."""
     frame = channels * bits // 8 if frame is None else frame
     fields = struct.pack(f"{order}HHIIHH", tag, channels, rate, (rate * frame) & 0xFFFFFFFF, frame, bits)
     return wav_chunk(b"fmt ", fields + more, order=order)
@@ -223,7 +223,7 @@ def uff_function(
     unit: str = "g",
     abscissa: str = "17",
 ) -> str:
-    """Return a function (58) whose fields are texts; `values` are written four in a line, of 20 characters each."""
+    """Return a function (58) whose fields are texts; `values` are written four to a line, in 20 characters each."""
     lines = [f"{name:<80}", *["NONE".ljust(80)] * 4]
     lines += [f"{kind:>5}         0    0         0       NONE         1   3       NONE         0   0"]
     lines += [

@@ -1,4 +1,4 @@
-"""Where tests find the recordings made in laboratories; they are not part of the project (licences, size)."""
+"""Folders of the recordings made in laboratories; they are not part of the project (licences, size)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TRIALS = ROOT.parent / "shared" / "trials" / "inputs"
 
 
 def recording_folder(name: str) -> Path:
-    """Return the folder of one real recording; skip the test where it is absent."""
+    """Return the folder of one real recording; skip the test if it is absent."""
     folder = FOLDER / name
     if not folder.is_dir():
         pytest.skip(f"the recordings of {name} are not beside this checkout (shared/data/{name})")
@@ -21,7 +21,7 @@ def recording_folder(name: str) -> Path:
 
 
 def trial_folder(name: str) -> Path:
-    """Return the folder of the inputs of one trial; skip the test where it is absent."""
+    """Return the folder of the inputs of one trial; skip the test if it is absent."""
     folder = TRIALS / name
     if not folder.is_dir():
         pytest.skip(

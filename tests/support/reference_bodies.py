@@ -1,4 +1,4 @@
-"""Bodies with many modes by other roads than the package's: eigh for chains, textbook shapes in many digits for beams.
+"""Bodies with many modes, independent of the package: eigh for chains, textbook shapes in many digits for beams.
 
 Modes are mass-normalised as in equations.md 5 and 6: q'' + damping q' + diag(w^2) q = f, the displacement of a point is
 shape . q, and a force at the point gives f = shape * force.
@@ -42,7 +42,7 @@ class Body:
 
     @property
     def generator(self) -> Floats:
-        """The matrix of (q, q')' = A (q, q') without forces, shape (2 modes, 2 modes)."""
+        """Matrix A of (q, q')' = A (q, q') without forces, shape (2 modes, 2 modes)."""
         n = self.modes
         return np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.natural**2), -self.damping]])
 
@@ -113,7 +113,7 @@ def beam(
 
 @cache
 def beam_shape(boundary: str, j: int, s: float, derivative: int = 0) -> float:
-    """Return phi_j(s), or a derivative of it, in the textbook's cosh and sinh form in many digits (thesis 7.23)."""
+    """Return phi_j(s), or a derivative of it, from the textbook's cosh and sinh form in many digits (thesis 7.23)."""
     return float(beam_root(boundary, j) ** derivative * exact_modes.beam_shape(boundary, j, s, derivative))
 
 
@@ -168,7 +168,7 @@ def period_one_orbits(
         phase = float(np.angle(turned / y)) % (2.0 * math.pi)
         rotor = steady * np.exp(1j * phase)
         after = np.concatenate([rotor.real, (1j * w * rotor).real]) + velocity * unit
-        # on the stop: takes off what the sums above have rounded
+        # back onto the stop: removes the rounding of the sums above
         after[:n] += impulse * (position - contact @ after[:n])
         clear = velocity > 0.0 and _stays_below(body, contact, rotor, w, velocity * unit, position, duration)
         saltation = _saltation(body, contact, rotor, force, phase, after, velocity, r, w)
@@ -213,7 +213,7 @@ def _stays_below(
     position: float,
     duration: float,
 ) -> bool:
-    """Say whether the flight stays below the stop: 400 samples for each period of the fastest mode."""
+    """Whether the flight stays below the stop: 400 samples for each period of the fastest mode."""
     rates, vectors = np.linalg.eig(body.generator)
     weights = np.linalg.solve(vectors, free.astype(complex)) * (contact @ vectors[: body.modes])
     count = int(400 * max(1.0, duration * max(w, np.abs(rates).max()) / (2.0 * math.pi)))

@@ -1,4 +1,4 @@
-"""What the reference of structures knows of stops: their laws, joint impulses, what is noted of a contact."""
+"""Stops of the reference of structures: their laws, joint impulses, and the records of contacts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from support.reference_bodies import Floats
 
 @dataclass(frozen=True)
 class Stop:
-    """A stop; `shape` (modes,) is the shape of the point that meets it, kg^(-1/2), `side` +1 upper, -1 lower."""
+    """A stop; `shape` (modes,) is the shape of its contact point, kg^(-1/2), `side` +1 upper, -1 lower."""
 
     shape: Floats
     position: float
@@ -35,7 +35,7 @@ class Stop:
         return self.law != "restitution"
 
     def raw_force(self, penetration: Floats | float, rate: Floats | float) -> Floats:
-        """Return what the law says before it is cut at zero (equations.md 6.9, 6.10), N."""
+        """Return the force of the law before it is cut at zero (equations.md 6.9, 6.10), N."""
         if self.law == "kelvin_voigt":
             return np.asarray(self.stiffness * penetration + self.damping * rate)
         power = 1.5 if self.law == "hertz" else self.exponent
@@ -45,7 +45,7 @@ class Stop:
         return result
 
     def pressing(self, penetration: Floats | float, rate: Floats | float) -> Floats:
-        """Return a quantity of the sign of the force: the force itself is flat at its zero for the power laws."""
+        """Return a quantity with the sign of the force: the force itself is flat at its zero for the power laws."""
         if self.law == "kelvin_voigt":
             return self.raw_force(penetration, rate)
         loss = 0.0 if self.law == "hertz" else self.damping
@@ -110,7 +110,7 @@ def complementary(matrix: Floats, offset: Floats, tolerance: float = 1e-13) -> F
 def first_rise(
     at: Callable[[float], float], u: Floats, values: Floats, start: float, end: float
 ) -> float | None:
-    """Return the first rise through zero in [start, end]; peaks between samples are looked at too."""
+    """Return the first rise through zero in [start, end]; peaks between samples are checked too."""
     for i in range(1, len(u)):
         if values[i - 1] < 0.0 <= values[i]:
             root = (

@@ -1,4 +1,4 @@
-"""Signals that the tests of the Replay FMU play, and an instance of it driven by FMPy as any tool would."""
+"""Signals for the tests of the Replay FMU, and an instance of it driven by FMPy, an independent importer."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 INTERVAL = 1.0 / 3000.0
 COUNT = 600
 JUMP = 200
-#: First and last good sample around each gap of the channel `gappy`; its first two and last three are missing too.
+#: Last good sample before and first after a gap of the channel `gappy`; its first two and last three are missing too.
 GAP = (100, 131)
 DAY = 86400.0
-#: Steepest slope of the records, that of the jump, 1/s.
+#: Steepest slope of the records, at the jump, 1/s.
 STEEPEST = 55.0 / INTERVAL
 
 
@@ -26,7 +26,7 @@ def noise(seed: int, count: int = COUNT) -> NDArray[np.float64]:
 
 
 def base_values() -> NDArray[np.float64]:
-    """Noise with a jump of 50 between two samples."""
+    """Return noise with a jump of 50 between two samples."""
     return noise(1) + np.where(np.arange(COUNT) >= JUMP, 50.0, 0.0)
 
 
@@ -60,7 +60,7 @@ class Player(ComponentFmu):
         return self.get(name), self.get(f"{name}_rate"), bool(self.get(f"{name}_valid"))
 
     def at(self, name: str, time: float) -> tuple[float, float, bool]:
-        """Return what is played at `time`, before or after the present one but after the start."""
+        """Return value, rate and validity at `time`, which may be before the current time, not before the start."""
         self.time = self.start
         self.step(time - self.start)
         return self.now(name)

@@ -1,4 +1,4 @@
-"""Recordings and scenes of replays that tests make themselves: a board clamped at both ends, hit through its base."""
+"""Recordings and scenes of replays for the tests: a board clamped at both ends, hit through its base."""
 
 from __future__ import annotations
 

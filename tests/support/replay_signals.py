@@ -1,4 +1,4 @@
-"""Records with a known answer for the tests of the replay's comparison: a mode that is hit, as a sensor sees it."""
+"""Records with a known answer for the tests of the replay's comparison: a mode is hit, and a sensor measures it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HIT = 0.02
 
 
 def ring(time: Floats, frequency: float = FREQUENCY, damping_ratio: float = DAMPING_RATIO) -> Floats:
-    """Displacement of a mode hit at 0 with 1 / (natural angular frequency); it rests before."""
+    """Return the displacement of a mode hit at 0 with 1 / (natural angular frequency); it rests before."""
     natural = 2.0 * np.pi * frequency
     damped = natural * np.sqrt(1.0 - damping_ratio**2)
     after = np.maximum(time, 0.0)
@@ -31,7 +31,7 @@ def channel(
     name: str = "board",
     axis: TimeAxis | None = None,
 ) -> Channel:
-    """Sample values as a measuring chain does that clips at a limit."""
+    """Sample values like a measuring chain that clips at a limit."""
     axis = axis or TimeAxis(interval * np.arange(len(values)), interval, uncertainty)
     quality = np.where(np.abs(values) >= limit, int(Quality.clipped), 0).astype(np.uint8)
     quality[~np.isfinite(values)] = int(Quality.missing)

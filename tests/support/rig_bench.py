@@ -1,4 +1,4 @@
-"""A client of NI on a virtual rig that is served in this process."""
+"""A client of NI on a virtual rig that this process serves."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Bench:
     Attributes
     ----------
     device : str
-        Tests call it `Dev1`; `named` gives its name.
+        The tests name it `Dev1`; `named` gives its own name.
     loop : str
-        An input that the first output is wired to.
+        An input wired to the first output.
     tolerance : float
-        V, of what is put out and read back.
+        Largest difference between a voltage and its reading, V.
     """
 
     device, loop, tolerance = "Dev1", "Dev1/ai2", BITS_16
@@ -45,7 +45,7 @@ class Bench:
         return self._control
 
     def named(self, text: str) -> str:
-        """Return names of channels and terminals with the name of the device."""
+        """Return channels and terminals with the device's own name."""
         return text.replace("Dev1", self.device)
 
     def options(self, name: str = "", **others: Any) -> Any:
@@ -75,37 +75,37 @@ class Bench:
         return task
 
     def as_it_waits(self) -> None:
-        """Let time go on only while a call waits for it."""
+        """Let time advance only while a call waits for it."""
         self.control.pace(lockstep=True)
 
     def as_in_life(self) -> None:
-        """Let time go on by itself."""
+        """Let time advance by itself."""
         self.control.pace(lockstep=False)
 
     def pass_time(self, seconds: float) -> None:
-        """Let time go on while the program does nothing."""
+        """Let time advance while the program does nothing."""
         self.control.advance(seconds)
 
     def output(self, number: int) -> float:
-        """Return the voltage of an output now."""
+        """Return the current voltage of an output."""
         return float(self.control.truth()["outputs"][number])
 
     def wait_until(self, holds: Callable[[], bool]) -> None:
-        """Wait until something holds; a rig that goes on by itself gets there."""
+        """Wait until a condition holds; a rig whose time advances by itself gets there."""
         end = time.monotonic() + 10.0
         while not holds():
             assert time.monotonic() < end
             time.sleep(0.01)
 
     def clear(self) -> None:
-        """Forget all tasks; outputs go to 0."""
+        """Remove all tasks; outputs go to 0."""
         for task in list(self.server.board.tasks.values()):
             self.server.board.remove(task)
         self.server.board.analog.held[:] = 0.0
 
 
 class RealBench(Bench):
-    """A client on a board: what needs the plant or the control service is skipped."""
+    """A client on a board: tests that need the plant or the control service are skipped."""
 
     tolerance = 0.02  # noise and calibration
 
@@ -115,16 +115,16 @@ class RealBench(Bench):
 
     @property
     def control(self) -> RigControl:
-        """Skip: a board has none."""
+        """Skip the test: a board has no control service."""
         pytest.skip("needs the control service of a virtual rig")
 
     @property
     def address(self) -> str:  # type: ignore[override]
-        """Of the server; skip, where there is none."""
+        """Return the address of the server; skip the test without a server."""
         return self._address or pytest.skip("needs a rig behind gRPC")
 
     def options(self, name: str = "", **others: Any) -> Any:
-        """Return the options of a task; None: the driver of this machine."""
+        """Return the options of a task; None stands for the driver of this machine."""
         return super().options(name, **others) if self.channel is not None else None
 
     def system(self) -> Any:
@@ -132,13 +132,13 @@ class RealBench(Bench):
         return self._rig.system()
 
     def as_it_waits(self) -> None:
-        """A board does not wait."""
+        """Do nothing: a board does not wait."""
 
     def as_in_life(self) -> None:
-        """A board is as in life."""
+        """Do nothing: a board always runs in real time."""
 
     def pass_time(self, seconds: float) -> None:
-        """Wait, less long: it only has to be seen that nothing happens."""
+        """Wait for a shorter time: the test only has to see that nothing happens."""
         time.sleep(min(seconds, 0.05))
 
     def output(self, number: int) -> float:
@@ -147,14 +147,14 @@ class RealBench(Bench):
             return float(task.read())
 
     def clear(self) -> None:
-        """Bring the first output to 0."""
+        """Set the first output to 0."""
         with self.outputs() as task:
             task.write(0.0)
 
 
 @contextmanager
 def opened_real_bench(choice: str) -> Iterator[Bench]:
-    """Open `Dev1`, the board of this machine, or `grpc://host:port/Dev1` for as long as the block lasts."""
+    """Open `Dev1`, the board of this machine, or `grpc://host:port/Dev1`, for the duration of the block."""
     address, _, device = choice.rpartition("/")
     with opened_rig(address or "local") as rig:
         yield RealBench(rig, device)
@@ -162,7 +162,7 @@ def opened_real_bench(choice: str) -> Iterator[Bench]:
 
 @contextmanager
 def opened_bench(file: Path, *, lockstep: bool = True) -> Iterator[Bench]:
-    """Serve a rig file for as long as the block lasts."""
+    """Serve a rig file for the duration of the block."""
     with served(read_rig(file)) as server, open_channel(server.address) as channel:
         bench = Bench(server, channel)
         bench.control.pace(lockstep=lockstep)
@@ -170,5 +170,5 @@ def opened_bench(file: Path, *, lockstep: bool = True) -> Iterator[Bench]:
 
 
 def refused(code: int) -> Any:
-    """Expect an error of NI's."""
+    """Expect an error with a code of NI's."""
     return pytest.raises(DaqError, match=rf"Status Code: {code}\b")

@@ -18,7 +18,7 @@ PATIENCE = 60.0
 
 @contextmanager
 def program(*words: str | Path, cwd: Path) -> Iterator[warm.Program]:
-    """Run a command of `vibroimpact` in a session of its own; kill it where it is still there."""
+    """Run a command of `vibroimpact` in a session of its own; kill it if it outlives the block."""
     environment = os.environ | {"COLUMNS": "200"}
     process = warm.start(ENTRY, *words, cwd=cwd, env=environment, start_new_session=True)
     try:
@@ -30,7 +30,7 @@ def program(*words: str | Path, cwd: Path) -> Iterator[warm.Program]:
 
 
 def wait_for_bytes(path: Path, count: int, process: warm.Program) -> None:
-    """Wait until a file has so many bytes."""
+    """Wait until a file has a number of bytes."""
     end = time.monotonic() + PATIENCE
     while not (path.exists() and path.stat().st_size >= count):
         if process.poll() is not None or time.monotonic() > end:

@@ -1,4 +1,4 @@
-"""States of FMI instances as bytes, for another process: calls of the standard that only tests make."""
+"""States of FMI instances as bytes, for another process: functions of the standard that only tests call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All keys of a scene, in both forms: type, unit, default, rule and words of each."""
+"""All keys of a scene, in both forms: type, unit, default, rule and help text of each."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ FORMS = {"both forms": BOTH, "short form": SHORT, "general form": GENERAL}
 
 
 def scene_keys() -> str:
-    """Return each table of a scene with a line for each of its keys, then what a sweep may vary."""
+    """Return each table of a scene with a line for each of its keys, then the sweepable keys."""
     lines = [
         line
         for form, tables in FORMS.items()
@@ -68,7 +68,7 @@ def _lines_of(model: type[BaseModel], prefix: str) -> Iterator[str]:
 
 
 def _said(field: FieldInfo) -> Iterator[str]:
-    """Yield what is known of a key: its type, choices and limits, default, and the words of its rule."""
+    """Yield the known facts of a key: its type, choices and limits, default, and the words of its rule."""
     rule, (low, high, is_open) = rule_of(field), bounds_of(field)
     yield " or ".join(dict.fromkeys(map(_type, forms_of(field.annotation))))
     if choices := choices_of(field.annotation):

@@ -1,7 +1,7 @@
-"""Single mistakes in scenes, with what is said of each.
+"""Single mistakes in scenes, with the message of each.
 
-A mistake is a text of the scene, what is written in its place, and the line that is told, of which "..." leaves out the
-end.
+A mistake has a text of the scene, the text in its place, and the line of its message; "..." stands for the rest of the
+line.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Scenes of each kind as texts, changes of them, and what is said of a wrong one."""
+"""Scenes of each kind as texts, changes of them, and the messages about wrong ones."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def swept(text: str, *entries: str) -> str:
 
 
 def problems_of(text: str, source: str | Path = SOURCE) -> list[str]:
-    """Return all that is said of a wrong scene, a line each, without its file."""
+    """Return all problems of a wrong scene, a line each, without its file."""
     with pytest.raises(SceneError) as caught:
         scene_of(text, source)
     assert str(caught.value) == "\n".join(caught.value.problems)

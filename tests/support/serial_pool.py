@@ -1,4 +1,4 @@
-"""Workers of a campaign that are this very process: what is under test is the campaign, not Dask."""
+"""Workers of a campaign that are this very process: the tests check the campaign, not Dask."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.scene import parse_scene
 
 
 class SerialPool:
-    """Does one piece of work at a time, when it is waited for; stops after so many chunks, as Ctrl-C would."""
+    """Does one piece of work at a time, when it is waited for; stops after a number of chunks, as by Ctrl-C."""
 
     def __init__(self, most_chunks: int | None = None) -> None:
         self._queue: deque[tuple[int, Callable[..., Any], tuple[Any, ...]]] = deque()
@@ -28,7 +28,7 @@ class SerialPool:
         self.is_local = True
 
     def worker_addresses(self) -> tuple[str, ...]:
-        """Return one address."""
+        """Return a single address."""
         return ("here",)
 
     def call_everywhere(self, function: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
@@ -42,7 +42,7 @@ class SerialPool:
         return self._tickets
 
     def next_finished(self) -> Finished:
-        """Make the next call."""
+        """Do the next call and return its result."""
         if self._left == 0:
             raise KeyboardInterrupt
         ticket, function, arguments = self._queue.popleft()
@@ -51,24 +51,24 @@ class SerialPool:
         return Finished(ticket, result)
 
     def cancel_all(self) -> None:
-        """Forget what is queued."""
+        """Drop all queued calls."""
         self._queue.clear()
 
 
 class Notes(Progress):
-    """Keeps what a campaign says."""
+    """Keeps the messages of a campaign."""
 
     def __init__(self) -> None:
         super().__init__()
         self.lines: list[str] = []
 
     def note(self, text: str) -> None:
-        """Keep it."""
+        """Keep a message."""
         self.lines.append(text)
 
 
 def workers_here(patch: pytest.MonkeyPatch, most_chunks: int | None = None) -> None:
-    """Let campaigns have this process as their one worker."""
+    """Make this process the only worker of campaigns."""
 
     @contextmanager
     def here(**_: object) -> Iterator[SerialPool]:

@@ -1,4 +1,4 @@
-"""A service in a process of its own, as tests start, stop and kill it."""
+"""A service in a process of its own, for tests that start, stop and kill it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ recorded_periods = 5
 
 
 def sweep_text(points: int, transient: int, path: str = "independent") -> str:
-    """Return a scene of so many points, each after so many periods."""
+    """Return a scene of `points` points, each after `transient` periods."""
     return SWEEP.format(points=points, transient=transient, path=path)
 
 
@@ -73,7 +73,7 @@ class Served:
         self.process.communicate()
 
     def restart(self) -> None:
-        """Start it again at the same address."""
+        """Start the service again at the same address."""
         self._start("--port", self.url.rpartition(":")[2])
 
     def stop(self) -> None:
@@ -82,7 +82,7 @@ class Served:
 
 
 class Cluster:
-    """A Dask scheduler with one worker: they run while it is entered, each time at the same address."""
+    """A Dask scheduler with one worker, for the duration of a block, each time at the same address."""
 
     def __init__(self) -> None:
         self.address = f"tcp://127.0.0.1:{free_port()}"

@@ -1,4 +1,4 @@
-"""Signals whose spikes are known: pulses on given instants, drift, noise of several kinds."""
+"""Signals with known spikes: pulses at given instants, drift, noise of several kinds."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def channel(values: Floats, interval: float, unit: str = "N", start: float = 0.0
 
 
 def pulses(time: Floats, starts: Floats, peaks: Floats, length: float, waveform: str = "half_sine") -> Floats:
-    """Return pulses that begin at `starts` (a bell five standard deviations after them)."""
+    """Return pulses that begin at `starts` (a bell has its peak five standard deviations later)."""
     shape = WAVEFORMS[waveform]
     reach = 5.0 if waveform == "bell" else 0.5
     signal = np.zeros(len(time))
@@ -45,12 +45,12 @@ def pink(rng: np.random.Generator, length: int) -> Floats:
 
 
 def time_above(threshold: float, peaks: Floats, length: float) -> Floats:
-    """Return how long half-sines are above a threshold: length (1 - (2/pi) arcsin(H/A))."""
+    """Return the time of half-sines above a threshold: length (1 - (2/pi) arcsin(H/A))."""
     return length * (1.0 - 2.0 / np.pi * np.arcsin(threshold / peaks))
 
 
 RATE = 20_000.0
-"""Of `SpikeRecord`, Hz."""
+"""Sample rate of `SpikeRecord`, Hz."""
 SHAPES = ("half sine", "biphasic", "ringing")
 NOISES = ("white", "red", "low-pass", "high-pass")
 
@@ -62,9 +62,9 @@ class SpikeRecord:
     ----------
     channel : Channel
     starts : ndarray of float, shape (spike,)
-        s.
+        Start times, s.
     length : float
-        Of a spike, ringing included, s.
+        Length of a spike, ringing included, s.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class SpikeRecord:
         self.channel = channel(values, 1.0 / RATE, "V")
 
     def found_once(self, instants: Floats) -> tuple[int, int]:
-        """Return how many of its spikes are among the instants (s) once, and how many instants are none of them."""
+        """Return the number of spikes that contain exactly one instant (s), and of instants outside of all spikes."""
         ends = self.starts + 1.5 * self.length
         within = (instants > self.starts[:, None] - 0.3 * self.length - 1e-4) & (instants < ends[:, None])
         return int(np.sum(within.sum(axis=1) == 1)), int(np.sum(~within.any(axis=0)))

@@ -1,4 +1,4 @@
-"""SSP archives written by hand, as other tools would write them."""
+"""SSP archives written by hand, in the style of other tools."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether an SSP archive is as the standard wants it: by the schema of its version, and by what no schema sees."""
+"""Conformance of an SSP archive to the standard: to the schema of its version, and to rules outside of any schema."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from lxml import etree
 
-#: The package that brings the schema of a version along, and where in it.
+#: The package that contains the schema of a version, and the folder in it.
 PLACES = {"1.0": ("fmpy", "ssp/schema"), "2.0": ("pyssp_standard", "resources/ssp2")}
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 FILES = {
@@ -21,13 +21,13 @@ FILES = {
 
 
 def missing_schema(version: str) -> str:
-    """Return why there is no schema of a version; empty where there is one."""
+    """Return the reason for a missing schema of a version; empty if it is there."""
     package, _ = PLACES[version]
     return "" if importlib.util.find_spec(package) else f"{package}, which has the schema, is not installed"
 
 
 def problems(archive: Path, version: str) -> list[str]:
-    """Return what is wrong with an archive: against the schema, and what leads nowhere."""
+    """Return the problems of an archive: violations of the schema, and dangling references."""
     with zipfile.ZipFile(archive) as file:
         roots = {
             name: etree.fromstring(file.read(name)) for name in file.namelist() if Path(name).suffix in FILES
@@ -58,7 +58,7 @@ def _schema(version: str, file: str) -> etree.XMLSchema:
 
 
 def _leading_nowhere(roots: dict[str, etree._Element], members: set[str]) -> Iterator[str]:
-    """Yield sources that are no member, ends of connections and units that nobody declares, entries without a value."""
+    """Yield sources that are no member, undeclared ends of connections and units, and entries without a value."""
     root = roots["SystemStructure.ssd"]
     for element in root.iterfind(".//{*}*[@source]"):
         if element.get("source") not in members:

@@ -1,4 +1,4 @@
-"""A clock that stands still: studies whose tests ask for errors, texts or files run each way once."""
+"""A clock that stands still: studies in tests of errors, texts or files run each way once."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from vibroimpact.orchestrator.study.ways.replays import ReplayTrial
 from vibroimpact.orchestrator.study.ways.way import SceneTrial, Trial, Way
 
 RUN = 1e-3
-"""Time that each run is said to take, s."""
+"""Reported time of each run, s."""
 NEVER_LATE = 1e4
-"""Budget of which no run takes so large a part that it is given up, however busy the machine is, s."""
+"""Budget from which no run takes a share large enough to be given up, however busy the machine is, s."""
 
 
 class StillClock(Clock):
@@ -38,7 +38,7 @@ class StillClock(Clock):
         return runs_limited(seconds, lambda: 0.0)
 
     def observed(self, trial: Trial) -> tuple[Observation, float, float]:
-        """Run a trial; return what it shows, and the times of any run, s."""
+        """Run a trial; return its observation, and the times of any run, s."""
         return trial.run(), RUN, RUN
 
     def timed(self, trial: Trial) -> tuple[float, float]:
@@ -50,18 +50,18 @@ class StillClock(Clock):
         return RUN
 
     def calls(self, way: Way) -> int:
-        """Return that nobody counts them."""
+        """Return -1: calls are not counted."""
         return -1
 
     def memory(
         self, scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float
     ) -> dict[int, int]:
-        """Return that nobody measures it."""
+        """Return nothing: memory is not measured."""
         return {}
 
 
 def let_nothing_run(patch: pytest.MonkeyPatch) -> None:
-    """Let each run of a scene be an error until the patch is undone."""
+    """Make each run of a scene an error until the patch is undone."""
 
     def run(trial: Trial) -> Observation:
         raise AssertionError("a scene has run")
@@ -71,5 +71,5 @@ def let_nothing_run(patch: pytest.MonkeyPatch) -> None:
 
 
 def stop_the_clock(patch: pytest.MonkeyPatch) -> None:
-    """Let studies measure nothing until the patch is undone."""
+    """Stop the clock of studies until the patch is undone."""
     patch.setattr(clock, "CLOCK", StillClock())

@@ -1,4 +1,4 @@
-"""Bodies of many modes, driven through the same C functions that the Chain and Beam FMUs are made of."""
+"""Bodies of many modes, driven through the C functions of the Chain and Beam FMUs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from vibroimpact.fmus.errors import ComponentError, UsageError
 
 Array = NDArray[np.float64]
 
-#: What a contact does, by the number in `Structure.statuses`.
+#: States of a contact, by the number in `Structure.statuses`.
 STATUSES = ("free", "touching", "held", "yielding", "receding")
-#: How `Structure.advance` may end.
+#: Results of `Structure.advance`.
 DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, UNFINISHED = 0, 2, 3, 4, 8
 GIVEN_UP = (5, 6, 7)
 MESSAGE_LENGTH = 1024
@@ -38,7 +38,7 @@ class Stop:
     shape : array_like, shape (modes,)
         Displacement of the point for unit modal displacements, kg^(-1/2).
     position : float
-        m.
+        Position of the stop, m.
     law : str
         `restitution`, `kelvin_voigt`, `hertz`, `hunt_crossley` or `none`.
     side : str
@@ -48,9 +48,9 @@ class Stop:
     stiffness, damping, exponent : float
         N/m^exponent; N s/m (kelvin_voigt) or s/m (hunt_crossley); exponent of hunt_crossley.
     relaxation_time : float
-        Of a compliant stop's surface after separation, s; 0: at once.
+        Relaxation time of a compliant stop's surface after separation, s; 0: immediate.
     impulse : array_like or None
-        Modal velocities that a unit impulse gives, kg^(-1/2); None for `shape`, the variational rule.
+        Modal velocities due to a unit impulse, kg^(-1/2); None for `shape`, the variational rule.
     """
 
     shape: ArrayLike
@@ -92,9 +92,9 @@ class Modes:
     force : array_like, shape (modes,), or float
         Modal amplitude of the force, N kg^(-1/2).
     angular_frequency, phase : float
-        Of the force, rad/s and rad.
+        Angular frequency and phase of the force, rad/s and rad.
     coupling : array_like, shape (modes, modes), or None
-        Modal damping matrix, 1/s, in place of damping ratios where the damping couples the modes.
+        Modal damping matrix, 1/s, which replaces the damping ratios if the damping couples the modes.
     """
 
     natural: ArrayLike
@@ -146,7 +146,7 @@ def _vector(values: ArrayLike, modes: int) -> Array:
 
 @dataclass(slots=True)
 class Rows:
-    """What a structure has recorded: rows of eight numbers, as `record.rows` of the FMUs."""
+    """Record of a structure: rows of eight numbers, as `record.rows` of the FMUs."""
 
     blocks: list[Array] = field(default_factory=list)
 
@@ -158,7 +158,7 @@ class Rows:
 
 
 def peaking(modes: int) -> tuple[Array, Array, Array]:
-    """Return frequencies, shape and start; shape . q is largest, 1, at the time pi, and every 2 pi later."""
+    """Return frequencies, shape and start; shape . q has its maximum, 1, at the time pi, and every 2 pi later."""
     natural: Array = 2.0 * np.arange(modes, dtype=np.float64) + 1.0
     shape: Array = np.where(np.arange(modes) % 2 == 0, 1.0, -1.0) / (1.0 + np.arange(modes, dtype=np.float64))
     share: Array = 1.0 / natural**2
@@ -285,16 +285,16 @@ class Structure:
         Parameters
         ----------
         duration : float
-            s, > 0.
+            Duration, s, > 0.
         held, held_rate : array_like, shape (modes,)
             Modal forces now and their slopes, N kg^(-1/2) and N kg^(-1/2) / s.
         most_impacts : float
-            End after so many events of contacts: impacts, touch-downs, rests; 0: no limit.
+            Number of contact events (impacts, touch-downs, rests) after which it ends; 0: no limit.
 
         Raises
         ------
         ComponentError
-            The motion does not go on, or goes beyond the largest numbers: names the time.
+            The motion does not go on, or exceeds the largest numbers; the message has the time.
         """
         force, slope = _vector(held, self.modes), _vector(held_rate, self.modes)
         self._read()
@@ -334,12 +334,12 @@ class Structure:
 
     @property
     def peaks(self) -> Array:
-        """Largest forces on stops that yield, one for each impact, shape (impacts, 8): 4, time, contact, force."""
+        """Largest forces on compliant stops, one for each impact, shape (impacts, 8): 4, time, contact, force."""
         return self._rows.of_kind(ROW_PEAK)
 
     @property
     def sticks(self) -> Array:
-        """Sticks that have ended, shape (sticks, 8): 2, start, end, contact, impulse of the summed chatter, 0, 0, 0."""
+        """Sticks that have ended, shape (sticks, 8): 2, start, end, contact, total impulse of the chatter, 0, 0, 0."""
         return self._rows.of_kind(ROW_STICK)
 
     @property
@@ -356,7 +356,7 @@ class Structure:
         return float(0.5 * (self.velocity @ self.velocity) + 0.5 * self._stiffness @ self.displacement**2)
 
     def close(self) -> None:
-        """Free it."""
+        """Free the structure."""
         if self._handle:
             self._library.vi_door_structure_free(self._handle)
             self._handle = None

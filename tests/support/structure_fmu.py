@@ -1,4 +1,4 @@
-"""A body's FMU with its record of impacts and sticks taken along the way."""
+"""A body's FMU with the record of its impacts and sticks, taken along the way."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROW_IMPACT, ROW_STICK = 1.0, 2.0
 
 
 def forced(amplitude: float, angular_frequency: float, phase: float = 0.0) -> dict[str, float]:
-    """Return a harmonic force, of a beam or an oscillator."""
+    """Return the parameters of a harmonic force, for a beam or an oscillator."""
     return {
         "forcing.amplitude": amplitude,
         "forcing.angular_frequency": angular_frequency,
@@ -22,7 +22,7 @@ def forced(amplitude: float, angular_frequency: float, phase: float = 0.0) -> di
 
 
 class StructureFmu(ComponentFmu):
-    """One initialized instance that records its impacts and sticks; its time is that of the last step."""
+    """One initialized instance that records its impacts and sticks; its time is the end of the last step."""
 
     def __init__(self, component: str, parameters: Mapping[str, float], start_time: float = 0.0) -> None:
         self._taken: list[np.ndarray] = []

@@ -1,12 +1,12 @@
-"""An independent road for bodies with many modes: DOP853 between impacts, nothing of the package imported.
+"""An independent solution for bodies with many modes: DOP853 between impacts, nothing of the package imported.
 
-Slow and plain. Between events the modal equations
+Slow and plain. Between events it integrates the modal equations
 
     q'' + D q' + diag(w^2) q = f cos(Omega t + psi) + held - sum_k n_k F_k
 
-are integrated numerically, n_k being the shape of contact k turned towards its stop. Impulsive stops answer with joint
-impulses P >= 0 (linear complementarity over all contacts that touch), compliant ones with F = max(0, law) while they
-penetrate; a contact that has come to rest is held, with the constrained equations, until its force falls through zero.
+numerically; n_k is the shape of contact k turned towards its stop. Impulsive stops answer with joint impulses P >= 0
+(linear complementarity over all touching contacts), compliant stops with F = max(0, law) during penetration. A contact
+at rest is held, with the constrained equations, until its force falls through zero.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from scipy.integrate import DOP853, solve_ivp
 from support.reference_bodies import Body, Floats
 from support.reference_stops import Forcing, Impact, Press, Stick, Stop, complementary, first_rise
 
-# How a contact stands.
+# States of a contact.
 OUT, PRESSED, SLACK, HELD = "out", "pressed", "slack", "held"
 _SAMPLES = 16
 
 Quantity = Callable[[Floats | float, Floats], Floats]
-"""Of the time and the state, at one instant or at many."""
+"""Function of the time and the state, at one instant or at many."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class _Mark:
 
 @dataclass
 class Reference:
-    """A body with stops, from a start state; `advance` moves it on and fills `impacts`, `sticks` and `presses`.
+    """A body with stops, from a start state; `advance` integrates it and fills `impacts`, `sticks` and `presses`.
 
-    A complete chatter is cut where the velocity falls below `chatter_velocity` (times `scale`): the times of
-    accumulation that the geometric tail gives at the last two impacts are extrapolated to zero velocity (their error
-    is quadratic).
+    A complete chatter is cut at velocities below `chatter_velocity` (times `scale`). The geometric tail gives a time of
+    accumulation at each of the last two impacts. The two times are extrapolated to zero velocity, since their error is
+    quadratic.
     """
 
     body: Body
@@ -114,7 +114,7 @@ class Reference:
         return np.concatenate([y[self.body.modes :], free - held.T @ force])
 
     def contact_forces(self, time: float) -> Floats:
-        """Return the force of each stop at a time already passed, shape (contacts,), N."""
+        """Return the force of each stop at a time in the past, shape (contacts,), N."""
         mark = self._mark(time)
         y = self.integrate(mark.time, mark.y, time, mark.status)
         forces = np.zeros(len(self.stops))
@@ -125,10 +125,10 @@ class Reference:
                 forces[k] = stop.raw_force(self.gaps(y)[k], self.rates(y)[k])
         return forces
 
-    # -- moving on -----------------------------------------------------------------------------------------------------
+    # -- steps ---------------------------------------------------------------------------------------------------------
 
     def advance(self, end: float, impacts: int | None = None) -> Reference:
-        """Move on to a time, or until a number of impacts has been seen in all."""
+        """Integrate to a time, or to a total number of impacts."""
         while self.time < end and (impacts is None or len(self.impacts) < impacts):
             self._fly(end)
             if self._events:
@@ -136,7 +136,7 @@ class Reference:
         return self
 
     def state(self, time: float) -> tuple[Floats, Floats]:
-        """Return q and q' at a time already passed (after an impact at that time)."""
+        """Return q and q' at a time in the past (after an impact at that time)."""
         mark = self._mark(time)
         y = self.integrate(mark.time, mark.y, time, mark.status)
         return y[: self.body.modes], y[self.body.modes :]
@@ -197,7 +197,7 @@ class Reference:
         self.time = end
 
     def _skip(self) -> float:
-        """Return a time in which a contact that has just left its stop, or met it, cannot meet the next event."""
+        """Return a time within which a contact that has just met or left its stop cannot have its next event."""
         fastest = max([*self.body.natural, self.forcing.angular_frequency])
         shortest = math.inf
         gaps, rates = self.gaps(self.y), self.rates(self.y)
@@ -223,7 +223,7 @@ class Reference:
     # -- events --------------------------------------------------------------------------------------------------------
 
     def _watched(self, status: Sequence[str]) -> list[tuple[int, Quantity]]:
-        """Return the quantities whose rise through zero is an event, with their contact."""
+        """Return the quantities whose rise through zero is an event, with their contacts."""
         watched: list[tuple[int, Quantity]] = []
         for k in range(len(self.stops)):
             if status[k] == HELD:
@@ -255,7 +255,7 @@ class Reference:
         origin: float,
         status: Sequence[str],
     ) -> tuple[float, set[int]] | None:
-        """Return when, within a step, something first rises through zero, and whose it is."""
+        """Return time and contact of the first rise through zero within a step."""
         margin = (end - start) / _SAMPLES
         u = np.linspace(start - margin, end + margin, _SAMPLES + 3)
         y = dense(u)
@@ -274,7 +274,7 @@ class Reference:
     def _polished(
         self, start: float, before: Floats, time: float, status: Sequence[str]
     ) -> tuple[float, Floats]:
-        """Return the time of the event by Newton on integrated states (the step's interpolant has fewer digits)."""
+        """Return the time of the event by Newton's method on integrated states (the interpolant has fewer digits)."""
         (k,) = self._events
         quantities = [g for owner, g in self._watched(status) if owner == k]
         y = self.integrate(start, before, time, status)
@@ -285,12 +285,12 @@ class Reference:
             ahead = self.integrate(time, y, time + h, status)
             slope = (float(quantity(time + h, ahead)) - value) / h
             if abs(slope) * h < 1e-14 * self.scale or abs(value / slope) > 1e-6:
-                break  # a graze: the time is known to half the digits only
+                break  # a graze: only half of the time's digits are known
             time -= value / slope
             y = self.integrate(start, before, time, status)
         return time, y
 
-    # -- what happens at an event --------------------------------------------------------------------------------------
+    # -- effects of an event -------------------------------------------------------------------------------------------
 
     def _resolve(self) -> None:
         """Change the status of the contacts, apply impulses, and hold or release."""
@@ -321,7 +321,7 @@ class Reference:
         ]
 
     def _strike(self, touching: list[int]) -> None:
-        """Apply the joint impulses: P >= 0, v+ + r v- >= 0, one of them zero, velocities along separation."""
+        """Apply the joint impulses: P >= 0, v+ + r v- >= 0, one of them zero; v is positive for separation."""
         normals = self._normals[touching]
         approach = self.rates(self.y)[touching]
         approach[[self.status[k] == HELD for k in touching]] = 0.0
@@ -334,7 +334,7 @@ class Reference:
                 self.impacts.append(Impact(self.time, float(velocity), float(impulse), k + 1))
 
     def _hold(self, candidates: list[int]) -> None:
-        """Hold the contacts that are at rest on their stops, or in the tail of a chatter, and are pressed."""
+        """Hold the pressed contacts that are at rest on their stops, or in the tail of a chatter."""
         slow = self.chatter_velocity * self.scale
         rates = self.rates(self.y)
         rest = [k for k in candidates if self.status[k] == HELD or abs(rates[k]) < slow]
@@ -359,7 +359,7 @@ class Reference:
             self.y = self._stopped(pressed)
 
     def _stopped(self, contacts: list[int]) -> Floats:
-        """Return the state with contacts put exactly on their stops, at rest, by plastic impulses."""
+        """Return the state with contacts exactly on their stops, at rest, by plastic impulses."""
         normals = self._normals[contacts]
         y, n = self.y.copy(), self.body.modes
         y[:n] -= np.linalg.lstsq(normals, self.gaps(y)[contacts], rcond=None)[0]
@@ -367,7 +367,7 @@ class Reference:
         return y
 
     def _note_tails(self, pressed: list[int], y: Floats, status: Sequence[str]) -> None:
-        """Keep velocity and first-order time of accumulation of a chatter that is about to be cut."""
+        """Store the velocity and the pull into the stop for each chatter that is about to be cut."""
         for k in pressed:
             last = [impact for impact in self.impacts if impact.contact == k + 1][-2:]
             if len(last) < 2 or last[-1].time != self.time:
@@ -376,7 +376,7 @@ class Reference:
             self._tails[k] = (last[-1].velocity, float(self._normals[k] @ self._free(self.time, y, status)))
 
     def _accumulation(self, k: int) -> float:
-        """Return when the impacts of a chatter accumulate (equations.md 3.1, first order, extrapolated)."""
+        """Return the time of accumulation of a chatter (equations.md 3.1, first order, extrapolated)."""
         if k not in self._tails:
             return self.time
         r = self.stops[k].restitution
@@ -390,7 +390,7 @@ class Reference:
         return (times[1] - ratio * times[0]) / (1.0 - ratio)
 
     def _contact_pull(self, k: int, time: float) -> float:
-        """Return the acceleration into stop k at an impact of the past, its contact velocity taken away."""
+        """Return the acceleration into stop k at an earlier impact, without the contact velocity."""
         mark = self._mark(time)
         y = self.integrate(mark.time, mark.y, time, mark.status)
         n, normal = self.body.modes, self._normals[k]
@@ -406,7 +406,7 @@ class Reference:
                 break
 
     def _meet_compliant(self, k: int, at_event: bool) -> None:
-        """Let a compliant contact begin, slacken or end."""
+        """Start, slacken or end a compliant contact."""
         if self.status[k] != OUT and not at_event:
             return
         stop, was = self.stops[k], self.status[k]
@@ -431,5 +431,5 @@ class Reference:
 
 
 def _falling(quantity: Quantity) -> Quantity:
-    """Return what rises through zero where a quantity falls through it."""
+    """Return the negated quantity, which rises through zero when the quantity falls through it."""
     return lambda time, y: -quantity(time, y)

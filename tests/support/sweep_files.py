@@ -1,4 +1,4 @@
-"""Sweep files of tests: a rig with a tip, and what may be wired besides."""
+"""Sweep files of tests: a rig with a tip, and optional further wiring."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ CELL = {"name": "cell", "terminal": "Dev1/ai2", "range": 5.0, "role": "load_cell
 def sweep_text(
     frequency: Any = None, *, inputs: tuple[dict[str, Any], ...] = (), rate: float = 5000.0, **sweep: Any
 ) -> str:
-    """Return the text of a sweep file of an output of .5 V, with inputs beside the tip and keys of `[sweep]`."""
-    asked = frequency if frequency is not None else [18.0, 19.0, 20.5]
+    """Return the text of a sweep file: an output of .5 V, inputs in addition to the tip, and keys of `[sweep]`."""
+    frequencies = frequency if frequency is not None else [18.0, 19.0, 20.5]
     tip = {"name": "tip", "terminal": "Dev1/ai0", "range": 5.0, "role": "displacement"}
     lines = ["[output]", 'terminal = "Dev1/ao0"', "amplitude = 0.5", f"rate = {rate!r}", "highest = 1.0"]
-    lines += ["slew = 1e6", "ramp_periods = 5", "[sweep]", f"frequency = {toml(asked)}"]
+    lines += ["slew = 1e6", "ramp_periods = 5", "[sweep]", f"frequency = {toml(frequencies)}"]
     chosen = {"transient_periods": 8, "recorded_periods": 4, **sweep}
     lines += [f"{key} = {toml(value)}" for key, value in chosen.items()]
     for each in (tip, *inputs):
@@ -26,7 +26,7 @@ def sweep_text(
 
 
 def toml(value: Any) -> str:
-    """Return a value as TOML writes it on one line."""
+    """Return a value as TOML on one line."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {toml(inner)}" for key, inner in value.items()) + " }"
     return (

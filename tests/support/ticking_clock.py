@@ -1,4 +1,4 @@
-"""A clock of studies that tells the work of runs and no time: it goes on by a step each time a run looks at it."""
+"""A clock of studies that measures the work of runs in place of time: it advances by a tick at each look."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from vibroimpact.orchestrator.study.ways.way import SceneTrial, Trial, Way
 
 
 class TickingClock(Clock):
-    """Counts the looks that runs take at their deadline: a plain step is one, an event of an importer another.
+    """Counts the looks of runs at their deadline: a plain step is one, an event of an importer another.
 
     Parameters
     ----------
     tick : float
-        Processor time that a look stands for, s.
+        Processor time of a look, s.
     slowness : float
         Wall time over processor time.
 
     Attributes
     ----------
     told : list of str
-        What was measured, in its order: `observed`, `timed`, `memory`.
+        Measurements, in order: `observed`, `timed`, `memory`.
     """
 
     def __init__(self, tick: float = 1e-3, slowness: float = 1.0) -> None:
@@ -40,7 +40,7 @@ class TickingClock(Clock):
         self.told: list[str] = []
 
     def look(self) -> float:
-        """Return the processor time, s, and go on by a tick."""
+        """Return the processor time, s, after an advance by a tick."""
         self.time += self._tick
         return self.time
 
@@ -57,7 +57,7 @@ class TickingClock(Clock):
         return runs_limited(seconds, self.look)
 
     def observed(self, trial: Trial) -> tuple[Observation, float, float]:
-        """Run a trial; return what it shows, and its times, s."""
+        """Run a trial; return its observation and its times, s."""
         self.told.append("observed")
         return self._run(trial)
 
@@ -77,18 +77,18 @@ class TickingClock(Clock):
         return self.timed(trial)[0]
 
     def calls(self, way: Way) -> int:
-        """Return that nobody counts them."""
+        """Return -1: calls are not counted."""
         return -1
 
     def memory(
         self, scene: Scene, given: Mapping[str, Any], parts: Sequence[tuple[int, float]], seconds: float
     ) -> dict[int, int]:
-        """Return a byte for each place."""
+        """Return one byte for each place."""
         self.told.append("memory")
         return {place: 1 for place, _ in parts}
 
 
 def tick_the_clock(patch: pytest.MonkeyPatch, ticking: TickingClock) -> TickingClock:
-    """Let studies measure by a ticking clock until the patch is undone."""
+    """Give studies a ticking clock until the patch is undone."""
     patch.setattr(clock, "CLOCK", ticking)
     return ticking

@@ -1,1 +1,1 @@
-"""What was measured, and what is read off it: recordings, replays, spectra, spikes, estimates."""
+"""Figures of measurements and of results from them: recordings, replays, spectra, spikes, estimates."""

@@ -16,7 +16,7 @@ _PANEL_MM = 32
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
-    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated."""
+    """Draw the dataset of `vibroimpact estimate`; the kind of estimation decides the figure."""
     drawers = {
         "decay": _draw_decay,
         "response": _draw_response,
@@ -60,12 +60,12 @@ def _draw_motion(axis: Axes, dataset: xr.Dataset) -> None:
     best = dataset["law_fit" if "law_fit" in dataset else "exponential_fit"]
     axis.plot(dataset.time, best, color=MARK, linewidth=0.4, linestyle="--", rasterized=True, label="fitted")
     axis.set_ylabel(f"{dataset.attrs['channel'].replace('_', ' ')} ({unit_symbol(dataset.measured)})")
-    # the power of ten of an axis stands on the left
+    # the power of ten of the axis stands on the left
     legend_above(axis, "right")
 
 
 def _draw_residuals(axis: Axes, dataset: xr.Dataset) -> None:
-    """Draw what is left over: noise shows as a band, a wrong law as a pattern."""
+    """Draw the residuals: noise shows as a band, a wrong law as a pattern."""
     residual = dataset.measured - dataset.exponential_fit
     axis.plot(dataset.time, residual, color=STOP, linewidth=0.4, rasterized=True, label="cosine")
     if "law_fit" in dataset:
@@ -89,7 +89,7 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
         label="turning points",
     )
     decrement = float(dataset.estimate.sel(estimator="decrement", quantity="logarithmic_decrement"))
-    # The line of the fit: its level is the weighted mean of the logarithms about it.
+    # The line of the fit; its level is the weighted mean of the logarithms about it.
     line = -0.5 * decrement * (number - number[0])
     level = np.average(np.log(height) - line, weights=height**2)
     axis.plot(dataset.peak_time, np.exp(level + line), color=MARK, linewidth=0.6, label="one decrement")
@@ -112,7 +112,7 @@ def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float, word
     axis.set_ylabel(words)
     axis.ticklabel_format(axis="y", useOffset=False)
     axis.errorbar(x, y, yerr=1.96 * error, fmt="o", markersize=2, color=LINE, elinewidth=0.6, capsize=1.5)
-    # One bad window must not press all others flat.
+    # One bad window must not compress all others.
     middle = np.median(y)
     reach = 1.3 * float(np.percentile(np.abs(y - middle) + error, 85)) or 1.0
     low, high = float(np.min(y - 2 * error)), float(np.max(y + 2 * error))
@@ -122,7 +122,7 @@ def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float, word
 
 
 def _mark_beyond(axis: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Draw an arrow at the frame for each point that lies beyond it, and write the farthest value."""
+    """Draw an arrow at the frame for each point beyond it, and write the farthest value."""
     low, high = axis.get_ylim()
     height = axis.get_xaxis_transform()
     for marker, place, beyond, farthest in (
@@ -146,7 +146,7 @@ def _mark_beyond(axis: Axes, x: np.ndarray, y: np.ndarray) -> None:
 
 def _draw_response(dataset: xr.Dataset) -> Figure:
     """Draw |H| with its fit near the resonance, and the coherence of a measured response."""
-    # One segment has the coherence 1 by construction.
+    # A single segment has the coherence 1 by construction.
     measured = "h1_magnitude" in dataset
     coherent = measured and bool(np.any(dataset.coherence < 1.0 - 1e-9))
     figure = canvas(8 + (1.6 + coherent) * _PANEL_MM)

@@ -1,4 +1,4 @@
-"""Figure of estimates from impacting motion: signal, impacts and fitted motion, what is left, then all intervals."""
+"""Figure of estimates from impacting motion: signal, impacts and fitted motion, residual, then all intervals."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _COLUMNS = 2
 _WIDTH = 174 / 85 * COLUMN_WIDTH
 """Width of two columns."""
 _MOST_FLIGHTS = 10
-"""Flights drawn at most: more cannot be told apart."""
+"""Largest number of flights drawn: more cannot be distinguished."""
 _NARROWEST = 1e-4
-"""Difference, over the values themselves, below which a panel shows no finer."""
+"""Smallest range of a panel, over the values themselves; smaller differences are not resolved."""
 
 
 def draw_impact_estimate(dataset: xr.Dataset) -> Figure:
-    """Draw what the estimates rest on over some flights, then each quantity with the intervals of all methods.
+    """Draw the data behind the estimates over some flights, then each quantity with the intervals of all methods.
 
     Two journal columns (174 mm) wide. Datasets without the signal (version 0.1) have the intervals alone.
     """
@@ -63,8 +63,8 @@ def draw_impact_estimate(dataset: xr.Dataset) -> Figure:
 
 
 def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
-    """Draw signal, impacts and fitted motion over some flights, and what the fit leaves there."""
-    low, high, said = _window(dataset)
+    """Draw signal, impacts and fitted motion over some flights, and the residual there."""
+    low, high, title = _window(dataset)
     part = dataset.sel(time=slice(low, high))
     upper, lower = axes
     impacts = dataset.impact_time.values
@@ -79,7 +79,7 @@ def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
     name = str(dataset.attrs.get("channel", "displacement")).replace("_", " ")
     upper.set_ylabel(f"{name} ({unit_symbol(dataset.measured)})")
     legend_above(upper, "right", columnspacing=2.0)
-    upper.set_title(said, loc="left", fontsize=7.5)
+    upper.set_title(title, loc="left", fontsize=7.5)
     lower.plot(part.time, part.measured - part.fitted, ".", color=LINE, markersize=1.2, rasterized=True)
     noise = float(dataset.attrs.get("noise", np.nan))
     if np.isfinite(noise):
@@ -90,7 +90,7 @@ def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
 
 
 def _window(dataset: xr.Dataset) -> tuple[float, float, str]:
-    """Return the span that is drawn, some flights of what was fitted, and what it is."""
+    """Return the drawn span (some flights of the fitted motion) and its description."""
     time, impacts = dataset.time.values, dataset.impact_time.values
     if len(impacts) <= _MOST_FLIGHTS + 1:
         return float(time[0]), float(time[-1]), f"{len(impacts)} impacts"
@@ -99,12 +99,12 @@ def _window(dataset: xr.Dataset) -> tuple[float, float, str]:
     first = min(first, len(impacts) - _MOST_FLIGHTS - 1)
     margin = 0.3 * float(np.median(np.diff(impacts)))
     low, high = impacts[first] - margin, impacts[first + _MOST_FLIGHTS] + margin
-    said = f"impacts {first + 1} to {first + 1 + _MOST_FLIGHTS} of {len(impacts)}; gray: twice the noise"
-    return float(low), float(high), said
+    title = f"impacts {first + 1} to {first + 1 + _MOST_FLIGHTS} of {len(impacts)}; gray: twice the noise"
+    return float(low), float(high), title
 
 
 def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
-    """Draw values as points and their intervals as bars; a value without an interval is open."""
+    """Draw values as points and their intervals as bars; a value without an interval is an open point."""
     names = [str(name) for name in chosen["estimator"].values]
     ends = []
     for place, name in enumerate(names):
@@ -126,6 +126,6 @@ def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
 
 
 def limit(setter: Callable[[float, float], object], low: float, high: float) -> None:
-    """Set limits with a margin, and never so near each other that rounding fills the panel."""
+    """Set limits with a margin, far enough apart that rounding does not fill the panel."""
     margin = max(0.08 * (high - low), _NARROWEST * max(abs(low), abs(high)), 1e-300)
     setter(low - margin, high + margin)

@@ -14,11 +14,11 @@ from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, canvas, legend_above, page_style
 
 _HEIGHT_MM, _WIDE = 120, 2 * COLUMN_WIDTH
-# Quantile of the intervals at which the delay plot ends, with longer ones at its edge; and its points at most.
+# Quantile of the intervals at the end of the delay plot (longer ones lie at its edge); largest number of its points.
 _SHOWN, _MOST_POINTS = 0.999, 20_000
 # Shades of the embeddings, from light to dark.
 _LIGHTEST, _DARKEST = 0.75, 0.0
-# Letters in a line of what stands in an empty panel.
+# Letters in a line of the text in an empty panel.
 _LINE_LETTERS = 44
 _KINDS = {"raw": "intervals", "log": "log intervals"}
 
@@ -26,7 +26,7 @@ _KINDS = {"raw": "intervals", "log": "log intervals"}
 def draw_intervals(report: xr.Dataset) -> Figure:
     """Draw the dataset of `interval_report`, two columns (170 mm) wide.
 
-    Delay plot and density above; below the local slopes of the correlation sums of the intervals and of their
+    Delay plot and density above. Below, the local slopes of the correlation sums of the intervals and of their
     logarithms, for every embedding m, with shuffled surrogates dashed.
     """
     with page_style():
@@ -40,7 +40,7 @@ def draw_intervals(report: xr.Dataset) -> Figure:
 
 
 def _draw_delay_plot(axis: Axes, report: xr.Dataset) -> None:
-    """Draw each interval against the one before it."""
+    """Draw each interval against the interval before it."""
     intervals = report["interval"].values
     known = intervals[np.isfinite(intervals)]
     limit = 1.05 * float(np.quantile(known, _SHOWN)) if known.size else 1.0
@@ -92,7 +92,7 @@ def _draw_slopes(axis: Axes, report: xr.Dataset, scale: str) -> None:
     axis.set_ylabel(r"slope d ln C / d ln $\varepsilon$")
     low, high = report.attrs["slope_window"]
     shades = np.linspace(_LIGHTEST, _DARKEST, report.sizes["embedding"])
-    # below the grid on which the instants were written every slope is that of the grid
+    # below the grid on which the instants were written, slopes only show the grid
     grid = float(report.attrs.get("resolution", 0.0))
     above = radii >= (grid if scale == "raw" else grid / float(np.nanmedian(report["interval"].values)))
     seen, ends = np.zeros(len(radii), dtype=np.bool_), []
@@ -126,7 +126,7 @@ def _draw_slopes(axis: Axes, report: xr.Dataset, scale: str) -> None:
 
 
 def _name_embedding(axis: Axes, radii: np.ndarray, slopes: np.ndarray, embedding: int) -> None:
-    """Write m beside the small end of a line, where no line is."""
+    """Write m next to the small end of a line, where there is space."""
     known = np.flatnonzero(np.isfinite(slopes))
     if known.size:
         axis.annotate(

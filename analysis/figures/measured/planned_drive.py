@@ -1,4 +1,4 @@
-"""Figure of the output that a program is about to drive."""
+"""Figure of a planned output before a program drives it."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def draw_planned_drive(begins: Floats, frequencies: Floats, stretches: Sequence[
     Parameters
     ----------
     begins : ndarray of float, shape (step + 1,)
-        Where each step begins and the last one ends, s.
+        Start of each step, and end of the last step, s.
     frequencies : ndarray of float, shape (step,)
         Hz.
     stretches : sequence of (str, ndarray, ndarray)
-        Title, instants (s) and voltages (V), each for a panel of its own.
+        Title, instants (s) and voltages (V); each stretch has its own panel.
     """
     with page_style():
         figure = canvas(45 + 32 * len(stretches))

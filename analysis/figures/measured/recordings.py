@@ -1,4 +1,4 @@
-"""Figures of recordings: every channel over its time, with what is clipped or missing, and trains of events."""
+"""Figures of recordings: every channel over time, with clipped and missing samples, and trains of events."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ _QUANTITIES = {
 }
 _PANEL_MM = 22
 _TRAIN_MM = 20
-#: Channels, and event trains, of one figure at most.
+#: Largest number of channels, and of event trains, in a figure.
 MOST_PANELS = 12
 _MOST_POINTS = 4000
 _LONGEST_NAME = 34
 _MOST_BANDS = 200
-_LOG_FROM = 30.0
+_LOG_RATIO = 30.0
 
 
 def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
     """Draw the first twelve channels of a recording, a panel for each on its own time axis, then its event trains.
 
-    Clipped samples are marked; where samples are missing or overrange a band runs through the panel. Event trains
+    Clipped samples are marked; a band runs through the panel where samples are missing or overrange. Event trains
     show the interval after each event against its time. Long channels are drawn by the smallest and largest value of
     each of some thousand spans, so that no peak is lost.
     """
@@ -67,7 +67,7 @@ def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
 
 
 def _share_time(axes: Sequence[Axes], channels: Sequence[Channel], shown: Sequence[Channel]) -> None:
-    """Write the instants once below each group of panels that have one axis."""
+    """Label the time once below each group of panels with a common axis."""
     for place, (axis, channel, part) in enumerate(zip(axes, channels, shown, strict=True)):
         if len(part.time) > 1:
             axis.set_xlim(part.time[0], part.time[-1])
@@ -78,7 +78,7 @@ def _share_time(axes: Sequence[Axes], channels: Sequence[Channel], shown: Sequen
 
 
 def _train_part(train: EventTrain, window: Window) -> EventTrain:
-    """Return the events in a window."""
+    """Return the events of a train in a window."""
     start, stop = window.part(train.times)
     inside = (train.times >= start) & (train.times <= stop)
     return replace(train, times=train.times[inside], window=(start, stop))
@@ -111,7 +111,7 @@ def _draw_channel(axis: Axes, channel: Channel) -> None:
 
 
 def _quantity(unit: str) -> str:
-    """Return what a channel of a unit measures, whatever multiple the unit is; nothing where that is not known.
+    """Return the quantity of a channel by its unit, for any multiple of the unit; empty if unknown.
 
     >>> _quantity("9.80665 m s-2"), _quantity("V"), _quantity("1")
     ('acceleration', 'voltage', '')
@@ -125,12 +125,12 @@ def _titled(name: str, entries: Sequence[str]) -> str:
 
 
 def short_name(name: str, longest: int = _LONGEST_NAME) -> str:
-    """Return a name that fits above a panel, or beside one."""
+    """Return a name short enough for a place above a panel, or next to one."""
     return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 def outline(time: Floats, values: Floats, per_span: int) -> tuple[Floats, Floats]:
-    """Return a line through the smallest and largest value of each span of so many samples; it looks the same."""
+    """Return a line through the smallest and largest value of each span of `per_span` samples; it looks the same."""
     known = np.where(np.isfinite(values), values, np.nan)
     starts = np.arange(0, len(time), per_span)
     ends = [extreme.reduceat(known, starts) for extreme in (np.fmin, np.fmax)]
@@ -138,7 +138,7 @@ def outline(time: Floats, values: Floats, per_span: int) -> tuple[Floats, Floats
 
 
 def spans_of(marked: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the first place of each run of marked samples and that after its last, shape (run, 2)."""
+    """Return the first place of each run of marked samples and the place after its last, shape (run, 2)."""
     return np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]))).reshape(-1, 2)
 
 
@@ -163,7 +163,7 @@ def _draw_train(axis: Axes, train: EventTrain) -> None:
             color=LINE,
             rasterized=True,
         )
-        if intervals.min() > 0.0 and intervals.max() > _LOG_FROM * intervals.min():
+        if intervals.min() > 0.0 and intervals.max() > _LOG_RATIO * intervals.min():
             axis.set_yscale("log")
     for begin, end in np.reshape(train.attrs.get("masked", ()), (-1, 2)):
         axis.axvspan(begin, end, color=STOP, alpha=0.3, linewidth=0.3)

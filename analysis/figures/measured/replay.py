@@ -1,4 +1,4 @@
-"""Figures of replays: a measured and a simulated signal over each other, and what is left between them."""
+"""Figures of replays: a measured and a simulated signal over each other, and their difference."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from vibroimpact.fmus.errors import DatasetError
 _HEIGHT_MM = 110
 _HEIGHTS = (1.25, 1.25, 0.9)
 _ZOOM_PERIODS = 12.0
-"""The first part shows so many dominant periods from the onset, and a sixth of that before it."""
+"""Dominant periods from the onset in the first part; a sixth of this time is shown before the onset."""
 _BEFORE = 1.0 / 6.0
 _LONGEST_NAME = 14
 _MEASURED = "#8FBBDB"
-_NEARLY_ALL = 0.6
-"""Share of the record above which its first part is not drawn once more."""
-# Range of the largest value outside which a power of ten stands beside the unit.
+_WHOLE_SHARE = 0.6
+"""Share of the record above which its first part has no panel of its own."""
+# Range of the largest value outside which the label has a power of ten next to the unit.
 _SMALL, _LARGE = 1e-2, 1e4
 
 
 def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
     """Draw a comparison: the whole record, its first part, and the residual with the scores of running windows.
 
-    The comparison is named by itself or by the file of its recording, else the first one is drawn. A window is drawn
-    in place of the whole record and its first part. Clipped samples, which were not scored, are marked on the measured
-    signal. The figure names the recording, and whether the fit has seen it.
+    `recording` is the name of a comparison or the file of its recording; by default the first comparison is drawn. A
+    window replaces the whole record and its first part. Clipped samples, which were not scored, are marked on the
+    measured signal. The figure names the recording, and says whether the fit has used it.
     """
     name, words = comparison_of(dataset, recording)
     scores = dataset.isel(comparison=[str(one) for one in dataset["comparison"].values].index(name))
@@ -70,9 +70,9 @@ def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Windo
 
 
 def comparison_of(dataset: xr.Dataset, recording: str | None) -> tuple[str, str]:
-    """Return the name of a comparison, and what to say of its recording; the first where none is named.
+    """Return the name of a comparison and the words about its recording; the first comparison if none is named.
 
-    None, or several of this name, raise DatasetError.
+    DatasetError: no comparison, or several, have this name.
     """
     names = _column(dataset, "comparison")
     if not names:
@@ -88,12 +88,12 @@ def comparison_of(dataset: xr.Dataset, recording: str | None) -> tuple[str, str]
             f"figure: recording: expected one of {recordings_of(dataset)}, got {got} named {recording!r}."
         )
     (place,) = places
-    said = {"fitted": "fitted on", "scored": "not fitted on"}.get(uses[place], "")
-    return names[place], ", ".join(part for part in (short_name(files[place]), said) if part)
+    role = {"fitted": "fitted on", "scored": "not fitted on"}.get(uses[place], "")
+    return names[place], ", ".join(part for part in (short_name(files[place]), role) if part)
 
 
 def recordings_of(dataset: xr.Dataset) -> str:
-    """Return the comparisons of a replay, each with its recording and what that was used for."""
+    """Return the comparisons of a replay, each with its recording and the use of this recording."""
     names, files, uses = (_column(dataset, name) for name in ("comparison", "recording", "use"))
     return ", ".join(
         f"{name} ({file}, {use})" if file else name
@@ -102,14 +102,14 @@ def recordings_of(dataset: xr.Dataset) -> str:
 
 
 def _column(dataset: xr.Dataset, name: str) -> list[str]:
-    """Return one text for each comparison, empty where the dataset has none of this name."""
+    """Return one text for each comparison, empty where the dataset lacks the variable."""
     if name not in dataset:
         return [""] * dataset.sizes.get("comparison", 0)
     return [str(text) for text in dataset[name].values]
 
 
 def _factor(values: Floats) -> tuple[float, str]:
-    """Return what values are multiplied with, and how the label says so."""
+    """Return the factor on the values, and its prefix in the label."""
     largest = float(np.nanmax(np.abs(values)))
     if _SMALL <= largest < _LARGE or largest <= 0.0:
         return 1.0, ""
@@ -118,14 +118,14 @@ def _factor(values: Floats) -> tuple[float, str]:
 
 
 def _parts(scores: xr.Dataset, time: Floats) -> list[Floats]:
-    """Return the stretches that are shown (s): the whole, and the first part of the event."""
+    """Return the stretches to show (s): the whole, and the first part of the event."""
     whole = np.array([time[0], time[-1]])
     frequency, onset = float(scores["measured_frequency"]), float(scores["onset"])
     if not np.isfinite(frequency) or frequency <= 0.0:
         return [whole]
     length = _ZOOM_PERIODS / frequency
     first = np.array([max(time[0], onset - _BEFORE * length), min(time[-1], onset + length)])
-    return [whole, first] if np.ptp(first) < _NEARLY_ALL * np.ptp(whole) else [whole]
+    return [whole, first] if np.ptp(first) < _WHOLE_SHARE * np.ptp(whole) else [whole]
 
 
 def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, Floats], size: float) -> None:
@@ -133,7 +133,7 @@ def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, 
     rows = (time >= part[0]) & (time <= part[1])
     measured = size * dataset[f"{name}_measured"].values
     clipped = rows & ((dataset[f"{name}_quality"].values & int(Quality.clipped)) != 0)
-    # wide and light below narrow and dark: where they agree, both are seen
+    # wide and light below narrow and dark: both are visible where they agree
     simulated = size * dataset[f"{name}_simulated"].values
     axis.plot(time[rows], measured[rows], color=_MEASURED, linewidth=1.8, label="measured", rasterized=True)
     axis.plot(time[rows], simulated[rows], color=MARK, linewidth=0.5, label="simulated", rasterized=True)
@@ -145,7 +145,7 @@ def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, 
 
 
 def _draw_events(axis: Axes, dataset: xr.Dataset, name: str, scale: float, part: Floats) -> None:
-    """Mark events: measured ones at the bottom of the panel, simulated ones at its top."""
+    """Mark events: measured events at the bottom of the panel, simulated events at its top."""
     if f"{name}_event_matched" not in dataset:
         return
     matched, missed, extra, delay = (
@@ -162,17 +162,17 @@ def _draw_events(axis: Axes, dataset: xr.Dataset, name: str, scale: float, part:
 
 
 def _say_scores(axis: Axes, scores: xr.Dataset, words: str) -> None:
-    """Write the recording, the score, and how the signals were aligned, into a panel."""
+    """Write the recording, the score and the alignment of the signals into a panel."""
     lag, error = 1e3 * float(scores["lag"]), 1e3 * float(scores["lag_error"])
     inverted = ", inverted" if float(scores["polarity"]) < 0.0 else ""
-    # one digit more than the error begins with
+    # one digit more than the first digit of the error
     digits = 3 if error <= 0.0 or not np.isfinite(error) else max(0, 1 - int(np.floor(np.log10(error))))
-    doubt, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
+    error_text, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
     score = f"VAF {float(scores['variance_accounted_for']):.2f} %"
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     style: dict[str, Any] = {"transform": axis.transAxes, "ha": "right", "fontsize": 7, "bbox": box}
     axis.text(0.98, 0.05, words, va="bottom", **style)
-    axis.text(0.98, 0.95, f"{score}\nlag {lag:.{digits}f}{doubt} ms{given}{inverted}", va="top", **style)
+    axis.text(0.98, 0.95, f"{score}\nlag {lag:.{digits}f}{error_text} ms{given}{inverted}", va="top", **style)
 
 
 def _draw_residual(
@@ -180,14 +180,14 @@ def _draw_residual(
 ) -> None:
     time, part = times
     residual = size * dataset[f"{name}_residual"].values
-    # what was not scored is not part of the residual that was
+    # samples that were not scored are no part of the residual
     scored = dataset[f"{name}_quality"].values == 0
     axis.plot(time, np.where(scored, residual, np.nan), color=STOP, linewidth=0.5, rasterized=True)
     axis.set_xlim(part[0], part[1])
 
 
 def _draw_running(axis: Axes, scores: xr.Dataset, scale: float) -> None:
-    """Draw the score of each running window over the residual, on an axis of its own; below 0 an arrow."""
+    """Draw the score of each running window over the residual, on its own axis; an arrow if it is below 0."""
     if "running_window_start" not in scores:
         return
     onset = float(scores["onset"])
@@ -199,11 +199,11 @@ def _draw_running(axis: Axes, scores: xr.Dataset, scale: float) -> None:
     start = scale * (scores["running_window_start"].values[known] + onset)
     stop = scale * (scores["running_window_stop"].values[known] + onset)
     shown = variance >= 0.0
-    beside = axis.twinx()
-    beside.hlines(variance[shown], start[shown], stop[shown], color=COLOURS[2], linewidth=1.2)
-    # worse than the mean: the arrow points to where the score is
+    twin = axis.twinx()
+    twin.hlines(variance[shown], start[shown], stop[shown], color=COLOURS[2], linewidth=1.2)
+    # worse than the mean: the arrow points towards the score
     below = 0.5 * (start + stop)[~shown]
-    beside.plot(below, np.full(len(below), 4.0), "v", color=COLOURS[2], markersize=3)
-    beside.set_ylim(0.0, 105.0)
-    beside.set_ylabel("VAF (%)", color=COLOURS[2])
+    twin.plot(below, np.full(len(below), 4.0), "v", color=COLOURS[2], markersize=3)
+    twin.set_ylim(0.0, 105.0)
+    twin.set_ylabel("VAF (%)", color=COLOURS[2])
     axis.tick_params(right=False)

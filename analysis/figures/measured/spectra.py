@@ -33,11 +33,11 @@ from vibroimpact.fmus.units import written_unit
 
 _PANEL_MM = 38
 _FEWEST = 16
-# Distance from an even spacing, over the mean interval, above which samples have no spectrum.
+# Deviation from even spacing, over the mean interval, above which samples have no spectrum.
 _UNEVEN = 0.01
 # Shares of the largest amplitude: frequencies end at the last one above the first, amplitudes begin at the second.
 _LAST, _FLOOR = 1e-2, 1e-5
-# Points of a line at most; of a longer one the largest of each span is drawn.
+# Largest number of points of a line; longer lines show the largest value of each span.
 _MOST_POINTS = 600
 _MULTIPLES = "multiples of the forcing frequency"
 _MULTIPLE_LINE: dict[str, Any] = {"color": STOP, "linestyle": ":", "linewidth": 0.5, "zorder": 0}
@@ -45,7 +45,7 @@ _LEAST_MULTIPLES, _MOST_MULTIPLES = 10, 20
 
 
 class _Signal(NamedTuple):
-    """What one line shows."""
+    """The signal of one line."""
 
     name: str
     unit: str
@@ -55,10 +55,10 @@ class _Signal(NamedTuple):
 
 
 class _Spectrum(NamedTuple):
-    """What is drawn over the frequency.
+    """A spectrum to draw over the frequency.
 
-    `of` returns angular frequencies (rad/s) and heights of a signal, `power` is 2 where heights are squares of
-    amplitudes, `quantity` names them for a unit, `words` say how they were computed.
+    `of` returns angular frequencies (rad/s) and heights of a signal. `power` is 2 where heights are squares of
+    amplitudes. `quantity` names the heights for a unit; `words` describe the method.
     """
 
     of: Callable[[_Signal], tuple[Floats, Floats]]
@@ -75,7 +75,7 @@ def _amplitudes(rate: float | None) -> _Spectrum:
 
 
 def _densities(segment: int | None, is_angular: bool) -> _Spectrum:
-    """Return densities, over the angular frequency where that is on the axis."""
+    """Return densities; over the angular frequency if the axis shows it."""
     words: list[str] = []
 
     def of(signal: _Signal) -> tuple[Floats, Floats]:
@@ -94,9 +94,9 @@ def _densities(segment: int | None, is_angular: bool) -> _Spectrum:
 def draw_run_spectrum(dataset: xr.Dataset, view: View, *, density: bool = False) -> Figure:
     """Draw the amplitude spectra of the sampled variables of one run, with the multiples of its forcing frequency.
 
-    A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
-    multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency. A density
-    is that of all samples.
+    A harmonic motion of amplitude A is a peak of height A. A forced motion is cut to whole periods, so that the
+    multiples lie on the grid of the frequencies. The axis of a nondimensional scene is the angular frequency. A
+    density uses all samples.
     """
     if not sampled_variables(dataset):
         raise DatasetError(
@@ -117,7 +117,7 @@ def draw_run_spectrum(dataset: xr.Dataset, view: View, *, density: bool = False)
 
 
 def draw_recording_spectrum(recording: Recording, view: View, *, density: bool = False) -> Figure:
-    """Draw the spectrum of each channel of a recording: of its longest stretch without a gap."""
+    """Draw the spectrum of each channel of a recording, from its longest stretch without a gap."""
     channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
     if not channels:
         raise DatasetError(
@@ -157,7 +157,7 @@ def _draw_panels(
     is_run: bool = False,
     is_angular: bool = False,
 ) -> Figure:
-    """Draw a panel for each group of signals; those of a run share the frequencies that its first one has.
+    """Draw a panel for each group of signals; all signals of a run have the frequency range of the first one.
 
     The rate is the angular frequency of the forcing, rad/s.
     """
@@ -181,7 +181,7 @@ def _draw_panels(
 
 
 def _end(spectra: Sequence[tuple[Floats, Floats]], rate: float | None, power: int) -> float:
-    """Return the angular frequency up to which spectra are shown, rad/s."""
+    """Return the largest angular frequency to show, rad/s."""
     end = 0.0 if rate is None else _LEAST_MULTIPLES * rate
     for frequency, height in spectra:
         high = np.flatnonzero(height > _LAST**power * height.max())
@@ -198,14 +198,14 @@ def _draw_panel(
     end: float,
     spectrum: _Spectrum,
 ) -> None:
-    """Draw spectra of one unit; `factor` makes of an angular frequency what the axis shows."""
+    """Draw spectra of one unit; `factor` converts an angular frequency to the axis."""
     lowest = math.inf
     for signal, (frequency, amplitude) in zip(signals, spectra, strict=True):
         inside = frequency <= end
-        # the mean was taken off
+        # the mean was removed
         inside[0] = False
         places, heights = _upper_edge(frequency[inside], amplitude[inside])
-        # amplitudes have the same room in every figure
+        # amplitudes have the same range in every figure
         lowest = min(lowest, 0.3 * float(heights.min(initial=math.inf)) if spectrum.power > 1 else 0.0)
         words = signal.name if len(signals) > 1 else None
         axis.plot(factor * places, heights, color=signal.colour, linewidth=0.6, label=words, rasterized=True)
@@ -230,12 +230,12 @@ def _upper_edge(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
 def amplitude_spectrum(
     name: str, time: Floats, values: Floats, rate: float | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the amplitude spectrum of the longest stretch without a gap, its mean taken off (Hann window).
+    """Return the amplitude spectrum of the longest stretch without a gap, mean removed (Hann window).
 
-    Instants (s) are evenly spaced, NaN marks values that are not there; whole periods of `rate` (rad/s) are taken.
-    Angular frequency (rad/s) and amplitude have shape (sample // 2 + 1,); a harmonic motion of amplitude A whose
-    frequency is on the grid has the height A. Uneven samples, or fewer than 16 in a row, raise DatasetError with the
-    name.
+    Instants (s) are evenly spaced, NaN marks missing values, and the stretch is cut to whole periods of `rate` (rad/s).
+    Angular frequency (rad/s) and amplitude have shape (sample // 2 + 1,). A harmonic motion of amplitude A with a
+    frequency on the grid has the height A. DatasetError, with the name: the samples are uneven, or fewer than 16 are in
+    a row.
 
     >>> time = np.arange(1000) / 100.0
     >>> frequency, amplitude = amplitude_spectrum("x", time, 3.0 + 2.0 * np.cos(8.0 * np.pi * time))
@@ -247,7 +247,7 @@ def amplitude_spectrum(
     count = len(values)
     if rate is not None:
         period = 2.0 * math.pi / (rate * interval)
-        # less than a whole period, as all there is
+        # everything, where it is less than a whole period
         count = round(math.floor(count / period + _UNEVEN) * period) or count
     count = min(count, len(values))
     weights = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)

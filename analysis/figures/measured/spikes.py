@@ -1,4 +1,4 @@
-"""Figure of the spikes of a channel: the signal, what it was compared with, and the largest spike close up."""
+"""Figure of the spikes of a channel: the signal, its detection statistic, and the largest spike close up."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 
 _PANEL_MM = 42
 _UNITS = {"m s-2": "m/s²", "1": "-"}
-#: Lines of more points are drawn as the band between their extremes.
+#: Number of points above which a line is drawn as the band between its extremes.
 _MOST_POINTS = 20_000
-#: More spikes than this have small marks.
+#: Number of spikes above which their marks are small.
 _MOST_LARGE_MARKS = 40
-#: The close-up shows the pulse and so many of its lengths after it.
+#: Range of the close-up, in lengths of the pulse, before and after its middle.
 _BEFORE, _AFTER = 1.0, 3.0
 _DASHES = {"half_sine": "-", "haversine": "--", "bell": ":"}
 
@@ -69,7 +69,7 @@ def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
 
 
 def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
-    """Draw the largest complete spike, its samples and the curves fitted to it."""
+    """Draw the largest complete spike: its samples, and the curves fitted to it."""
     data, found = report.dataset, report.found
     axis.set_ylabel(f"from baseline ({_unit(report)})")
     spike = data.isel(spike=int(np.argmax(np.abs(data["spike_peak"].values))))
@@ -105,7 +105,7 @@ def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
 
 
 def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> None:
-    """Draw a line, a long one by its extremes."""
+    """Draw a line; a long line is drawn by its extremes."""
     if len(time) > _MOST_POINTS:
         time, values = outline(time, values, -(-4 * len(time) // _MOST_POINTS))
     axis.plot(time, values, rasterized=True, **style)

@@ -1,1 +1,1 @@
-"""One motion: its time series, its planes, its modes."""
+"""Figures of one motion: its time series, its phase planes, its modes."""

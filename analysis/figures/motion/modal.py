@@ -1,4 +1,4 @@
-"""Figures of what the modes of a body do: their shapes along a beam, their energies over time."""
+"""Figures of the modes of a body: their shapes along a beam, their energies over time."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def draw_energies(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def draw_shapes(dataset: xr.Dataset) -> Figure:
-    """Draw the shapes of the modes that a beam was let go from, over its length.
+    """Draw the shapes of the modes in which a beam was released, over its length.
 
-    The dataset is a sweep of `sensor.location` and `body.displacement_start[j]`; runs that start in one mode alone
-    are drawn, each shape divided by its largest value.
+    The dataset is a sweep of `sensor.location` and `body.displacement_start[j]`. Runs that start in a single mode are
+    drawn, each shape divided by its largest value.
     """
     runs = dataset.vibroimpact.runs
     starts = sorted((int(m[1]), m[0]) for m in map(_START.fullmatch, map(str, runs.variables)) if m)
@@ -61,7 +61,7 @@ def draw_shapes(dataset: xr.Dataset) -> Figure:
             "figure: expected a sweep of sensor.location and body.displacement_start[j], with displacement in the "
             "time series, got another dataset. See examples/thesis/figure_7_2.toml."
         )
-    # the sample in which each run begins
+    # the first sample of each run
     first = np.searchsorted(dataset["sample_run"].values, runs["run_id"].values)
     displacement = dataset["displacement"].values[first]
     moved = np.stack([runs[name].values != 0 for _, name in starts], axis=1)

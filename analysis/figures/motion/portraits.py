@@ -38,15 +38,15 @@ from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 62
-# Small enough that ten thousand impacts do not run into one blot.
+# Marker size, points: small enough that ten thousand impacts do not merge.
 _DOT = 1.1
-# Impacts on one stop above which they are as small.
-_MANY = 200
+# Impacts on one stop above which their marks have this size.
+_MANY_IMPACTS = 200
 _QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
 
 
 class _Orbit(NamedTuple):
-    """What one line of a portrait shows."""
+    """The orbit of one line in a portrait."""
 
     name: str
     words: str
@@ -55,10 +55,10 @@ class _Orbit(NamedTuple):
 
 
 def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
-    """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
+    """Draw velocity against displacement for each sampled pair; a whole chain also shows its modes.
 
-    Lines end at an impact and begin again after it, joined by dots. Those of a long motion are not joined: dots of many
-    jumps would be a solid band.
+    Lines end at an impact and begin again after it; dots join both ends. In a long motion the ends are not joined: the
+    dots of many jumps would be a solid band.
     """
     samples = samples_within(dataset, view)
     orbits = _sampled_orbits(samples)
@@ -90,7 +90,7 @@ def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
-    """Draw one line, broken where the velocity jumps; the turns of a long one are layers."""
+    """Draw one line, broken where the velocity jumps; the turns of a long line are layers."""
     x, y = (with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity))
     draw_turns(axis, x, y, color=colour, label=orbit.words, rasterized=True)
     if not jumps.size or turn_begins(orbit.velocity).size > FEW_TURNS:
@@ -113,7 +113,7 @@ def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
 
 
 def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
-    """Return the modal coordinates q = Psi' M y of a chain all of whose masses were sampled (equations.md 5.2)."""
+    """Return the modal coordinates q = Psi' M y of a chain if all of its masses were sampled (equations.md 5.2)."""
     scene = scene_of(dataset.attrs)
     body = {} if any(key.startswith("body.") for key in swept_keys(scene)) else table(scene, "body")
     masses = np.atleast_1d(np.asarray(body.get("masses", []), dtype=float))
@@ -156,9 +156,9 @@ def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def _draw_dots(
-    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY
+    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY_IMPACTS
 ) -> None:
-    """Draw points of the impacts on each stop, small ones where there are many, and name several stops."""
+    """Draw points of the impacts on each stop, small where they are many; several stops are named."""
     for place, (stop, (x, y)) in enumerate(points.items()):
         axis.plot(
             x,
@@ -176,7 +176,7 @@ def _draw_dots(
 
 
 def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
-    """Draw the velocity of each impact over that of the one before it on the same stop.
+    """Draw the velocity of each impact over the velocity of the impact before it on the same stop.
 
     Points on the diagonal repeat; a motion of period n has n points, chaos a line or a thin set.
     """
@@ -192,7 +192,7 @@ def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(82)
     axis = figure.subplots()
     pairs = {stop: (values[:-1], values[1:]) for stop, values in chains.items()}
-    _draw_dots(figure, axis, pairs, _MANY - 1)  # pairs are one less than impacts
+    _draw_dots(figure, axis, pairs, _MANY_IMPACTS - 1)  # there is one pair less than impacts
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])

@@ -1,4 +1,4 @@
-"""Figures of one run: its time series and phase portrait, or what was recorded in their place."""
+"""Figures of one run: its time series and phase portrait, or other recorded groups in their place."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 
-#: More impacts than this have small marks.
+#: Number of impacts above which their marks are small.
 _MOST_LARGE_MARKS = 100
 
 
 def draw_run(dataset: xr.Dataset, view: View) -> Figure:
     """Draw one run: time series with the stop and the impacts, and the phase portrait.
 
-    Variables of components, and of a body where more than displacement and velocity was sampled, are drawn as
-    time series with the events or impacts. Where no time series was recorded, the extremes of each period and
-    the strobe points stand in for it. Of a long record the first forcing periods are drawn, unless a window says
-    otherwise; the phase portrait then shows all of it.
+    Variables of components are drawn as time series with the events or impacts. So is a body with more sampled
+    variables than displacement and velocity. Without a time series, the extremes of each period and the strobe points
+    are drawn. A long record shows its first forcing periods, unless a window is given; the phase portrait then shows
+    all of it.
     """
     sampled = sampled_variables(dataset)
     if set(sampled) == {"displacement", "velocity"}:
@@ -108,7 +108,7 @@ def _impact_points(dataset: xr.Dataset, run: int | None) -> Floats:
 
 
 def _with_impacts(samples: xr.Dataset, marks: Floats, part: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Return time, displacement and velocity of a part with its impacts in them, and the impacts alone.
+    """Return time, displacement and velocity of a part with its impacts inserted, and the impacts alone.
 
     The velocity has a gap where it jumps.
     """
@@ -123,7 +123,7 @@ def _with_impacts(samples: xr.Dataset, marks: Floats, part: tuple[float, float])
 
 
 def _draw_periods(dataset: xr.Dataset, run: int | None) -> Figure:
-    """Draw what stands in for a time series: extremes, impact velocities, strobe points."""
+    """Draw the substitutes of a time series: extremes, impact velocities, strobe points."""
     runs = dataset.vibroimpact.runs
     chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
     if chosen.sizes["run"] != 1:

@@ -32,19 +32,19 @@ from vibroimpact.fmus.errors import DatasetError
 _STYLES = ("-", "--", ":", "-.")
 _PANEL_MM = 34
 _ROW_MM = 4
-# What fits beside a panel, and in a row above it where each name comes after its line.
+# Letters of a label next to a panel, and of a row above it; letters of the line before each name.
 _LONGEST_LABEL = 24
 _LONGEST_QUANTITY = 18
 _ROW_LETTERS = 52
 _LINE_LETTERS = 7
-# Instants above which marks of full height would cover the panel, and the height at which shorter ones begin.
+# Number of instants above which full marks would cover the panel; height at which shorter marks begin.
 _MOST_LINES, _TICKS_FROM = 25, 0.94
-# What tells variables of one quantity apart: contact_displacement_1, displacement_2; energy_kinetic, energy_potential.
+# Parts of a name that separate variables of one quantity: contact_displacement_1, displacement_2; energy_kinetic.
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 _CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
 # First instant, over the width of the panel, above which time counts from it.
-_LATE = 10.0
-# What happens at an instant, and the variable with its times.
+_LATE_START = 10.0
+# Kinds of instants, and the variables with their times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
 
@@ -58,10 +58,9 @@ def sampled_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def draw_series(dataset: xr.Dataset, view: View) -> Figure:
-    """Draw the sampled variables of one run against time: a panel for each quantity, its stops, marks at the events.
+    """Draw the sampled variables of one run against time: a panel for each quantity, with stops and event marks.
 
-    Panels and lines are in the order of the scene. Without a window the first forcing periods of a long record are
-    drawn.
+    Panels and lines are in the order of the scene. Without a window, a long record shows its first forcing periods.
     """
     samples = dataset.vibroimpact.samples(**selected(view.run))
     part, words = time_part(dataset, samples, view.window)
@@ -80,7 +79,7 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
         _draw_stops(axis, dataset, variables)
         marks = _draw_instants(axis, kind, instants)
         peaks = _draw_peaks(axis, dataset, view.run, part, variables)
-        # What the marks are is said once, above the first panel.
+        # The legend of the marks appears once, above the first panel.
         _name_lines(axis, variables, lines, [*(marks if axis is axes[0] else []), *peaks])
         axis.margins(x=0.0)
     count_time(axes[-1], samples["time"], view.window, words)
@@ -88,7 +87,7 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
 
 
 def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple[tuple[float, float], str]:
-    """Return first and last instant to draw (s), and what the label of the time must say of it."""
+    """Return the first and last instant to draw (s), and a note for the label of the time axis."""
     time, rate = samples["time"].values, forcing_rate(dataset, samples)
     if not len(time):
         raise DatasetError("figure: expected samples of the run, got none. Its outcome and message say why.")
@@ -100,19 +99,19 @@ def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple
 
 
 def count_time(axis: Axes, time: xr.DataArray, window: Window, words: str) -> None:
-    """Label the instants of a panel: from the first one on, where a long transient came before the record.
+    """Label the instants of a panel, counted from the first one if a long transient came before the record.
 
-    Instants that a window names stay those of the file, as all data of the panel do.
+    With a window, instants stay those of the file, as in the panel's data.
     """
-    # long numbers of late instants would run together
+    # long numbers of late instants would overlap
     axis.xaxis.set_major_locator(MaxNLocator(6))
     axis.set_xlabel(label(time) + words)
     low, high = axis.dataLim.intervalx
     first = float(time.values[0])
-    if window.given or not first > _LATE * (high - low) > 0.0:
+    if window.given or not first > _LATE_START * (high - low) > 0.0:
         return
     axis.xaxis.set_major_locator(_CountedFrom(first))
-    digits = math.ceil(6.0 - math.log10(high - low))  # rounding of late instants is none of the tick
+    digits = math.ceil(6.0 - math.log10(high - low))  # without the rounding of late instants
     axis.xaxis.set_major_formatter(
         FuncFormatter(
             lambda instant, _: ScalarFormatter.fix_minus(f"{round(instant - first, digits) + 0.0:.6g}")
@@ -135,12 +134,12 @@ class _CountedFrom(MaxNLocator):
 
 
 def selected(run: int | None) -> dict[str, int]:
-    """Return what names a run to the accessor of a dataset; nothing names the only one."""
+    """Return the selection of a run for the accessor of a dataset; empty for the only run."""
     return {} if run is None else {"run_index": run}
 
 
 def samples_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
-    """Return the samples of a run in a window; all of them where none is given."""
+    """Return the samples of a run in a window, or all of them."""
     samples: xr.Dataset = dataset.vibroimpact.samples(**selected(view.run))
     if not view.window.given:
         return samples
@@ -150,7 +149,7 @@ def samples_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
 
 
 def impacts_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
-    """Return the impacts of a run in a window; all of them where none is given."""
+    """Return the impacts of a run in a window, or all of them."""
     hits: xr.Dataset = dataset.vibroimpact.impacts(**selected(view.run))
     if not view.window.given:
         return hits
@@ -174,14 +173,14 @@ def with_gaps(values: Floats, places: npt.NDArray[np.intp]) -> Floats:
 
 
 def _quantity(variable: xr.DataArray) -> str:
-    """Return what variables of one panel have in common: displacement of displacement_2."""
+    """Return the common name of the variables in a panel: displacement for displacement_2."""
     if "component_variable" in variable.attrs:
         return ""
     return _PARTICULARS.sub("", str(variable.name))
 
 
 def _instants(dataset: xr.Dataset, run: int | None) -> tuple[str, Floats]:
-    """Return what happened at instants of the run, and when (s)."""
+    """Return the kind of the instants of the run, and their times (s)."""
     for kind, clock in _INSTANTS:
         if kind in dataset.dims:
             rows = getattr(dataset.vibroimpact, f"{kind}s")(**selected(run))
@@ -205,9 +204,9 @@ def _draw_lines(axis: Axes, time: Floats, variables: list[xr.DataArray]) -> list
 
 
 def _draw_stops(axis: Axes, dataset: xr.Dataset, variables: list[xr.DataArray]) -> None:
-    """Draw the stops that displacements may meet, each in the colour of its displacement where there are several.
+    """Draw the stops that displacements may meet; with several displacements, each in its colour.
 
-    A stop farther away than the motion is wide would press it flat, and is not drawn.
+    A stop farther away than the width of the motion would compress it, and is not drawn.
     """
     for place, variable in enumerate(variables):
         colour = COLOURS[place % len(COLOURS)] if len(variables) > 1 else STOP
@@ -218,7 +217,7 @@ def _draw_stops(axis: Axes, dataset: xr.Dataset, variables: list[xr.DataArray]) 
 
 
 def _draw_instants(axis: Axes, kind: str, instants: Floats) -> list[Artist]:
-    """Draw thin lines where something happened: over the whole panel, or where there are many at its top alone."""
+    """Draw thin lines at instants: over the whole panel, or only at its top where they are many."""
     if not instants.size:
         return []
     marks = axis.vlines(
@@ -238,7 +237,7 @@ def _draw_instants(axis: Axes, kind: str, instants: Floats) -> list[Artist]:
 def _draw_peaks(
     axis: Axes, dataset: xr.Dataset, run: int | None, part: tuple[float, float], variables: list[xr.DataArray]
 ) -> list[Artist]:
-    """Draw the largest force of each contact over its duration: samples may miss it."""
+    """Draw the largest force of each contact over its duration: samples may miss this force."""
     forces = [_CONTACT_FORCE.match(str(variable.name)) for variable in variables]
     if "impact_peak_force" not in dataset.variables or not any(forces):
         return []
@@ -268,7 +267,7 @@ def _draw_peaks(
 
 
 def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], marks: list[Artist]) -> None:
-    """Name the lines above their panel; the label of the axis is enough for a single one of short name."""
+    """Name the lines above their panel; for a single short name the axis label is enough."""
     axis_label = label(variables[0])
     entries = marks
     if len(variables) > 1 or len(axis_label) > _LONGEST_LABEL:
@@ -280,14 +279,14 @@ def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], 
 
 
 def _common(variables: list[xr.DataArray]) -> str:
-    """Return the quantity that all variables of a panel are: their common words, or the last part of their names."""
+    """Return the quantity of all variables of a panel: their common words, or the last part of their names."""
     quantities = {_quantity(variable) or _last_name(title(variable)) for variable in variables}
     words = min(quantities).replace("_", " ") if len(quantities) == 1 else ""
     return words if len(words) <= _LONGEST_QUANTITY else ""
 
 
 def _last_name(name: str) -> str:
-    """Return what a variable of a component is, whichever of them it is.
+    """Return the kind of a component's variable, without component and number.
 
     >>> _last_name("soft.displacement[3]"), _last_name("load")
     ('displacement', 'load')
@@ -296,6 +295,6 @@ def _last_name(name: str) -> str:
 
 
 def _columns(variables: list[xr.DataArray]) -> int:
-    """Return how many names fit in a row above a panel."""
+    """Return the number of names that fit in a row above a panel."""
     longest = max(len(title(variable)) for variable in variables)
     return max(1, _ROW_LETTERS // (longest + _LINE_LETTERS))

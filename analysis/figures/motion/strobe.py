@@ -1,4 +1,4 @@
-"""Figures of the motion seen once per forcing period: sections of one run, diagrams of a sweep."""
+"""Figures of the motion once per forcing period: sections of one run, diagrams of a sweep."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from vibroimpact.analysis.figures.sweep.diagrams import draw_diagram, one_value,
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
-# Points of a section above which they are small, so that the layers of an attractor show.
-_MANY = 100
+# Number of points of a section above which they are small, so that the layers of an attractor show.
+_MANY_POINTS = 100
 
 
 def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
@@ -42,12 +42,12 @@ def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
 def draw_section(axis: Axes, run: xr.Dataset) -> None:
     """Draw displacement and velocity of one run at forcing phase 0."""
     x, y = run["strobe_displacement"], run["strobe_velocity"]
-    size = 2.5 if np.isfinite(x.values).sum() <= _MANY else 1.0
+    size = 2.5 if np.isfinite(x.values).sum() <= _MANY_POINTS else 1.0
     axis.plot(x.values, y.values, "o", markersize=size, markeredgewidth=0.0, color=LINE, rasterized=True)
     for values, limits in ((x, "xlim"), (y, "ylim")):
         same = one_value(values.values)
         if same is not None:
-            # a single point: numbers around it to nine digits say nothing
+            # a single point: nine digits of axis numbers around it would be meaningless
             room = 0.5 * abs(same) or 1.0
             axis.set(**{limits: (same - room, same + room)})
     axis.xaxis.set_major_locator(MaxNLocator(5))

@@ -1,1 +1,1 @@
-"""Periodic orbits and what is around them: branches, basins, maps, exponents, resonances."""
+"""Figures of periodic orbits and related sets: branches, basins, maps, exponents, resonances."""

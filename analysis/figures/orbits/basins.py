@@ -17,7 +17,7 @@ _UNDECIDED, _BEYOND = "#FFFFFF", "#5A5A5A"
 
 
 def draw_basins(dataset: xr.Dataset) -> Figure:
-    """Draw which attractor each start ends on, and the attractors at forcing phase 0."""
+    """Draw the attractor of each start state, and the attractors at forcing phase 0."""
     labels = dataset["basin"].values
     names = [str(name) for name in dataset["attractor_name"].values]
     colours = [_COLOURS[place % len(_COLOURS)] for place in range(len(names))]

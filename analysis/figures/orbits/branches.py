@@ -23,7 +23,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 BRANCH = "orbit_branch"
 _LONG = 20
-"""Letters of an entry of the legend, of which no three fit beside each other."""
+"""Letters of a legend entry above which three entries do not fit side by side."""
 _STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
 _UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
 _ALONE: dict[str, Any] = {"marker": "o", "markersize": 3.4}
@@ -53,8 +53,8 @@ _MARKS = {
 def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable: str | None = None) -> Figure:
     """Draw displacement range and impact velocity of orbits over their parameter: stable solid, unstable dashed.
 
-    A sweep of the same parameter is drawn below (`over`). A variable, of `diagrams.drawable_variables`, is drawn
-    instead. Another sweep, or a variable that was not recorded, raises DatasetError.
+    A sweep of the same parameter is drawn below (`over`). A variable of `diagrams.drawable_variables` replaces both.
+    A sweep of another parameter, or a variable that was not recorded, raises DatasetError.
     """
     names = varied(dataset)
     if variable is not None:
@@ -88,12 +88,12 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
 def _label(dataset: xr.Dataset, panel: str) -> str:
     if panel in dataset.variables:
         return label(dataset[panel])
-    # of orbits that were not opened from a file
+    # the orbits were not opened from a file
     return f"displacement range ({unit_symbol(dataset['displacement_max'])})"
 
 
 def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -> Figure:
-    """Draw bifurcations over two parameters, over a map where there is one."""
+    """Draw bifurcations over two parameters, over a map if there is one."""
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
     if over is not None:
@@ -109,19 +109,19 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         x, y = sorted(names, key=lambda name: name != first)
         panels[0].set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
     branch, special = runs[BRANCH].values, runs["orbit_special"].values
-    said: set[str] = set()
+    labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         kind = SpecialOrbit(int(special[chosen[0]]))
         words = str(kind.name).replace("_", " ")
         style = _LOCI.get(kind, {"color": "0.4"})
-        shown = None if words in said else words
+        shown = None if words in labelled else words
         for axis in panels:
             axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
-        said.add(words)
+        labelled.add(words)
     if over is None:
         panels[0].margins(x=0.02)
-    else:  # curves may go on beyond the map
+    else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
     legend_outside(figure, panels[0], ncols=3)
     return figure
@@ -133,7 +133,7 @@ def _ends(values: Any) -> tuple[float, float]:
 
 
 def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
-    """Return the values of a panel, an array for each run: of its periods, or of its impacts."""
+    """Return the values of a panel, an array for each run: its periods or its impacts."""
     runs = dataset.vibroimpact.runs
     if panel == "displacement_range":
         ranges = runs["displacement_max"].values - runs["displacement_min"].values
@@ -158,20 +158,20 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
     rows = _rows(dataset, panel)
     places, branch = runs[name].values, runs[BRANCH].values
     stable, special = runs["orbit_stable"].values > 0, runs["orbit_special"].values
-    said: set[str] = set()
+    labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         columns = min(rows[each].size for each in chosen)
         values = np.array([rows[each][:columns] for each in chosen])
         for which, style, words in ((stable, _STABLE, "stable"), (~stable, _UNSTABLE, "unstable")):
-            # a piece goes to the neighbours on either side, so that no gap is left where stability changes
+            # a piece extends to its neighbours on both sides, so that no gap is left where stability changes
             keep = which[chosen] | np.append(which[chosen][1:], False) & ~which[chosen]
             shown = np.where(keep[:, None], values, np.nan)
-            # an orbit that was not followed is no line
+            # a single orbit, which was not followed, is a mark instead of a line
             lines = axis.plot(places[chosen], shown, **style, **({} if chosen.size > 1 else _ALONE))
-            if words not in said and keep.any():
+            if words not in labelled and keep.any():
                 lines[0].set_label(words)
-                said.add(words)
+                labelled.add(words)
         for each in chosen[special[chosen] > 0]:
             kind = SpecialOrbit(int(special[each]))
             words = str(kind.name).replace("_", " ")
@@ -184,7 +184,7 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
                 markerfacecolor="white",
                 markeredgewidth=0.7,
                 color=MARK,
-                label=None if words in said else words,
+                label=None if words in labelled else words,
                 zorder=3,
             )
-            said.add(words)
+            labelled.add(words)

@@ -1,4 +1,4 @@
-"""Figure of an orbit that is kept by its forcing amplitude: thesis figure 3.15."""
+"""Figure of an orbit kept by its forcing amplitude: thesis figure 3.15."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _DOTS: dict[str, Any] = {"marker": ".", "linestyle": "none", "markersize": 1.6, 
 
 
 def draw_control(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
-    """Draw impact velocities over the angular frequency, and what the amplitude was corrected by.
+    """Draw impact velocities over the angular frequency, and the corrections of the amplitude.
 
-    A sweep of the same frequency is drawn below (`over`): what happens without control. Another sweep raises
+    A sweep of the same frequency (`over`) is drawn below: the motion without control. Another sweep raises
     DatasetError.
     """
     frequency, velocity = dataset["angular_frequency"].values, dataset["impact_velocity"].values

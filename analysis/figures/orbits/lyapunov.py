@@ -1,4 +1,4 @@
-"""Figures of Lyapunov exponents: of a run, over a swept parameter, over two."""
+"""Figures of Lyapunov exponents: of a run, over one swept parameter, over two."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _COLOURS = {"up": "#56A5DC", "down": "#B5410B"}
 
 
 def draw_lyapunov(dataset: xr.Dataset) -> Figure:
-    """Draw the largest exponent of each run over one or two swept parameters; of a single run all exponents.
+    """Draw the largest exponent of each run over one or two swept parameters, or all exponents of a single run.
 
-    More swept parameters, or runs that are no grid of them, raise DatasetError.
+    More swept parameters, or runs without a grid, raise DatasetError.
     """
     names = [str(dim) for dim in dataset["reason"].dims if dim != "direction"]
     if not names and "direction" not in dataset["reason"].dims:
@@ -50,7 +50,7 @@ def _draw_run(dataset: xr.Dataset) -> Figure:
 
 
 def _draw_map(dataset: xr.Dataset, names: list[str]) -> Figure:
-    """Draw the largest exponent as colours: what is above 0 in other ones than what is below."""
+    """Draw the largest exponent as colours, with different colours above and below 0."""
     along, across = in_order_of_the_scene(dataset, names)
     largest = dataset["lyapunov_exponent"].isel(exponent=0)
     directions = dataset["direction"].values.tolist() if "direction" in largest.dims else [None]

@@ -1,4 +1,4 @@
-"""Figures of maps: impacts, states at phase 0, the sets S and W, and the diagrams of what a graze is like."""
+"""Figures of maps: impacts, states at phase 0, the sets S and W, and the diagrams of maps near a graze."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vibroimpact.analysis.figures.page import canvas, label, legend_outside, uni
 
 _DOTS: dict[str, Any] = {"marker": "o", "linestyle": "none", "markeredgewidth": 0.0, "color": "#0F4C81"}
 _SMALLEST, _LARGEST, _ONE, _TENFOLD = 0.9, 4.0, 5.0, 1.05
-"""Diameters of dots, points: limits, that of an only dot, and how much ten times as many take off."""
+"""Diameters of dots, points: smallest, largest, diameter of a single dot, and decrease for ten times as many."""
 _MARKS = "osD^v"
 
 
 def draw_maps(dataset: xr.Dataset) -> Figure:
-    """Draw what `maps` returns."""
+    """Draw the dataset of `maps`."""
     figure = canvas(80)
     axis = figure.subplots()
     if dataset.attrs["map"] in ("nordmark", "square-root"):
@@ -60,7 +60,7 @@ def draw_maps(dataset: xr.Dataset) -> Figure:
 
 
 def dot_size(count: int) -> float:
-    """Return the diameter of so many dots, points: few dots are seen, and many do not cover each other.
+    """Return the diameter of `count` dots, points: few dots are visible, and many do not cover each other.
 
     >>> [round(dot_size(count), 1) for count in (2, 100, 2752, 200_000)]
     [4.0, 2.9, 1.4, 0.9]
@@ -71,7 +71,7 @@ def dot_size(count: int) -> float:
 def _draw_curve(
     axis: Axes, phase: np.ndarray[Any, Any], speed: np.ndarray[Any, Any], colour: str, words: str
 ) -> None:
-    """Draw a curve that ends where its phase passes 0."""
+    """Draw a curve, interrupted where its phase passes 0."""
     wraps = np.abs(np.diff(phase, prepend=phase[:1])) > np.pi
     axis.plot(phase, np.where(wraps, np.nan, speed), color=colour, linewidth=0.9, label=words)
 

@@ -1,4 +1,4 @@
-"""Figures of energies that modes exchange on orbits: of one orbit, along a sweep; thesis figures 6.15 and 6.16."""
+"""Figures of the energies that modes exchange: on one orbit, along a sweep; thesis figures 6.15 and 6.16."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MARKS = {"up": "^", "down": "v"}
 
 
 def draw_orbit_energies(dataset: xr.Dataset) -> Figure:
-    """Draw what the modes of an orbit get and give, or their residual energies along a sweep; below, the restitution.
+    """Draw the energy gains and losses of an orbit's modes, or residual energies along a sweep; below, the restitution.
 
     A missing variable, or more than one swept key, raises DatasetError.
     """
@@ -72,9 +72,9 @@ def _draw_bars(axis: Axes, dataset: xr.Dataset) -> None:
 
 
 def _draw_curve(axis: Axes, dataset: xr.Dataset) -> None:
-    """Draw restitution over residual energy at the energy that the impacts of the orbit meet: figure 6.16 (a)."""
+    """Draw restitution over residual energy for the energy that the impacts of the orbit meet: figure 6.16 (a)."""
     met, residual = float(dataset["contact_energy"]), float(dataset["residual_energy"].sum())
-    # square root: closest where the curve is steep
+    # square root: points are closest where the curve is steep
     share = 1.0 - np.linspace(1.0, 0.0, 200) ** 2
     axis.plot(met * share, np.sqrt(1.0 - share), color=LINE)
     axis.plot(residual, float(dataset["residual_restitution"]), "o", color=MARK, markersize=4)
@@ -86,10 +86,10 @@ def _draw_curve(axis: Axes, dataset: xr.Dataset) -> None:
 def _draw_sweep(axis: Axes, dataset: xr.Dataset, along: str) -> None:
     for number, mode in enumerate(dataset["mode"].values.tolist()):
         own = dataset["residual_energy"].sel(mode=mode) / dataset["periods"]
-        for way in own["direction"].values.tolist() if "direction" in own.dims else [None]:
-            line = own if way is None else own.sel(direction=way)
+        for sweep in own["direction"].values.tolist() if "direction" in own.dims else [None]:
+            line = own if sweep is None else own.sel(direction=sweep)
             colour = COLOURS[number % len(COLOURS)]
-            axis.plot(line[along] if along in line.coords else np.arange(line.size), line, _MARKS.get(str(way), "."),
+            axis.plot(line[along] if along in line.coords else np.arange(line.size), line, _MARKS.get(str(sweep), "."),
                       color=colour, markersize=1.5, label=f"mode {mode}", rasterized=True)  # fmt: skip
     axis.axhline(0.0, color=STOP, linewidth=0.6)
     axis.set_xlabel(label(dataset[along]) if along in dataset.coords else along)

@@ -17,7 +17,7 @@ _COLOURS = ("#0F4C81", "#B5410B", "#3C7D3C", "#7A4B9A", "#8A6D00", "#555555")
 
 
 def draw_orbits(orbits: FoundOrbits) -> Figure:
-    """Draw orbits of one body: displacement of its observed point on x, velocity on y. None raise DatasetError."""
+    """Draw orbits of one body: displacement of its observed point on x, velocity on y. DatasetError without orbits."""
     if not orbits:
         raise DatasetError("figure: expected orbits, got none.")
     figure = canvas(75)

@@ -24,7 +24,7 @@ _NEEDED = ("quantity", "peak_frequency", "peak_height", "shifted_frequency", "na
 
 
 def draw_resonances(dataset: xr.Dataset) -> Figure:
-    """Draw a panel for the whole body's displacement range, its impact velocity, and the kinetic energies of the modes.
+    """Draw panels for displacement range, impact velocity and kinetic energies of the modes over the frequency.
 
     A missing variable raises DatasetError.
     """
@@ -52,8 +52,8 @@ def draw_resonances(dataset: xr.Dataset) -> Figure:
                           markersize=3, label="peaks")  # fmt: skip
             _draw_natural(axis, dataset)
             kinetic = names and names[0].startswith("mean_kinetic")
-            said = "kinetic energy" if kinetic else names[0].replace("_", " ")
-            axis.set_ylabel(f"{said} ({unit_symbol(dataset[names[0]])})")
+            quantity = "kinetic energy" if kinetic else names[0].replace("_", " ")
+            axis.set_ylabel(f"{quantity} ({unit_symbol(dataset[names[0]])})")
             axis.set_ylim(bottom=0.0)
         axes[-1].set_xlim(float(frequency.min()), float(frequency.max()))
         axes[-1].set_xlabel(f"angular frequency ({unit_symbol(dataset['forcing'])})")
@@ -63,7 +63,7 @@ def draw_resonances(dataset: xr.Dataset) -> Figure:
 
 
 def _draw_natural(axis: Axes, dataset: xr.Dataset) -> None:
-    """Mark natural frequencies, and those that the stop shifts at the highest peak of the first panel."""
+    """Mark natural frequencies, and those shifted by the stop at the highest peak of the first panel."""
     first = dataset["quantity"].values == dataset["quantity"].values[0]
     heights = np.where(first, dataset["peak_height"].values, -np.inf)
     shifted = dataset["shifted_frequency"].values[int(np.argmax(heights))]

@@ -1,4 +1,4 @@
-"""Figure of transients: how far other starts are from a scene's own motion, period by period."""
+"""Figure of transients: distance of other starts from a scene's own motion, period by period."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import canvas
 
 _MOST_LABELLED = 6
-"""Ends that the legend names."""
+"""Number of ends named in the legend."""
 _COLOURS = ("#20567D", "#B5410B", "#7A7A7A", "#56A5DC", "#8C6BB1", "#41AB5D")
 
 
 def draw_transients(dataset: xr.Dataset) -> Figure:
-    """Draw the distance of each start over the periods, with the tolerance, and the body without impacts beside it."""
+    """Draw the distance of each start over the periods, the tolerance, and the decay of the body without impacts."""
     figure = canvas(70)
     axis = figure.subplots()
     period, distances = dataset["period"].values, dataset["distance"].values

@@ -1,1 +1,1 @@
-"""Studies of a scene: what accuracy and effects cost, hard cases, sensitivity, scores."""
+"""Figures of studies of a scene: cost of accuracy and of effects, hard cases, sensitivity, scores."""

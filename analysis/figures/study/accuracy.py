@@ -1,4 +1,4 @@
-"""What accuracy costs in time: errors of all ways of simulating a scene over the seconds that they take."""
+"""The cost of accuracy: errors of all methods of simulating a scene over their processor time."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
 from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missing
 
 _MARKERS = "osD^vP<"
-"""One more than there are colours: that many times as many ways look different."""
+"""Markers: one more than colours, so that many combinations of both look different."""
 _NEEDED = ("cost", "error", "name", "failure", "on_front", "is_model")
 _ROUNDING = 1e-16
-"""Error below which nothing is told apart; an error of 0 is drawn there."""
+"""Error below which values are equal; an error of 0 is drawn there."""
 _ROWS = 12
-"""mm: two rows of names below the panel."""
+"""Height of two rows of names below the panel, mm."""
 _SIGNS = 3
-"""Rows of names for what is no way: crosses, rings, the error of the reference."""
+"""Rows of names for other entries: crosses, rings, the error of the reference."""
 
 
 def draw_accuracy(dataset: xr.Dataset) -> Figure:
-    """Draw the error of each way over its cost, a line for each way and a mark for each setting.
+    """Draw the error of each method over its cost, a line for each method and a mark for each setting.
 
-    The line of those that no other way beats is drawn behind them; what failed is a cross at the top, where its time
-    went; another model of the same thing is hollow. A way that simulated a part of the time has a ring: its cost is
-    extrapolated, and its error is that of the part. The figure is one column (85 mm) wide. A missing variable raises
-    DatasetError.
+    A line behind the methods joins the settings that no other method beats. A failed setting is a cross at the top, at
+    its time; another model of the same scene is hollow. A setting that simulated a part of the time has a ring: its
+    cost is extrapolated, and its error belongs to that part. The figure is one column (85 mm) wide. A missing variable
+    raises DatasetError.
     """
     refuse_missing(missing_from(dataset, _NEEDED), "what `vibroimpact accuracy` writes")
     names = list(dict.fromkeys(str(name) for name in dataset["name"].values))
@@ -65,7 +65,7 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
 
 
 def _show_whole_decades(axis: Axes, costs: np.ndarray) -> None:
-    """Let the axis of times begin and end at powers of ten, which alone are labelled."""
+    """Let the axis of times begin and end at powers of ten; only these are labelled."""
     known = costs[np.isfinite(costs) & (costs > 0.0)]
     if known.size:
         axis.set_xlim(
@@ -75,7 +75,7 @@ def _show_whole_decades(axis: Axes, costs: np.ndarray) -> None:
 
 
 def _write_scores(axis: Axes, dataset: xr.Dataset, errors: np.ndarray) -> None:
-    """Write what a replay accounts for of its recording beside each way that is no other model."""
+    """Write the variance of the recording that a replay accounts for next to each setting, other models excepted."""
     if "variance_accounted_for" not in dataset:
         return
     scores, costs = dataset["variance_accounted_for"].values, dataset["cost"].values
@@ -91,7 +91,7 @@ def _write_scores(axis: Axes, dataset: xr.Dataset, errors: np.ndarray) -> None:
 
 
 def _ring_parts(axis: Axes, dataset: xr.Dataset, errors: np.ndarray, good: np.ndarray) -> None:
-    """Draw a ring around each way that simulated a part of the time."""
+    """Draw a ring around each setting that simulated a part of the time."""
     if "part" not in dataset:
         return
     its = good & (dataset["part"].values < 1.0)
@@ -152,7 +152,7 @@ def _draw_way(
         "linewidth": 0.8,
     }
     shown = its & good
-    if "part" in dataset:  # errors of parts of the time are no line with those of all of it
+    if "part" in dataset:  # errors over a part of the time are not joined with others
         parts = shown & (dataset["part"].values < 1.0)
         shown = shown & ~parts
         axis.plot(
@@ -175,7 +175,7 @@ def _draw_way(
 
 
 def _explain_failures(axis: Axes, dataset: xr.Dataset) -> None:
-    """Say in the legend what a cross is, where there is one."""
+    """Explain the crosses in the legend, if there are any."""
     if (dataset["failure"].values != "").any():
         label = "no error: impacts missed, or no end"
         axis.plot([], [], "x", color="0.4", markersize=5.0, linestyle="none", label=label)

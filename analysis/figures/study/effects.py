@@ -1,4 +1,4 @@
-"""What effects cost: the share of each in the time of a run, and what is otherwise without it."""
+"""The cost of effects: the share of each effect in the time of a run, and the change of the results without it."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from vibroimpact.analysis.figures.study.needed import missing_from, refuse_missi
 _NEEDED = ("share", "seconds", "run_seconds", "name", "changes")
 _BAR_MM = 9
 _LETTERS, _LINE_MM = 6, 2.9
-"""Size of what is written beside a bar, points, and height of its lines."""
+"""Size of the text next to a bar, points, and height of its lines, mm."""
 _CONVERGENCE_MM = 45
 _WORDS = 0.75
-"""Room for what is written beside the bars, over that of the bars."""
+"""Width of the text next to the bars, over that of the bars."""
 _LONGEST = 24
-"""Letters in a line of what is written beside a bar."""
+"""Letters in a line of the text next to a bar."""
 _CLASSES = ("orbit", "orbit_without")
 
 
 def draw_effects(dataset: xr.Dataset) -> Figure:
-    """Draw a bar for the share of each effect, a point for each pair of runs, and what changes without it.
+    """Draw a bar for the share of each effect, a point for each pair of runs, and the changes without the effect.
 
     The figure is one column (85 mm) wide. A missing variable, or no effect, raises DatasetError.
     """
@@ -37,10 +37,10 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     parts = 100.0 * dataset["seconds"].values / dataset["run_seconds"].values[:, None]
     converges = "modes_tried" in dataset.attrs
     with page_style():
-        beside = _beside(dataset)
-        rows = np.array([max(_BAR_MM, _LINE_MM * (1 + words.count("\n"))) for words in beside])
+        texts = _bar_texts(dataset)
+        rows = np.array([max(_BAR_MM, _LINE_MM * (1 + words.count("\n"))) for words in texts])
         bars = 25 + float(rows.sum())
-        # bars are as far from each other as what is written beside them is high
+        # bars are as far apart as the text next to them is high
         places = ((rows.sum() - np.cumsum(rows) + 0.5 * rows) / _BAR_MM) - 0.5
         figure = canvas(bars + (_CONVERGENCE_MM if converges else 0))
         if converges:
@@ -50,7 +50,7 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
             axis = figure.subplots()
         axis.barh(places, 100.0 * dataset["share"].values, height=0.6, color=LINE, alpha=0.5)
         axis.plot(parts, np.broadcast_to(places[:, None], parts.shape), ".", color=MARK, markersize=2.5)
-        for place, words in zip(places, beside, strict=True):
+        for place, words in zip(places, texts, strict=True):
             axis.text(
                 0.98,
                 place,
@@ -71,8 +71,8 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _beside(dataset: xr.Dataset) -> list[str]:
-    """Return what is written beside each bar: what is otherwise without it, and below as a whole."""
+def _bar_texts(dataset: xr.Dataset) -> list[str]:
+    """Return the text next to each bar: the changes without the effect, class and displacement range below."""
     found = []
     for row, words in enumerate(dataset["changes"].values):
         lines = [str(words)]
@@ -89,17 +89,17 @@ def _beside(dataset: xr.Dataset) -> list[str]:
 
 
 def _draw_convergence(axis: Axes, dataset: xr.Dataset) -> None:
-    """Draw how far each number of modes that was tried is from the most, and which was taken."""
+    """Draw the distance of each number of modes from the largest number, and the chosen number."""
     tried = json.loads(dataset.attrs["modes_tried"])
-    told = {int(n): off for n, off in tried.items() if isinstance(off, float | int) and off > 0.0}
+    distances = {int(n): off for n, off in tried.items() if isinstance(off, float | int) and off > 0.0}
     other = [int(n) for n, off in tried.items() if isinstance(off, str)]
     tolerance, taken = float(dataset.attrs["tolerance"]), int(dataset.attrs["modes_found"])
     axis.axhline(tolerance, color="0.5", linewidth=0.8, linestyle="--", label="tolerance")
-    axis.loglog(list(told), list(told.values()), "o-", color=LINE, markersize=3, linewidth=0.8)
-    if taken in told:
-        axis.plot(taken, told[taken], "o", color=MARK, markersize=5, label=f"taken: {taken}")
+    axis.loglog(list(distances), list(distances.values()), "o-", color=LINE, markersize=3, linewidth=0.8)
+    if taken in distances:
+        axis.plot(taken, distances[taken], "o", color=MARK, markersize=5, label=f"taken: {taken}")
     if other:
-        top = 2.0 * max([tolerance, *told.values()])
+        top = 2.0 * max([tolerance, *distances.values()])
         axis.plot(other, [top] * len(other), "x", color=LINE, markersize=4, label="another motion")
     numbers = sorted(map(int, tried))
     axis.set_xticks(numbers, [str(n) for n in numbers], fontsize=6)

@@ -1,4 +1,4 @@
-"""Hard cases: what was measured of each, beside its bound."""
+"""Hard cases: the measured values of each case, with its bound."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _NEEDED = (
 _COLUMNS = 3
 _PANEL_MM, _PANEL_WIDTH = 40, 60 / 25.4
 _SMALLEST = 1e-17
-"""What an error of 0 is drawn at where the axis is logarithmic."""
+"""Place of an error of 0 on a logarithmic axis."""
 
 
 def draw_hard_cases(dataset: xr.Dataset) -> Figure:
-    """Draw what was measured of each case over what makes it hard, and its bound; three panels beside each other.
+    """Draw the measured values of each case over its difficulty, with its bound; three panels side by side.
 
     A missing variable, or no case, raises DatasetError.
     """

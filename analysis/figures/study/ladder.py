@@ -1,4 +1,4 @@
-"""Figures of a ladder of steps or tolerances: how errors fall with the step, and what they cost."""
+"""Figures of a ladder of steps or tolerances: decrease of the errors with the step, and their cost."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.analysis.landmarks import observed_order
 _QUANTITIES = ("error", "energy_drift")
 _MARKERS = "os^Dvx"
 _MEASURED = "Draw what a benchmark of coupling measured."
-#: Most steps that are all labelled in one column's width.
+#: Largest number of steps that are all labelled in one column's width.
 MOST_LABELS = 4
 _WORDS = {"gauss_seidel": "Gauss-Seidel", "jacobi": "Jacobi"}
 
@@ -28,8 +28,8 @@ def convergence(dataset: xr.Dataset) -> Figure:
     Parameters
     ----------
     dataset : xarray.Dataset
-        `error` and `energy_drift` on `exchange` (names) and `macro_step` (numbers, with `units`), as a
-        benchmark measures them; magnitudes are drawn. The attribute `title` is written above.
+        `error` and `energy_drift` on `exchange` (names) and `macro_step` (numbers, with `units`), as a benchmark
+        measures them; magnitudes are drawn. The attribute `title` is written above.
 
     Returns
     -------
@@ -62,14 +62,14 @@ def convergence(dataset: xr.Dataset) -> Figure:
 
 
 def work_precision(dataset: xr.Dataset) -> Figure:
-    """Draw what accuracy costs: the errors of a ladder over the seconds that they took.
+    """Draw the cost of accuracy: the errors of a ladder over their wall time.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        `error`, and `energy_drift` where there is one, and `wall_time` (s), all on the steps or tolerances of the
-        ladder and, where several ways are compared, on their names. Magnitudes are drawn; what has no error or no
-        time leaves a gap. The attribute `title` is written above.
+        `error`, optionally `energy_drift`, and `wall_time` (s), all on the steps or tolerances of the ladder. Several
+        methods have a second dimension with their names. Magnitudes are drawn; a missing error or time leaves a gap.
+        The attribute `title` is written above.
 
     Returns
     -------
@@ -90,21 +90,21 @@ def work_precision(dataset: xr.Dataset) -> Figure:
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('wall time (s)', 'error (m)')
     """
-    along, ways = _ladder_of(dataset)
+    along, dim = _ladder_of(dataset)
     panels = [name for name in _QUANTITIES if name in dataset and along in dataset[name].dims]
     with page_style():
         figure = canvas(10 + 55 * len(panels))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, name in zip(axes, panels, strict=True):
-            for place, way in enumerate(dataset[ways].values if ways else [""]):
-                line = (dataset.sel({ways: way}) if ways else dataset).sortby(along)
+            for place, method in enumerate(dataset[dim].values if dim else [""]):
+                line = (dataset.sel({dim: method}) if dim else dataset).sortby(along)
                 values, seconds = line[name].values, line["wall_time"].values
                 shown = (values != 0.0) & np.isfinite(values) & (seconds > 0.0)
-                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _way(str(way)))
+                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _method_words(str(method)))
             axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
         axes[-1].set_xlabel(label(dataset["wall_time"]))
         _label_seconds(axes[-1])
-        if ways:
+        if dim:
             figure.legend(
                 *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
             )
@@ -113,7 +113,7 @@ def work_precision(dataset: xr.Dataset) -> Figure:
 
 
 def _label_seconds(axis: Axes) -> None:
-    """Label few enough seconds of less than two decades that no label covers another; matplotlib labels more."""
+    """Label few values of time over less than two decades, without overlap; matplotlib would label more."""
     first, last = axis.get_xlim()
     if last < 100.0 * first:
         few = MaxNLocator(MOST_LABELS) if last < 10.0 * first else LogLocator(subs=(1.0, 2.0, 5.0))
@@ -123,7 +123,7 @@ def _label_seconds(axis: Axes) -> None:
 
 
 def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
-    """Return the dimension of the steps or tolerances, and that of the ways that are compared."""
+    """Return the dimension of the steps or tolerances, and the dimension of the compared methods."""
     expected = "error and wall_time (s) on a ladder of steps or tolerances"
     refuse_missing(missing_from(dataset, ("error", "wall_time")), expected, _MEASURED)
     dims = [str(name) for name in dataset["error"].dims]
@@ -136,7 +136,7 @@ def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
 
 
 def _refuse_other(dataset: xr.Dataset) -> None:
-    """Refuse a dataset that is no ladder of macro steps."""
+    """Raise DatasetError unless a dataset is a ladder of macro steps."""
     missing = missing_from(dataset, (*_QUANTITIES, "exchange", "macro_step"))
     other = [
         f"{name} on them"
@@ -152,7 +152,7 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
     order = np.argsort(step)
     for place, exchange in enumerate(quantity["exchange"].values):
         values = quantity.values[place]
-        # A logarithm shows no zero: what is exact leaves a gap.
+        # A logarithm has no zero: an exact value leaves a gap.
         shown = np.where(values == 0.0, np.nan, np.abs(values))
         words = _entry(str(exchange), observed_order(step, values))
         _draw_line(axis, step[order], shown[order], place, words)
@@ -170,7 +170,7 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
 
 
 def _draw_line(axis: Axes, x: NDArray[np.float64], y: NDArray[np.float64], place: int, words: str) -> None:
-    """Draw one way to compute, by its colour and its marker."""
+    """Draw the line of one method, with its colour and its marker."""
     axis.plot(
         x,
         y,
@@ -183,20 +183,20 @@ def _draw_line(axis: Axes, x: NDArray[np.float64], y: NDArray[np.float64], place
 
 
 def _mark_steps(axis: Axes, steps: NDArray[np.float64]) -> None:
-    """Label the steps that were measured, every other one where there are many."""
+    """Label the measured steps, only every other one if they are many."""
     marked = steps[:: 1 if len(steps) <= MOST_LABELS else 2]
     axis.set_xticks(marked, [f"{step:.3g}" for step in marked])
     axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _entry(exchange: str, order: float) -> str:
-    """Return the legend of one exchange; where there are no errors to compare it has no order."""
-    name = _way(exchange)
+    """Return the legend entry of one exchange; without errors to compare it has no order."""
+    name = _method_words(exchange)
     return f"{name} {order:.2f}" if np.isfinite(order) else f"{name} (none)"
 
 
-def _way(name: str) -> str:
-    """Return an exchange, or another way to compute, in words."""
+def _method_words(name: str) -> str:
+    """Return the name of an exchange or of another method, in words."""
     return _WORDS.get(name, name.replace("_", " "))
 
 

@@ -1,4 +1,4 @@
-"""What a figure needs of a dataset, refused in the same words where it is not there."""
+"""The variables that a figure needs; missing ones are refused in the same words everywhere."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from vibroimpact.fmus.errors import DatasetError
 
 
 def missing_from(dataset: xr.Dataset, needed: Iterable[str]) -> list[str]:
-    """Return which of the variables that a figure needs a dataset does not have."""
+    """Return the needed variables that a dataset lacks."""
     return [name for name in needed if name not in dataset.variables]
 
 
 def refuse_missing(missing: Sequence[str], expected: str, advice: str = "") -> None:
-    """Raise DatasetError, with advice, if names are missing in a dataset of which a figure is drawn.
+    """Raise DatasetError, with advice, if a dataset lacks variables of its figure.
 
     >>> refuse_missing(["cost", "error"], "what `vibroimpact accuracy` writes")
     Traceback (most recent call last):
@@ -23,5 +23,5 @@ def refuse_missing(missing: Sequence[str], expected: str, advice: str = "") -> N
     vibroimpact.fmus.errors.DatasetError: figure: expected what `vibroimpact accuracy` writes, got no cost, no error.
     """
     if missing:
-        said = f"figure: expected {expected}, got no {', no '.join(missing)}."
-        raise DatasetError(f"{said} {advice}".rstrip())
+        problem = f"figure: expected {expected}, got no {', no '.join(missing)}."
+        raise DatasetError(f"{problem} {advice}".rstrip())

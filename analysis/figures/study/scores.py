@@ -1,4 +1,4 @@
-"""The figure of a campaign of replays: how much of the measured variance each point accounts for."""
+"""The figure of a campaign of replays: the share of the measured variance that each point accounts for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.analysis.figures.page import COLOURS, canvas, label
 from vibroimpact.analysis.figures.sweep.diagrams import varied
 from vibroimpact.fmus.errors import DatasetError
 
-#: More lines than this in a panel cannot be told apart.
+#: Largest number of distinguishable lines in a panel.
 MOST_LINES = 12
 _STYLES = ("-", "--", ":", "-.")
 
@@ -49,7 +49,7 @@ def draw_scores(dataset: xr.Dataset) -> Figure:
 
 
 def _draw_pair(axis: Axes, scores: xr.DataArray, along: str, others: list[str]) -> None:
-    """Draw the lines of one compared pair: colours along the last of the other parameters, dashes along the rest."""
+    """Draw the lines of one compared pair: colours for the last of the other parameters, dashes for the rest."""
     values = [scores[name].values.tolist() for name in others]
     for place, chosen in enumerate(product(*values)):
         point = dict(zip(others, chosen, strict=True))
@@ -65,5 +65,5 @@ def _draw_pair(axis: Axes, scores: xr.DataArray, along: str, others: list[str]) 
             label=", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in point.items()),
         )
     axis.set_ylabel("variance accounted for (%)")
-    # a model without any skill may be far below zero: what matters is above
+    # a model without any skill may be far below zero: the relevant range is above
     axis.set_ylim(bottom=max(0.0, axis.get_ylim()[0]))

@@ -20,9 +20,9 @@ _STYLES = {"up": "-", "down": "--"}
 
 
 def draw_sensitivity(dataset: xr.Dataset) -> Figure:
-    """Draw the indices of each quantity in a panel of its own: bars, or with one more key the total indices along it.
+    """Draw the indices of each quantity in its own panel: bars, or total indices along one further key.
 
-    A missing variable, or more than one such key, raises DatasetError.
+    A missing variable, or more than one further key, raises DatasetError.
     """
     missing = [name for name in _NEEDED if name not in dataset]
     if missing:
@@ -56,7 +56,7 @@ def _draw_bars(axis: Axes, own: xr.Dataset) -> None:
     places = np.arange(own.sizes["parameter"])[::-1].astype(np.float64)
     for shift, (order, (colour, words)) in zip((0.5, -0.5), _ORDERS.items(), strict=True):
         values, ends = own[order].values, own[f"{order}_interval"].values
-        # a quantile of resamples may lie on one side of the estimate
+        # a quantile of resamples may lie on the other side of the estimate
         errors = np.maximum([values - ends[:, 0], ends[:, 1] - values], 0.0)
         style = {"elinewidth": 0.7, "capsize": 1.5}
         axis.barh(
@@ -69,7 +69,7 @@ def _draw_bars(axis: Axes, own: xr.Dataset) -> None:
 
 
 def _draw_lines(axis: Axes, own: xr.Dataset, along: str) -> None:
-    """Draw total indices with their intervals, up and down sweeps apart."""
+    """Draw total indices with their intervals, one line for each direction of the sweep."""
     values = own[along].values
     for number, parameter in enumerate(own["parameter"].values.tolist()):
         colour = COLOURS[number % len(COLOURS)]

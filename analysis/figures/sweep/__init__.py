@@ -1,1 +1,1 @@
-"""Motions along a sweep, or over two parameters."""
+"""Figures of motions along a sweep, or over two parameters."""

@@ -27,15 +27,15 @@ KIND = "class_kind"
 _COLOURS = ("#0F4C81", "#56A5DC", "#3C7D3C", "#9BC46B", "#7A4B9A", "#C79BD6", "#8A6D00", "#E0B53A")
 OWN_COLOURS = {"no impacts": "0.85", "chaos": "#B5410B", "rest": "0.55", "unknown": "0.35"}
 _SHORT = 10
-"""Letters of a name of the legend, of which four fit beside each other."""
+"""Letters of a name up to which four names of the legend fit side by side."""
 OTHER_COLOUR = "#EFD9B4"
-"""Light, and no colour of a class: chaos and what is rare are not to be taken for each other."""
+"""Light, and different from all class colours: rare classes must not look like chaos."""
 _MOST_NAMED = 8
-"""Classes with a colour of their own; those of fewer runs are `other`."""
+"""Number of classes with their own colour; rarer classes are `other`."""
 
 
 def draw_classes(dataset: xr.Dataset) -> Figure:
-    """Draw the class of each run over one or two swept parameters. No grid of them raises DatasetError."""
+    """Draw the class of each run over one or two swept parameters. DatasetError: the runs form no grid."""
     names = in_order_of_the_scene(dataset, varied(dataset))
     if len(names) == 2 and not ({"run", "point"} & set(dataset["run_id"].dims)):
         return _draw_map(dataset, names[0], names[1])
@@ -47,7 +47,7 @@ def draw_classes(dataset: xr.Dataset) -> Figure:
 def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
     """Return the class of each run in words, in the shape of the runs; empty where there is no run.
 
-    Their impacts are in the same dataset, or in `impacts_of`.
+    The impacts of the runs are in the same dataset, or in `impacts_of`.
     """
 
     def named(kind: int, impacts: int, periods: int, stop: int) -> str:
@@ -66,7 +66,7 @@ def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
 
 
 def _only_stop(dataset: xr.Dataset) -> Any:
-    """Return for each `run_id` the only stop that a run of a body with several stops hits; 0 for any other run."""
+    """Return the only stop that a run hits, for each `run_id`, if its body has several; 0 for any other run."""
     written = scene_of(dataset.attrs).get("stop")
     recorded = {"impact_run", "impact_contact"} <= set(dataset.variables) and dataset.sizes["impact"]
     if not isinstance(written, list) or len(written) < 2 or not recorded:
@@ -80,7 +80,7 @@ def _only_stop(dataset: xr.Dataset) -> Any:
 
 
 def _palette(names: Any) -> dict[str, str]:
-    """Return the colour of each class: the frequent ones have one of their own."""
+    """Return the colour of each class; frequent classes have their own colour."""
     counts = Counter(str(name) for name in names.ravel() if name)
     own = [name for name, _ in counts.most_common() if name not in OWN_COLOURS][:_MOST_NAMED]
     palette = dict(zip(sorted(own), _COLOURS, strict=False))
@@ -133,9 +133,9 @@ def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
 
 
 def _points(dataset: xr.Dataset, runs: xr.Dataset) -> tuple[str, Any, Any]:
-    """Return the quantity that shows runs, and of each of its values the place of its run, and itself.
+    """Return the quantity that represents runs, and for each of its values the place of its run, and the value.
 
-    A run without an impact has the speed 0, where impacts are all that is recorded.
+    If only impacts are recorded, a run without an impact has the speed 0.
     """
     quantity = next((q for q in ("displacement_max", "strobe_displacement") if q in runs), None)
     if quantity is not None:

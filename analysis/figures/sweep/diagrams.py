@@ -19,16 +19,16 @@ from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.messages import Argument, message
 
-# Relative difference of runs on one orbit: rounding, and what is left of their transients.
+# Relative difference of runs on one orbit: rounding, and remains of their transients.
 _NOISE = 1e-9
 
-# Where both sweeps agree the small dark crosses lie inside the large light rings, and both stay visible.
+# The small dark crosses lie inside the large light rings where both sweeps agree, and both stay visible.
 _SWEEPS: dict[str, dict[str, Any]] = {
     "up": {"marker": "o", "color": "#56A5DC", "markersize": 2.6, "markeredgewidth": 0.5, "fillstyle": "none"},
     "down": {"marker": "x", "color": "#B5410B", "markersize": 1.5, "markeredgewidth": 0.5},
     "independent": {"marker": ".", "color": "#20567D", "markersize": 1.6, "markeredgewidth": 0.0},
 }
-# Changes of that style for impacts on the second stop, the third: all marks stay visible where stops are hit alike.
+# Changes of this style for impacts on the second and third stop: marks stay visible where stops agree.
 _OF_STOPS: tuple[dict[str, dict[str, Any]], ...] = (
     {"up": {}, "down": {}, "independent": {}},
     {
@@ -43,20 +43,20 @@ _OF_STOPS: tuple[dict[str, dict[str, Any]], ...] = (
     },
 )
 
-# Distinct values above which a column is a crowd; area (points squared) and least opacity of a point in a crowd;
-# distance, over the largest value, below which two values are one.
-_CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
-# Median of a map, over its largest value, below which a linear scale would leave half of it dark.
+# Distinct values above which a column is crowded, then the area (points squared) and the smallest opacity of its
+# points. The last number is the distance, over the largest value, below which two values are equal.
+_CROWDED, _DOT, _FAINTEST, _DISTINCT_STEP = 20, 0.7, 0.3, 1e-3
+# Median of a map, over its largest value, below which a linear scale would leave half of the map dark.
 _DARK = 0.15
-# Quantile of the values at which a logarithmic scale begins, so that one grazing impact does not stretch it.
+# Quantile of the values at the start of a logarithmic scale, so that one grazing impact does not stretch it.
 _LOWEST = 0.01
-# Ratio of the ends of a swept range from which a logarithmic axis tells more.
-_WIDE = 8.0
+# Ratio of the ends of a swept range above which a logarithmic axis shows more.
+_WIDE_RANGE = 8.0
 # Largest ratio of the ends of a logarithmic scale.
 _WIDEST = 1e6
 # Cells of a map of scattered points along each axis.
 _CELLS = 500
-# Numbers of runs and their periods, and of their impacts, that are drawn over a swept parameter.
+# Variables of runs, of their periods and of their impacts that are drawn over a swept parameter.
 _OF_PERIODS = (
     *("displacement_range", "displacement_max", "displacement_min"),
     *("strobe_displacement", "strobe_velocity", "impacts_per_period"),
@@ -72,12 +72,12 @@ _NEITHER = (
 
 
 def varied(dataset: xr.Dataset) -> list[str]:
-    """Return the swept parameters that take more than one value; one stands for those that move together."""
+    """Return the swept parameters with more than one value; one stands for parameters that move together."""
     together: dict[str, list[str]] = {}
     for name in swept_names(dataset):
         along = dataset[name].attrs.get(SWEPT_ALONG, name)
         if dataset[name].size > 1:
-            # points that are no grid stand for two parameters
+            # points without a grid stand for two parameters
             together.setdefault(name if along == SCATTERED else along, []).append(name)
     return [_standing_for(dataset, along, names) or names[0] for along, names in together.items()]
 
@@ -89,7 +89,7 @@ def _standing_for(dataset: xr.Dataset, along: str, names: list[str]) -> str | No
 def on_axes(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
     """Return values over two swept parameters, shape (across, along), both ascending.
 
-    The axis of parameters that move together is the one that stands for all. Where none does, it is their place.
+    The axis of parameters that move together is the parameter that stands for all. Otherwise it is their place.
     """
     axes = []
     for name in (across, along):
@@ -104,7 +104,7 @@ def on_axes(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
 
 
 def in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
-    """Return swept parameters as the scene lists them; a displacement before a velocity, as in any phase plane."""
+    """Return swept parameters in the order of the scene; a displacement comes before a velocity."""
     listed = [column_of(key, names) for key in swept_keys(scene_of(dataset.attrs))]
     plane = ("displacement_start", "velocity_start")
 
@@ -116,7 +116,7 @@ def in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
 
 
 def one_value(values: Any) -> float | None:
-    """Return the value that all numbers share but for rounding; None where they differ, or where there is none.
+    """Return the common value of numbers that differ only by rounding; None if they differ, or without numbers.
 
     >>> one_value([3.0037242956181855, 3.003724295618186, float("nan")]), one_value([1.0, 1.001])
     (3.0037242956181855, None)
@@ -130,13 +130,13 @@ def one_value(values: Any) -> float | None:
 
 
 def is_logarithmic(values: Any) -> bool:
-    """Return whether values are those of a sweep with `spacing = "log"`: one ratio, one sign, and a wide range.
+    """Return whether values come from a sweep with `spacing = "log"`: one ratio, one sign, and a wide range.
 
     >>> is_logarithmic([10.0, 100.0, 1000.0]), is_logarithmic([1.0, 2.0, 3.0]), is_logarithmic([2.0, 2.2, 2.42])
     (True, False, False)
     """
     ordered = np.sort(np.asarray(values, dtype=np.float64))
-    if ordered.size < 3 or not ordered[0] > 0.0 or ordered[-1] < _WIDE * ordered[0]:
+    if ordered.size < 3 or not ordered[0] > 0.0 or ordered[-1] < _WIDE_RANGE * ordered[0]:
         return False
     steps = np.diff(np.log(ordered))
     return bool(np.ptp(steps) <= _NOISE * abs(float(steps.max())))
@@ -171,9 +171,9 @@ def refuse_variable(dataset: xr.Dataset, variable: str, whose: str) -> None:
 
 
 def draw_bifurcation(dataset: xr.Dataset, variable: str | None = None) -> Figure:
-    """Draw displacement range and impact velocity against the swept parameter, up and down told apart.
+    """Draw displacement range and impact velocity against the swept parameter, with separate marks for up and down.
 
-    A variable, of `drawable_variables`, is drawn instead. What was not recorded raises DatasetError.
+    A variable of `drawable_variables` replaces both. Variables that were not recorded raise DatasetError.
     """
     if variable is not None:
         refuse_variable(dataset, variable, "the sweep")
@@ -185,7 +185,7 @@ def draw_bifurcation(dataset: xr.Dataset, variable: str | None = None) -> Figure
 
 
 def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
-    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point."""
+    """Draw quantities against the single swept parameter, a panel for each: every run, period or impact is a point."""
     if len(varied(dataset)) != 1:
         raise DatasetError(wrong_sweep("one swept parameter", dataset))
     (name,) = varied(dataset)
@@ -210,8 +210,8 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
         )
         _fit_limits(axis, drawn)
         if drawn.size > 1 and one_value(drawn) is not None:
-            said = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
-            axis.set_title(said, fontsize=7, loc="left")
+            title = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
+            axis.set_title(title, fontsize=7, loc="left")
     axes[-1].set_xlabel(label(dataset[name]))
     if is_logarithmic(dataset[name].values):
         axes[-1].set_xscale("log")
@@ -222,7 +222,7 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
 
 
 def _stops_hit(dataset: xr.Dataset) -> list[int | None]:
-    """Return the stops whose impacts are told apart; one None where only one stop is hit."""
+    """Return the stops whose impacts have separate marks; a single None if only one stop is hit."""
     if "impact_contact" not in dataset.variables:
         return [None]
     found: list[int | None] = [int(stop) for stop in np.unique(dataset["impact_contact"].values)]
@@ -239,7 +239,7 @@ def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
 
 
 def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None, shown: Any) -> None:
-    """Draw the points of one branch, or those of one stop; the points of a crowd are small and faint."""
+    """Draw the points of one branch, or of one stop; points in a crowded column are small and faint."""
     crowd, style, words = crowded(x, y)[shown], dict(_SWEEPS[direction]), [f"{direction} sweep"]
     if stop is not None:
         style |= _OF_STOPS[(stop - 1) % len(_OF_STOPS)][direction]
@@ -253,7 +253,7 @@ def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None, s
 
 
 def _fit_limits(axis: Axes, drawn: Any) -> None:
-    """Fit the vertical axis to its points, from 0 where none is below; rounding does not fill it."""
+    """Fit the vertical axis to its points, from 0 if none is below; rounding does not fill it."""
     low, high = float(np.nanmin(drawn, initial=np.inf)), float(np.nanmax(drawn, initial=-np.inf))
     if not low < 0.0:
         axis.set_ylim(0.0, 1.05 * high if high > 0.0 else 1.0)
@@ -266,9 +266,9 @@ def _fit_limits(axis: Axes, drawn: Any) -> None:
 def _points(
     dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str
 ) -> tuple[Any, Any, Any]:
-    """Return the points of one branch and the stop of each: one for each run, or for each period or impact of its runs.
+    """Return the points of one branch and their stops: one point for each run, or for each period or impact.
 
-    What is no impact has stop 0.
+    Points other than impacts have stop 0.
     """
     parameter = runs[name].values
     # one direction alone is a scalar
@@ -277,7 +277,7 @@ def _points(
         values = runs[quantity].values[chosen]
         x = np.repeat(parameter[chosen], values[:1].size)
         return x, values.ravel(), np.zeros(x.size)
-    # Positions of the runs in the file lead from each impact to the parameter of its run.
+    # Positions of the runs in the file map each impact to the parameter of its run.
     at = np.full(int(dataset["impact_run"].values.max(initial=-1)) + 1, np.nan)
     ids = runs["run_id"].values
     inside = chosen & (ids < at.size)
@@ -289,7 +289,7 @@ def _points(
 
 
 def crowded(x: Any, y: Any) -> Any:
-    """Return how crowded the column of each point is: its distinct values over those that can be told apart.
+    """Return the crowding of the column of each point: its distinct values over the largest distinguishable number.
 
     >>> crowded([1.0] * 3 + [2.0] * 300, [0.5] * 3 + [k / 300 for k in range(300)])[[0, -1]].tolist()
     [0.05, 15.0]
@@ -297,9 +297,9 @@ def crowded(x: Any, y: Any) -> Any:
     places, owner = np.unique(x, return_inverse=True)
     values = np.asarray(y, dtype=np.float64)
     size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
-    told = np.unique(np.column_stack([owner, np.round(values / (_TOLD_APART * size))]), axis=0)
-    distinct = np.bincount(told[:, 0].astype(np.intp), minlength=places.size)
-    return distinct[owner] / _CROWD
+    rounded = np.unique(np.column_stack([owner, np.round(values / (_DISTINCT_STEP * size))]), axis=0)
+    distinct = np.bincount(rounded[:, 0].astype(np.intp), minlength=places.size)
+    return distinct[owner] / _CROWDED
 
 
 def draw_map(dataset: xr.Dataset) -> Figure:
@@ -358,7 +358,7 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
 
 
 def _nearest(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
-    """Return values of scattered points on a fine grid, each cell with that of the nearest point."""
+    """Return values of scattered points on a fine grid; each cell has the value of the nearest point."""
     from scipy.spatial import cKDTree
 
     columns = [values[along].values, values[across].values]
@@ -384,14 +384,14 @@ def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[str]:
-    """Draw one colour map over (vertical, horizontal) with its bar; return what must be said of it.
+    """Draw one colour map over (vertical, horizontal) with its bar; return the notes about it.
 
     `of_all` are the values of all branches, which share their colours.
     """
     across, along = values.dims
     norm, same = _norm(of_all), one_value(of_all)
     axis.set_facecolor("0.88")
-    # a logarithm leaves what is below its scale without a colour
+    # a logarithm gives no colour to values below its scale
     lowest = float(norm.vmin or 0.0) if isinstance(norm, LogNorm) else -math.inf
     mesh = axis.pcolormesh(
         edges(values[along].values),
@@ -401,7 +401,7 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
         norm=norm,
         rasterized=True,
     )
-    # Long numbers of small distances would run into each other.
+    # Long numbers of small distances would overlap.
     axis.xaxis.set_major_locator(MaxNLocator(4))
     for name, set_scale in ((along, axis.set_xscale), (across, axis.set_yscale)):
         if is_logarithmic(values[name].values):
@@ -427,7 +427,7 @@ def _norm(of_all: Any) -> Normalize:
     if not finite.size:
         return Normalize(0.0, 1.0)
     if same is not None:
-        # a range of rounding would be drawn as a pattern
+        # a range of rounding errors would look like a pattern
         room = max(0.5 * abs(same), sys.float_info.min)
         return Normalize(same - room, same + room)
     low, high = float(finite.min()), float(finite.max())

@@ -1,4 +1,4 @@
-"""Figure of how often a body impacts along a sweep, beside a shifted natural frequency: thesis figure 2.7."""
+"""Figure of the impact frequency of a body along a sweep, with a shifted natural frequency: thesis figure 2.7."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _FEWEST = 2
 def draw_impact_frequency(dataset: xr.Dataset) -> Figure:
     """Draw the mean angular frequency of the impacts of each run over the swept key.
 
-    Where an undamped mass is let go at rest, without a force, the curve of thesis (2.35) is drawn too: it is exact for
-    an elastic stop.
+    The curve of thesis (2.35) is drawn too if an undamped mass is released at rest, without a force. The curve is exact
+    for an elastic stop.
     """
     swept = varied(dataset)
     if len(swept) != 1 or "impact_time" not in dataset:
@@ -48,7 +48,7 @@ def draw_impact_frequency(dataset: xr.Dataset) -> Figure:
 
 
 def _frequencies(dataset: xr.Dataset, run_ids: Floats) -> Floats:
-    """Return 2 pi over the mean interval between impacts of each run, rad/s; NaN where there are too few."""
+    """Return 2 pi over the mean interval between impacts of each run, rad/s; NaN for too few impacts."""
     owners = dataset["impact_run"].values
     order = np.argsort(owners, kind="stable")
     times, owners = dataset["impact_time"].values[order], owners[order]
@@ -61,7 +61,7 @@ def _frequencies(dataset: xr.Dataset, run_ids: Floats) -> Floats:
 
 
 def _shifted(dataset: xr.Dataset, swept: str, positions: Floats) -> tuple[Floats, Floats] | None:
-    """Return the curve of an undamped mass that is let go from below its upper stop; None of any other scene."""
+    """Return the curve of an undamped mass released from below its upper stop; None for any other scene."""
     scene = scene_of(dataset.attrs)
     stops = scene.get("stop", [])
     body = table(scene, "body")

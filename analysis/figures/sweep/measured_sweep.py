@@ -20,9 +20,9 @@ _OTHER_FREQUENCY = {
     ("frequency", "angular_frequency"): 1.0 / _TURN,
     ("angular_frequency", "frequency"): _TURN,
 }
-"""Factor that makes the second coordinate the first one."""
+"""Factor that converts the second coordinate to the first one."""
 
-# What lies on top is dark and small, what lies below is light and large: where both agree, both stay visible.
+# Upper marks are dark and small, lower marks light and large: both stay visible where they agree.
 _ABOVE: dict[str, dict[str, Any]] = {
     "up": {"marker": "o", "color": "#0F4C81", "markersize": 2.4, "markeredgewidth": 0.5, "fillstyle": "none"},
     "down": {"marker": "x", "color": "#B5410B", "markersize": 2.2, "markeredgewidth": 0.6},
@@ -45,11 +45,11 @@ _TOP = 0.965
 
 
 def draw_measured_sweep(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
-    """Draw the range of each recorded period over the swept parameter, up and down told apart.
+    """Draw the range of each recorded period over the swept parameter, with separate marks for up and down.
 
-    A clipped step has no points, since its range is that of the input; a mark at the top says where it is. What is
-    flagged otherwise has a ring. Another sweep of the same parameter, such as a simulated one, is drawn below (`over`).
-    One that sweeps something else, or has no extrema, raises DatasetError.
+    A clipped step has no points, since its range is the range of the input; a mark at the top shows its place. Steps
+    with other flags have a ring. Another sweep of the same parameter, for example a simulated one, is drawn below
+    (`over`). DatasetError: `over` sweeps another parameter, or has no extrema.
     """
     name = _swept(dataset)
     figure = canvas(65 if over is None else 72)
@@ -70,7 +70,7 @@ def draw_measured_sweep(dataset: xr.Dataset, over: xr.Dataset | None = None) -> 
 
 
 def _swept(dataset: xr.Dataset) -> str:
-    """Return the one swept parameter."""
+    """Return the only swept parameter."""
     names = varied(dataset)
     if len(names) != 1:
         raise DatasetError(wrong_sweep("one swept parameter", dataset))
@@ -82,7 +82,7 @@ def _swept(dataset: xr.Dataset) -> str:
 
 
 def _names(dataset: xr.Dataset, over: xr.Dataset | None) -> tuple[str, str]:
-    """Return what the two are called: measured or simulated, their titles where they are both of one kind."""
+    """Return the names of both sweeps: measured or simulated, or their titles if both are of one kind."""
     kinds = ["measured" if _FLAGS in each else "simulated" for each in (dataset, over) if each is not None]
     if over is None:
         return "", ""
@@ -92,7 +92,7 @@ def _names(dataset: xr.Dataset, over: xr.Dataset | None) -> tuple[str, str]:
 
 
 def _places(dataset: xr.Dataset, name: str) -> Any:
-    """Return the values of the swept parameter of each run, as the one of this name."""
+    """Return the values of the swept parameter of each run, converted to the parameter of this name."""
     own = _swept(dataset)
     if own != name and (name, own) not in _OTHER_FREQUENCY:
         raise DatasetError(f"figure: over: expected a sweep of {name}, got one of {own}.")
@@ -101,10 +101,10 @@ def _places(dataset: xr.Dataset, name: str) -> Any:
 
 
 def _flagged(dataset: xr.Dataset) -> tuple[Any, Any]:
-    """Return which runs are clipped, and which are flagged otherwise."""
+    """Return masks of the clipped runs, and of the runs with other flags."""
     runs = dataset.vibroimpact.runs
     flags = runs[_FLAGS].values if _FLAGS in runs else np.zeros(runs.sizes["run"], dtype=np.int8)
-    # -1 stands for a point that no run covers
+    # -1 marks a point that no run covers
     flags = np.where(flags < 0, 0, flags)
     clipped = (flags & MeasurementFlag.clipped) != 0
     return clipped, (flags != 0) & ~clipped

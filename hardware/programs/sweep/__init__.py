@@ -1,7 +1,7 @@
 """A measured frequency sweep: up and down in steps, extrema of each period (thesis section 3.3.1, appendix B.2.2).
 
-`settings` reads the file of a sweep, `plan` is the output sample by sample, `analysis` says what the samples of a step
-show, `dataset` keeps it, `program` drives and measures, `command` is `vibroimpact rig sweep`.
+`settings` reads the file of a sweep, and `plan` has the output sample by sample. `analysis` evaluates the samples of a
+step, `dataset` keeps the results, `program` drives and measures. `command` is `vibroimpact rig sweep`.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ def measure_sweep(
     rig: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
-    """Measure the frequency sweep of a file on a rig, or go on with it.
+    """Measure the frequency sweep of a file on a rig, or continue it.
 
     Parameters
     ----------
     file : path
-        Of a sweep (TOML).
+        The file of a sweep (TOML).
     folder : path
-        One sweep, one folder; made when absent. The dataset is `dataset.nc` in it.
+        One sweep, one folder; it is made if absent. The dataset in it is `dataset.nc`.
     rig : str, optional
-        `virtual:RIG.toml`, `grpc://host:port` or `local`; else as the file says, else the board of this machine.
+        `virtual:RIG.toml`, `grpc://host:port` or `local`; else as in the file, else the board of this machine.
     progress : bool
-        Show how far it is.
+        Show the progress.
 
     Returns
     -------
     xarray.Dataset
-        As `open_dataset(folder)` gives it. After Ctrl-C it has the steps that were measured, and the same call goes on.
+        As from `open_dataset(folder)`. After Ctrl-C it has the finished steps, and the same call continues.
 
     Raises
     ------
     UsageError
-        The file is wrong, the folder is of something else, or the rig lacks what is asked for: nothing was driven.
+        The file is wrong, the folder has other contents, or the rig lacks a terminal: nothing was driven.
     RigError
-        The rig failed, or the motion is on another branch than before. What was measured is in the folder.
+        The rig failed, or the motion is on another branch than before. Finished steps are in the folder.
 
     Examples
     --------

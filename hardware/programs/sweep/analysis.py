@@ -1,4 +1,4 @@
-"""What the samples of a step say: extrema of each period, their averages, impacts, and what is wrong with them."""
+"""Results of a step's samples: extrema of each period, their averages, impacts, and flags of problems."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from vibroimpact.hardware.programs.sweep.plan import CYCLE, Plan, Segment, recor
 from vibroimpact.hardware.programs.sweep.settings import InputTable, SweepSettings
 
 _ERRORS_OF_A_TREND = 4.0
-"""Standard errors from which on a trend is one."""
+"""Standard errors, above which a trend is significant."""
 _FEWEST_OF_A_TREND = 4
 _OTHER_DRIVE = 0.05
-"""Share of the amplitude by which the drive may differ from the planned one."""
+"""Relative difference of the drive from the planned amplitude, above which it is reported."""
 _SLOPE = 0.01
-"""Share of a period to both sides of an instant, over which the velocity there is a difference."""
+"""Share of a period on both sides of an instant, for the velocity as a difference."""
 _ENDED = 0.5
-"""An excursion of the load cell is over below this part of the threshold."""
+"""Part of the threshold, below which an excursion of the load cell is over."""
 
 
 class Scale(Protocol):
-    """Turns the volts of an input into the unit of what it measures."""
+    """Converts the volts of an input to its measured quantity."""
 
     def __call__(self, volts: Floats, time: Floats, /) -> Floats:
-        """Return values at times (s) since the acquisition began."""
+        """Return values at times (s) since the start of the acquisition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Converter:
     step: float
 
     def at_its_end(self, volts: Floats) -> NDArray[np.bool_]:
-        """Return which samples are at the first or the last step."""
+        """Return a mask of the samples at the first or the last step."""
         return np.asarray((volts <= self.low + 0.5 * self.step) | (volts >= self.high - 1.5 * self.step))
 
 
 @dataclass(frozen=True, slots=True)
 class StepSamples:
-    """The samples of a step, NaN where missing: shape (input, sample), the first one of its segment first."""
+    """The samples of a step, NaN if missing: shape (input, sample), from the first one of its segment."""
 
     segment: Segment
     volts: Floats
@@ -57,10 +57,10 @@ class StepSamples:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredStep:
-    """What a step has shown."""
+    """The results of a step."""
 
     place: int
-    """Along the path."""
+    """Number along the path."""
     highest: Floats
     lowest: Floats
     """`highest` and `lowest`: m, shape (value,), each the mean of `average_periods` periods."""
@@ -70,20 +70,20 @@ class MeasuredStep:
     """Mean number of impacts in a period, shape (value,); None without a load cell."""
     flags: MeasurementFlag
     message: str
-    """What is wrong; empty where nothing is."""
+    """Problems in words, or empty."""
     drive: Drive
     final_displacement: float
     """m."""
 
     @property
     def range(self) -> float:
-        """Mean of largest less smallest displacement of the periods, m; NaN where no period is whole."""
+        """Mean range of displacement over the periods, m; NaN without a whole period."""
         ranges = self.highest - self.lowest
         return float(np.nanmean(ranges)) if np.isfinite(ranges).any() else np.nan
 
 
 class StepCollector:
-    """Cuts the stream of an acquisition of so many inputs into steps, by the numbers of its samples."""
+    """Cuts the stream of an acquisition with this many inputs into steps, by the numbers of its samples."""
 
     def __init__(self, plan: Plan, inputs: int) -> None:
         self._left = [segment for segment in plan.segments if segment.kind in ("step", "repeat")]
@@ -91,9 +91,9 @@ class StepCollector:
         self._kept: list[tuple[int, Floats]] = []
 
     def take(self, first: int, volts: Floats) -> Iterator[StepSamples]:
-        """Take samples, shape (input, sample), and yield the steps that are complete by them.
+        """Take samples, shape (input, sample), and yield the steps that they complete.
 
-        The samples come in order; where some were lost the number of the first is larger than it would have been.
+        Samples come in order; after lost samples, `first` is larger than the previous end.
         """
         self._kept.append((first, volts))
         while self._left and first + volts.shape[1] >= self._left[0].stop:
@@ -110,7 +110,7 @@ class StepCollector:
         self._forget()
 
     def _forget(self) -> None:
-        """Forget what no step needs any more."""
+        """Drop samples that no step needs any more."""
         needed = self._left[0].first if self._left else np.inf
         self._kept = [(begin, block) for begin, block in self._kept if begin + block.shape[1] > needed]
 
@@ -121,7 +121,7 @@ def analysed(
     scale: Scale,
     converters: Sequence[Converter],
 ) -> MeasuredStep:
-    """Return what a step shows, by the scale of the displacement's input and the converter of each input."""
+    """Return the results of a step, with the scale of the displacement and the converter of each input."""
     segment, rate = step.segment, settings.output.rate
     edges = recorded_periods(settings, segment) - segment.first
     place = settings.place_of("displacement")
@@ -133,8 +133,8 @@ def analysed(
     highest, lowest = (_grouped(each, settings) for each in (highest, lowest))
     drive = _drive(step, settings)
     recorded = step.volts[:, edges[0] : edges[-1]]
-    flags, said = MeasurementFlag(0), []
-    # NaN compares false
+    flags, reasons = MeasurementFlag(0), []
+    # comparisons with NaN are false
     clipped = [
         each.name
         for each, values, converter in zip(settings.inputs, recorded, converters, strict=True)
@@ -142,16 +142,16 @@ def analysed(
     ]
     if clipped:
         flags |= MeasurementFlag.clipped
-        said.append(f"{' and '.join(clipped)} at the end of the range")
+        reasons.append(f"{' and '.join(clipped)} at the end of the range")
     if lost := int(np.isnan(recorded[place]).sum()):
         flags |= MeasurementFlag.gap
-        said.append(f"{lost} of {recorded.shape[1]} samples lost")
+        reasons.append(f"{lost} of {recorded.shape[1]} samples lost")
     if drift := _drift(highest, lowest, settings.sweep.drift):
         flags |= MeasurementFlag.drift
-        said.append(f"{drift} while it was recorded")
+        reasons.append(f"{drift} while it was recorded")
     if wrong := _wrong_drive(drive, settings):
         flags |= MeasurementFlag.starved
-        said.append(wrong)
+        reasons.append(wrong)
     late = drive.late((0.5 * (edges[0] + edges[-1]) - 0.5 * segment.count) / rate)
     return MeasuredStep(
         segment.place,
@@ -160,7 +160,7 @@ def analysed(
         _strobe(displacement, segment, settings, late * rate),
         _impacts(step, settings, edges),
         flags,
-        "; ".join(said),
+        "; ".join(reasons),
         drive,
         float(displacement[-1]),
     )
@@ -173,7 +173,7 @@ def _grouped(values: Floats, settings: SweepSettings) -> Floats:
 
 
 def _strobe(displacement: Floats, segment: Segment, settings: SweepSettings, late: float) -> Floats:
-    """Return displacement and velocity at phase 0 of the first period of each group, so many samples late."""
+    """Return displacement and velocity at phase 0 of the first period of each group, shifted by the lag in samples."""
     periods = range(settings.sweep.transient_periods, settings.step_periods, settings.sweep.average_periods)
     at = np.array([(period * CYCLE - segment.phase) / segment.increment for period in periods]) + late
     half = max(1.0, _SLOPE * CYCLE / segment.increment)
@@ -184,7 +184,7 @@ def _strobe(displacement: Floats, segment: Segment, settings: SweepSettings, lat
 
 
 def _drift(highest: Floats, lowest: Floats, share: float) -> str:
-    """Return in words what changes steadily over a step by more than a share of the range; empty: nothing."""
+    """Return, in words, a trend over a step above a share of the range; empty without one."""
     ranges = highest - lowest
     size = float(np.nanmean(ranges)) if np.isfinite(ranges).any() else np.nan
     for name, values in (("range", ranges), ("mean", 0.5 * (highest + lowest))):
@@ -208,7 +208,7 @@ def _drive(step: StepSamples, settings: SweepSettings) -> Drive:
 
 
 def _wrong_drive(drive: Drive, settings: SweepSettings) -> str:
-    """Return in words how the drive differs from the planned one; empty: it does not, or nobody has seen it."""
+    """Return, in words, the deviation of the drive from the plan; empty if it is small or was not measured."""
     planned = settings.output.amplitude
     if not np.isfinite(drive.amplitude):
         return ""
@@ -220,7 +220,7 @@ def _wrong_drive(drive: Drive, settings: SweepSettings) -> str:
 
 
 def _impacts(step: StepSamples, settings: SweepSettings, edges: Indices) -> Floats | None:
-    """Return the mean number of impacts in the periods of each group."""
+    """Return the mean number of impacts per period of each group."""
     place = settings.place_of("load_cell")
     if place is None:
         return None
@@ -232,7 +232,7 @@ def _impacts(step: StepSamples, settings: SweepSettings, edges: Indices) -> Floa
 
 
 def _pulses(volts: Floats, cell: InputTable, rate: float) -> Floats:
-    """Return at which samples the pulses of a load cell begin; what follows within the dead time is ringing."""
+    """Return the samples at which pulses of a load cell begin; the dead time excludes ringing."""
     assert cell.threshold is not None  # the file was checked
     centred = np.nan_to_num(volts - np.nanmedian(volts)) if np.isfinite(volts).any() else np.zeros(len(volts))
     found = find_excursions(np.arange(len(volts), dtype=np.float64), centred, cell.threshold, _ENDED)

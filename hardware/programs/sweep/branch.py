@@ -1,4 +1,4 @@
-"""Whether a sweep that goes on is on the branch on which it was left."""
+"""The check that a continued sweep is still on its branch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vibroimpact.hardware.programs.sweep.analysis import MeasuredStep
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings
 
 _SAME = 0.05
-"""Difference of two ranges, over the larger one, up to which two motions are one; beside how much each varies."""
+"""Difference of two ranges, relative to the larger one, below which two motions are equal, with scatter added."""
 
 
 def refuse_other_branch(
@@ -19,11 +19,11 @@ def refuse_other_branch(
 ) -> None:
     """Raise RigError if the last finished step, measured again, shows another motion.
 
-    Its ranges differ then by more than 5 % and by more than they vary from period to period.
+    The motions differ if their ranges differ by more than 5 % plus their scatter from period to period.
     """
     spread = max(_spread(before), _spread(now))
     difference = abs(before.range - now.range)
-    # NaN, of a step without a whole period, compares false
+    # NaN, from a step without a whole period, compares false
     if difference > _SAME * max(before.range, now.range) + spread:
         direction, frequency = settings.steps[before.place]
         was, now_is = (f"{1e3 * step.range:.4g} mm" for step in (before, now))

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 def calibrations_of(settings: SweepSettings) -> dict[str, Calibration]:
     """Return the calibrations of a sweep by the names of its inputs.
 
-    UsageError: one is wrong or of another input, or there is none of the displacement in a unit of length.
+    UsageError: a calibration is wrong or for another input, or the displacement has none in a unit of length.
     """
     if isinstance(settings.calibration, str):
         file = Path(settings.source).parent / settings.calibration
@@ -55,20 +55,20 @@ def _inline(settings: SweepSettings) -> dict[str, Calibration]:
         if one is not None:
             found[name] = one
             if one.terminal not in ("", terminals[name]):
-                wanted = f"{terminals[name]}, where {name} is measured"
-                problems.append(Problem(f"calibration.{name}.terminal", wanted, quoted(one.terminal)))
+                expected = f"{terminals[name]}, where {name} is measured"
+                problems.append(Problem(f"calibration.{name}.terminal", expected, quoted(one.terminal)))
     if problems:
         raise UsageError("\n".join(lines_of(problems, settings.source)))
     return found
 
 
 def calibration_text(found: dict[str, Calibration]) -> str:
-    """Return calibrations as TOML, for what is kept with the data."""
+    """Return calibrations as TOML, to be kept with the data."""
     return tomli_w.dumps({name: one.model_dump() for name, one in found.items()})
 
 
 def displacement_scale(settings: SweepSettings, found: dict[str, Calibration]) -> Scale:
-    """Return what turns the volts of the displacement into m."""
+    """Return the conversion from the volts of the displacement to m."""
     place = settings.place_of("displacement")
     assert place is not None
     calibration = found[settings.inputs[place].name]

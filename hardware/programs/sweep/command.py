@@ -1,4 +1,4 @@
-"""What `vibroimpact rig sweep` does."""
+"""The command `vibroimpact rig sweep`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLAN = "plan.png"
 
 
 def sweep_rig(options: MeasureSweep) -> None:
-    """Measure the sweep of a file into a folder, or only draw what it would drive."""
+    """Measure the sweep of a file into a folder, or only draw its planned output."""
     refuse_folder(options.output)
     settings = read_sweep(options.file)
     if options.dry_run:

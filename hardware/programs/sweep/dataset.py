@@ -1,4 +1,4 @@
-"""The dataset of a sweep in its folder: written anew, whole, after each step, and read again when the sweep goes on."""
+"""The dataset of a sweep in its folder: written as a whole after each step, and read when the sweep continues."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ _STROBED = ("displacement", "velocity")
 
 @dataclass(slots=True)
 class SweepRows:
-    """What is measured of a sweep so far."""
+    """The finished part of a sweep."""
 
     settings: SweepSettings
     calibration: str
     """TOML."""
     steps: list[MeasuredStep] = field(default_factory=list)
-    """The first ones of the path, in its order."""
+    """The first steps of the path, in its order."""
     made_by: dict[str, str] = field(default_factory=dict)
-    """`rig`, `device` and `measured_at`, a line for each time that it was begun or went on."""
-    begun_with: list[int] = field(default_factory=list)
-    """Steps that were there then."""
+    """`rig`, `device` and `measured_at`, with a line for each start or continuation."""
+    session_starts: list[int] = field(default_factory=list)
+    """Number of steps at each of these starts."""
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is left to measure."""
+        """Whether all steps are measured."""
         return len(self.steps) == len(self.settings.steps)
 
 
 def dataset_of(rows: SweepRows) -> xr.Dataset:
-    """Return the one-dimensional dataset of what is measured so far, a run for each step."""
+    """Return the one-dimensional dataset of the finished steps, a run for each step."""
     settings, steps = rows.settings, rows.steps
-    asked = settings.steps[: len(steps)]
+    done = settings.steps[: len(steps)]
     measured: dict[str, Any] = {"measurement_flags": [int(step.flags) for step in steps]}
     if settings.place_of("drive") is not None:
         drives = [step.drive for step in steps]
@@ -70,8 +70,8 @@ def dataset_of(rows: SweepRows) -> xr.Dataset:
     omitted = ["impacts_per_period"] if settings.place_of("load_cell") is None else []
     return build_dataset(
         [_record(step, settings) for step in steps],
-        coordinates={"frequency": np.array([frequency for _, frequency in asked], dtype=np.float64)},
-        direction=[direction for direction, _ in asked],
+        coordinates={"frequency": np.array([frequency for _, frequency in done], dtype=np.float64)},
+        direction=[direction for direction, _ in done],
         run_index=range(len(steps)),
         unit_of={"frequency": "Hz"},
         omit=omitted,
@@ -114,20 +114,20 @@ def _attributes(rows: SweepRows) -> dict[str, Any]:
         "sweep_content": json.dumps(settings.content),
         "calibration": rows.calibration,
         "steps_planned": len(settings.steps),
-        "begun_with_steps": json.dumps(rows.begun_with),
+        "begun_with_steps": json.dumps(rows.session_starts),
         **rows.made_by,
     }
-    error, doubt = clock_error_of(_seen_lags(rows))
+    error, standard_error = clock_error_of(_seen_lags(rows))
     if np.isfinite(error):
-        attributes |= {"clock_error_ppm": error, "clock_error_standard_error_ppm": doubt}
+        attributes |= {"clock_error_ppm": error, "clock_error_standard_error_ppm": standard_error}
     return attributes
 
 
 def _seen_lags(rows: SweepRows) -> list[SeenLags]:
-    """Return the lags that each acquisition has seen; its plan says when."""
+    """Return the lags that each acquisition has measured; its plan gives their times."""
     found = []
-    ends = [*rows.begun_with[1:], len(rows.steps)]
-    for begin, end in zip(rows.begun_with, ends, strict=True):
+    ends = [*rows.session_starts[1:], len(rows.steps)]
+    for begin, end in zip(rows.session_starts, ends, strict=True):
         plan = planned(rows.settings, begin)
         middles = {s.place: (s.first + 0.5 * s.count) / plan.rate for s in plan.segments if s.kind == "step"}
         some = rows.steps[begin:end]
@@ -142,14 +142,14 @@ def _seen_lags(rows: SweepRows) -> list[SeenLags]:
 
 
 def store(rows: SweepRows, folder: Path) -> None:
-    """Write what is measured so far; what was there before stays until the new file is complete."""
+    """Write the finished steps; the old file stays until the new one is complete."""
     write_dataset(dataset_of(rows), folder / DATASET)
 
 
 def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows:
-    """Return what a folder has of a sweep; nothing where it is new.
+    """Return the finished part of a sweep in a folder; empty in a new folder.
 
-    A folder of another sweep, of a campaign, or with a damaged dataset raises UsageError.
+    UsageError: the folder has another sweep, a campaign, or a damaged dataset.
     """
     path = folder / DATASET
     rows = SweepRows(settings, calibration)
@@ -160,7 +160,7 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
     try:
         attributes = file_attributes(path)
         if not attributes:
-            read_flat(path)  # says what is wrong with it
+            read_flat(path)  # raises the error of the damage
         if attributes.get("history") != _MADE_BY:
             raise _refused(folder, "one with another dataset")
         different = _differences(json.loads(str(attributes.get("sweep_content"))), settings.content)
@@ -181,7 +181,7 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
         ) from error
     rows.steps = _steps_of(flat)
     rows.made_by = {name: str(flat.attrs[name]) for name in ("rig", "device", "measured_at")}
-    rows.begun_with = [int(steps) for steps in json.loads(str(flat.attrs["begun_with_steps"]))]
+    rows.session_starts = [int(steps) for steps in json.loads(str(flat.attrs["begun_with_steps"]))]
     return rows
 
 
@@ -195,7 +195,7 @@ def _refused(folder: Path, got: str) -> UsageError:
 
 
 def _differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Return in words in what a stored sweep differs from this one."""
+    """Return, in words, the differences of a stored sweep from this one."""
     found = []
     now = json.loads(json.dumps(now))
     for key in sorted(was.keys() | now.keys()):
@@ -212,7 +212,7 @@ def _shown(value: Any) -> str:
 
 
 def _steps_of(flat: xr.Dataset) -> list[MeasuredStep]:
-    """Return the steps that a stored dataset holds."""
+    """Return the steps of a stored dataset."""
 
     def column(name: str) -> Floats | None:
         return flat.variables[name].values if name in flat.variables else None

@@ -1,4 +1,4 @@
-"""The planned output of a sweep as a figure, before anything is driven."""
+"""The figure of a sweep's planned output, before anything is driven."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from vibroimpact.hardware.programs.sweep.plan import Plan
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings
 
 _PERIODS = 4
-"""Forcing periods drawn to both sides of a change."""
+"""Forcing periods drawn on both sides of a change."""
 
 
 def draw_plan(plan: Plan, settings: SweepSettings) -> Figure:
-    """Draw the frequency of a sweep over its time, its beginning, a change of frequency and its end."""
+    """Return the figure of a sweep's frequency over time, its beginning, a change of frequency and its end."""
     steps = [segment for segment in plan.segments if segment.place >= 0]
     begins = np.array([segment.first for segment in steps] + [steps[-1].stop]) / plan.rate
     frequencies = np.array([settings.steps[segment.place][1] for segment in steps])

@@ -1,4 +1,4 @@
-"""What an input that the output is wired to says of the drive: its amplitude, its lag, the error of the clock."""
+"""The measured drive, from an input that the output is wired to: its amplitude, its lag, the error of the clock."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ _FEWEST_PERIODS = 2
 
 
 class Drive(NamedTuple):
-    """The drive of a step as an input saw it."""
+    """The drive of a step as measured by an input."""
 
     amplitude: float = np.nan
     """V."""
     lag: float = np.nan
-    """Seen less planned in the middle of the step, s, within half a period."""
+    """Measured minus planned drive in the middle of the step, s, within half a period."""
     clock_error: float = np.nan
-    """Of the inputs' clock, 1e-6, from this step alone: it is fast where this is positive."""
+    """Relative error of the inputs' clock, 1e-6, from this step alone; positive if it is fast."""
     residual: float = np.nan
-    """RMS of what is no sine of the planned frequency, over the amplitude."""
+    """RMS of the rest beside a sine of the planned frequency, over the amplitude."""
 
     def late(self, after: float) -> float:
-        """Return the lag (s) at a time (s) after the middle of the step; 0 where nobody has seen it."""
+        """Return the lag (s) at a time (s) after the middle of the step; 0 if it was not measured."""
         lag = self.lag + 1e-6 * self.clock_error * after
         return lag if np.isfinite(lag) else 0.0
 
 
 def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
-    """Return what an input saw of the drive of a step.
+    """Return the drive of a step as measured by an input.
 
-    The step is cut into parts; each is fitted by the planned sine with an amplitude, a phase and an offset of its own.
-    Where the clock of the inputs is fast by e the phase falls behind by 2 pi f e in a second. `volts` are all samples
-    of the step, shape (sample,), NaN where missing.
+    The step is cut into parts; each is fitted by the planned sine with its own amplitude, phase and offset. If the
+    clock of the inputs is fast by e, the phase falls behind by 2 pi f e in a second. `volts` are all samples of the
+    step, shape (sample,), NaN if missing.
     """
     periods = segment.count * segment.increment / CYCLE
     parts = int(min(_PARTS, periods // _FEWEST_PERIODS))
@@ -67,7 +67,7 @@ def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
 
 
 def _fitted(volts: Floats, angle: Floats) -> tuple[complex, float] | None:
-    """Return the complex amplitude of a part, and the mean square of what is left; None of too few samples."""
+    """Return the complex amplitude of a part, and the mean square of the residual; None for too few samples."""
     there = np.isfinite(volts)
     if there.sum() < 8:
         return None
@@ -78,7 +78,7 @@ def _fitted(volts: Floats, angle: Floats) -> tuple[complex, float] | None:
 
 
 class SeenLags(NamedTuple):
-    """The lags of the steps that one acquisition has seen, in their order; each field has shape (step,)."""
+    """The lags of steps measured by one acquisition, in order; each field has shape (step,)."""
 
     time: Floats
     """Middle of each step, s."""
@@ -93,9 +93,9 @@ class SeenLags(NamedTuple):
 def clock_error_of(seen: Sequence[SeenLags]) -> tuple[float, float]:
     """Return the error of the inputs' clock and its standard error, 1e-6: the slope of the lag over all steps.
 
-    An input sees the steps of a converter, so that the lag grows by whole samples: what one step shows of its slope is
-    coarse, and serves to tell how many periods the lag has grown by from step to step. Each acquisition begins its
-    clocks anew.
+    An input samples in steps of its clock, so that the lag grows by whole samples. The slope from one step is
+    therefore coarse; it only resolves the whole periods by which the lag grows from step to step. Each acquisition
+    starts its clocks anew.
     """
     time, lag = [], []
     for each in seen:
@@ -115,7 +115,7 @@ def clock_error_of(seen: Sequence[SeenLags]) -> tuple[float, float]:
 
 
 def _unwrapped(seen: SeenLags) -> Floats:
-    """Return the lags with the whole periods that they have grown by."""
+    """Return the lags with their whole periods."""
     found = [float(seen.lag[0])]
     usual = 1e-6 * float(np.median(seen.clock_error))
     for k in range(1, len(seen.lag)):

@@ -11,15 +11,15 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _KINK = 10.0
-"""Curvature at an extremum, over the usual one of the signal, from which on it is the kink of an impact."""
+"""Curvature at an extremum, over the usual one of the signal, above which the extremum is the kink of an impact."""
 
 
 def extrema_of(values: Floats, edges: Indices) -> tuple[Floats, Floats]:
-    """Return the largest and the smallest value of each period, shape (period,); NaN where a sample of it is missing.
+    """Return the largest and the smallest value of each period, shape (period,); NaN if a sample of it is missing.
 
-    A smooth extremum is that of the parabola through its three samples, that of an impact where the lines before and
-    after it meet: the error falls with the square of the sample interval in both cases. Periods begin at `edges`, whose
-    last one is the end of the last period.
+    A smooth extremum is that of the parabola through its three samples. At an impact it is the intersection of the
+    lines before and after it. In both cases the error falls with the square of the sample interval. Periods begin at
+    `edges`, and the last edge is the end of the last period.
 
     >>> wave = np.sin(2.0 * np.pi * (np.arange(100) + 0.3) / 50)
     >>> highest, lowest = extrema_of(wave, np.array([0, 50, 100]))
@@ -44,7 +44,7 @@ def _maximum(values: Floats, at: int, usual: float) -> float:
     """Return the maximum near a sample that is the largest of its period."""
     before, here, after = (float(values[k]) if 0 <= k < len(values) else np.nan for k in (at - 1, at, at + 1))
     bend = before - 2.0 * here + after
-    # at the end of a period the motion may still rise; NaN compares false too
+    # at the end of a period the motion may still rise; comparisons with NaN are false too
     if not (before <= here >= after and bend < 0.0):
         return here
     if -bend > _KINK * usual and 2 <= at < len(values) - 2:
@@ -55,10 +55,10 @@ def _maximum(values: Floats, at: int, usual: float) -> float:
 
 
 def _kink(five: Floats) -> float | None:
-    """Return where lines through the samples before and after a kink meet; None where they do not near the middle."""
+    """Return the intersection of the lines before and after a kink; None if it is not near the middle."""
     rise, before, after, fall = np.diff(five).tolist()
     found = []
-    # the middle sample lies on one of the two lines; one that crosses the kink is too flat and meets the other lower
+    # the middle sample lies on one of the two lines; a line across the kink is too flat and gives a lower value
     for slope_up, slope_down, low in ((rise, after, -1.0), (before, fall, 0.0)):
         if not slope_up > slope_down:
             continue

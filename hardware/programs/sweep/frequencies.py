@@ -1,4 +1,4 @@
-"""The frequencies of a sweep: a list, or a range of so many points or of equal steps."""
+"""The frequencies of a sweep: a list, or a range with a number of points or a step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class RangeTable(BaseModel):
 
 
 def frequencies_of(raw: Any, problems: list[Problem], most: int) -> tuple[float, ...] | None:
-    """Return the ascending frequencies (Hz) of an array or table, at most `most`; None, and problems added, if wrong.
+    """Return the ascending frequencies (Hz) of an array or table, at most `most`; None, with problems added, if wrong.
 
     >>> frequencies_of({"start": 18.0, "stop": 18.3, "step": 0.1}, [], 10)
     (18.0, 18.1, 18.2, 18.3)

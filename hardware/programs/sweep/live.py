@@ -1,4 +1,4 @@
-"""The figure of a sweep that is under way, drawn by a process of its own: drawing would hold up the output."""
+"""The figure of a running sweep, drawn by a process of its own: drawing would delay the output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.fmus.processes.process import Process
 
 FILE = "live.png"
 SECONDS = 5.0
-"""Time between two drawings."""
+"""Time between two drawings, s."""
 KIND = "bifurcation"
 _COMMANDS = "vibroimpact.orchestrator.commands.cli"
 
@@ -27,20 +27,20 @@ class LiveFigure:
         self._process: Process | None = None
 
     def follow(self) -> None:
-        """Draw what the folder has by now, if some seconds have passed since it was drawn."""
+        """Draw the present contents of the folder, if some seconds have passed since the last drawing."""
         if time.monotonic() - self._drawn >= SECONDS and (
             self._process is None or self._process.poll() is not None
         ):
             self._start()
 
     def finish(self) -> None:
-        """Draw what the folder has at the end, when no output waits any more."""
+        """Draw the final contents of the folder, when no output waits any more."""
         self.close()
         with open_dataset(self._folder) as dataset, writing(self._folder / FILE):
             figures.save(figures.draw(dataset, KIND), self._folder / FILE)
 
     def close(self) -> None:
-        """Let no drawing go on."""
+        """End a drawing under way."""
         if self._process is not None:
             with self._process:
                 self._process.kill_session()
@@ -50,7 +50,7 @@ class LiveFigure:
         self.close()
         self._drawn = time.monotonic()
         folder, figure = str(self._folder), str(self._folder / FILE)
-        # what is wrong is said by the last drawing
+        # the last drawing reports errors
         self._process = Process("-m", _COMMANDS, "plot", folder, "-o", figure, "--kind", KIND)
-        with suppress(OSError, AttributeError):  # where priorities are not to be had
+        with suppress(OSError, AttributeError):  # on systems without priorities
             os.setpriority(os.PRIO_PROCESS, self._process.pid, 10)

@@ -1,7 +1,7 @@
-"""The output of a sweep, planned sample by sample: one phase that goes on through all changes of frequency.
+"""The output of a sweep, planned sample by sample: one continuous phase through all changes of frequency.
 
-The phase is a whole number of 2^-64 cycles, and so is its increment of a sample. It is the same wherever a block of
-the output begins, and the samples at which periods begin are exact. A frequency is met within rate / 2^65.
+The phase is a whole number of 2^-64 cycles, and so is its increment per sample. It does not depend on the start of an
+output block, and the first samples of periods are exact. A frequency is met within rate / 2^65.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 CYCLE = 2**64
 """Units of phase in a cycle."""
 _MANTISSA = 53
-"""Bits of a phase that a sine can tell apart."""
+"""Bits of a phase that a sine can resolve."""
 Kind = Literal["rise", "pass", "repeat", "step", "fall"]
 
 
@@ -31,13 +31,13 @@ class Segment:
     kind: Kind
     """Rise and fall of the amplitude, a step, a pass through a finished step, or a repeat of the last finished one."""
     place: int
-    """Number of the step along the path, from 0; -1 of rise and fall."""
+    """Number of the step along the path, from 0; -1 for rise and fall."""
     first: int
     """Number of its first sample."""
     count: int
     increment: int
     phase: int
-    """`increment` a sample, and `phase` at the first sample, are in units of 1 / `CYCLE`."""
+    """`increment` per sample, and `phase` at the first sample, in units of 1 / `CYCLE`."""
 
     @property
     def stop(self) -> int:
@@ -45,29 +45,29 @@ class Segment:
         return self.first + self.count
 
     def begin_of(self, period: int) -> int:
-        """Return the first sample of a forcing period: the first one at or after its phase is whole."""
+        """Return the first sample of a forcing period: the first one at or after the whole phase."""
         return self.first + _samples_to(period, self.phase, self.increment)
 
 
 def _samples_to(cycles: int, phase: int, increment: int) -> int:
-    """Return after how many samples a phase has come so many cycles further than the beginning of its own."""
+    """Return the number of samples after which a phase has advanced by `cycles` from the start of its own cycle."""
     return max(0, -((phase - cycles * CYCLE) // increment))
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The whole output of a sweep; a waveform that `Output` takes."""
+    """The whole output of a sweep; a waveform for `Output`."""
 
     rate: float
     """Samples per second."""
     amplitude: float
     """V."""
     segments: tuple[Segment, ...]
-    """Each begins at the sample where the one before has ended."""
+    """Each begins at the end of the previous one."""
     _firsts: tuple[int, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Note where the segments begin."""
+        """Note the starts of the segments."""
         object.__setattr__(self, "_firsts", tuple(segment.first for segment in self.segments))
 
     @property
@@ -77,11 +77,11 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """Of the whole output, s."""
+        """Duration of the whole output, s."""
         return self.samples / self.rate
 
     def volts(self, first: int, count: int) -> Floats:
-        """Return samples of the output, V, shape (count,); 0 before it begins and after it has ended."""
+        """Return samples of the output, V, shape (count,); 0 before its start and after its end."""
         found = np.zeros(count)
         place = max(0, bisect_right(self._firsts, first) - 1)
         for segment in self.segments[place:]:
@@ -106,21 +106,21 @@ class Plan:
 
 
 def planned(settings: SweepSettings, finished: int = 0) -> Plan:
-    """Return the output of a sweep of which so many steps are finished.
+    """Return the output of a sweep with this many finished steps.
 
     The amplitude rises at the first frequency of the path. Finished steps are passed through in the order of the path,
-    so that the motion is on the branch that it was on; the last of them is repeated in full, so that this can be seen.
+    so that the motion is on its former branch. The last of them is repeated in full, to check this.
     """
     steps, sweep = settings.steps, settings.sweep
-    asked: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
+    pieces: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
     for place, (_, frequency) in enumerate(steps):
         kind: Kind = "step" if place >= finished else "repeat" if place == finished - 1 else "pass"
         periods = sweep.resume_periods if kind == "pass" else settings.step_periods
-        asked.append((kind, place, frequency, periods))
-    asked.append(("fall", -1, steps[-1][1], settings.output.ramp_periods))
+        pieces.append((kind, place, frequency, periods))
+    pieces.append(("fall", -1, steps[-1][1], settings.output.ramp_periods))
     segments: list[Segment] = []
     first = phase = 0
-    for kind, place, frequency, periods in asked:
+    for kind, place, frequency, periods in pieces:
         increment = round(Fraction(frequency) / Fraction(settings.output.rate) * CYCLE)
         count = _samples_to(periods, phase, increment)
         segments.append(Segment(kind, place, first, count, increment, phase))
@@ -129,9 +129,9 @@ def planned(settings: SweepSettings, finished: int = 0) -> Plan:
 
 
 def recorded_periods(settings: SweepSettings, segment: Segment) -> NDArray[np.int64]:
-    """Return the sample numbers where recorded periods of a step begin and the last one ends, shape (periods + 1,).
+    """Return the sample numbers of the starts of recorded periods, and of the last end, shape (periods + 1,).
 
-    A period has as many samples as lie in it: its number differs by one from period to period.
+    Periods may differ by one in their number of samples.
     """
     whole = range(settings.sweep.transient_periods, settings.step_periods + 1)
     return np.array([segment.begin_of(period) for period in whole], dtype=np.int64)

@@ -1,7 +1,7 @@
-"""Measure a sweep: one output drives, inputs follow it sample by sample, each step is kept when it is sure.
+"""Measure a sweep: one output drives, inputs follow it sample by sample, each step is kept once it is sure.
 
-A step is sure once the output has gone on well past its end: an output that ran empty, or that was stopped, never
-leaves a step that was driven otherwise than planned.
+A step is sure once the output has gone on well past its end. An output that ran empty, or was stopped, thus never
+leaves a step with another drive than planned.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ from vibroimpact.hardware.rig.output import Output, start_trigger
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 from vibroimpact.orchestrator.run.progress import Progress
 
-_SURE_SECONDS = 1.0
+_SETTLED_SECONDS = 1.0
 """Time, besides that of a fall from the highest voltage, after which a step is sure, s."""
 _RATE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class SweepReport:
-    """What a command did."""
+    """Summary of a sweep command."""
 
     dataset: Path
     steps: int
     """Steps in the dataset."""
     before: int
-    """Steps that were there before."""
+    """Steps from before."""
     planned: int
     """Steps of the whole sweep."""
     stopped: bool
@@ -61,11 +61,11 @@ class SweepReport:
 def measure(
     settings: SweepSettings, folder: Path, rig: str | None = None, progress: Progress | None = None
 ) -> SweepReport:
-    """Measure a sweep into a folder, made when absent, or go on with it.
+    """Measure a sweep into a folder, which is made if absent, or continue it.
 
-    The rig is that of `--rig`, else of the file of the sweep, else the board of this machine. UsageError: the folder is
-    of something else, there is no such rig, or it lacks what is asked for; nothing was driven. RigError: the rig
-    failed, or the motion is on another branch than before; what was measured is in the folder.
+    The rig is that of `--rig`, else of the file of the sweep, else the board of this machine. UsageError: the folder
+    has other contents, there is no such rig, or it lacks a terminal; nothing was driven. RigError: the rig failed, or
+    the motion is on another branch than before; finished steps are in the folder.
     """
     limits = Limits(settings.output.highest, settings.output.slew)
     calibrations = calibrations_of(settings)
@@ -82,7 +82,7 @@ def measure(
 
 
 class _Sweep:
-    """A sweep that is under way."""
+    """A running sweep."""
 
     def __init__(
         self, rows: SweepRows, folder: Path, limits: Limits, scale: Scale, progress: Progress | None
@@ -97,7 +97,7 @@ class _Sweep:
         self._converters: list[Converter] = []
 
     def run(self, choice: str | None) -> bool:
-        """Measure until the end, or until it is stopped; return whether it was."""
+        """Measure to the end, or until a stop; return whether it was stopped."""
         settings, plan = self._settings, self._plan
         rate = settings.output.rate
         with opened_rig(choice) as rig:
@@ -119,7 +119,7 @@ class _Sweep:
             with inputs, output, stopped_by_signals(stop):
                 self._take_note(inputs.facts, rig.name)
                 output.start()
-                if self._stopped_at is None:  # else it may not have started, nor the inputs
+                if self._stopped_at is None:  # else output and inputs may not have started
                     self._note_start(inputs.facts)
                     self._progress.begin(len(settings.steps), len(self._rows.steps))
                     try:
@@ -133,7 +133,7 @@ class _Sweep:
         return self._stopped_at is not None
 
     def _take_note(self, facts: Facts, rig: str) -> None:
-        """Note what measures; refuse another rig than that which began, and a rate that it does not have."""
+        """Note the rig; refuse another rig than at the start, and a rate that it does not have."""
         rate = self._settings.output.rate
         if abs(facts.rate - rate) > _RATE_ROUNDING * rate:
             raise UsageError(
@@ -154,20 +154,20 @@ class _Sweep:
     def _note_start(self, facts: Facts) -> None:
         earlier = self._rows.made_by.get("measured_at", "")
         self._rows.made_by["measured_at"] = "\n".join(filter(None, (earlier, facts.started_at)))
-        self._rows.begun_with.append(len(self._rows.steps))
+        self._rows.session_starts.append(len(self._rows.steps))
 
     def _follow(self, inputs: Acquisition, output: Output) -> None:
-        """Take what the inputs give, and keep the steps that are sure."""
+        """Take the samples of the inputs, and keep the sure steps."""
         collector = StepCollector(self._plan, len(self._settings.inputs))
         fall = self._limits.fall(self._limits.amplitude, self._settings.output.rate)
-        margin = fall.samples + round(_SURE_SECONDS * self._settings.output.rate)
+        margin = fall.samples + round(_SETTLED_SECONDS * self._settings.output.rate)
         for block in inputs.blocks():
             for step in collector.take(block.first, block.volts):
                 self._analyse(step)
             if self._stopped_at is None:
                 self._keep(output.generated - margin)
             if output.poll(0.0):
-                output.wait()  # raises why, where it is over before its end
+                output.wait()  # raises the reason of an early end
 
     def _analyse(self, step: StepSamples) -> None:
         found = analysed(step, self._settings, self._scale, self._converters)
@@ -176,9 +176,9 @@ class _Sweep:
         else:
             self._waiting.append((step.segment.stop, found))
 
-    def _keep(self, sure: int) -> None:
-        """Store the steps that have ended by a sample."""
-        while self._waiting and self._waiting[0][0] <= sure:
+    def _keep(self, settled: int) -> None:
+        """Store the steps that have ended before a sample."""
+        while self._waiting and self._waiting[0][0] <= settled:
             _, step = self._waiting.popleft()
             self._rows.steps.append(step)
             with writing(self._folder / DATASET):
@@ -193,5 +193,5 @@ class _Sweep:
     @property
     def _is_a_diagram(self) -> bool:
         """Whether more than one frequency is measured."""
-        asked = self._settings.steps[: len(self._rows.steps)]
-        return len({frequency for _, frequency in asked}) > 1
+        done = self._settings.steps[: len(self._rows.steps)]
+        return len({frequency for _, frequency in done}) > 1

@@ -1,4 +1,4 @@
-"""The file of a sweep: what drives the rig, what is measured of it, and at which frequencies."""
+"""The file of a sweep: output, inputs and frequencies."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from vibroimpact.orchestrator.scene.problems import (
 )
 
 _MOST_BYTES = 2**18
-"""Size of the file: it may list the frequency of each step."""
+"""Largest size of the file, bytes: it may list the frequency of each step."""
 _STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 MOST_STEPS = 10_000
 LONGEST = 7 * 86_400.0
-"""Of a sweep, s."""
+"""Longest sweep, s."""
 MOST_VALUES = 5 * 10**7
-"""Samples of a step, of all inputs, which are kept until it is over; and recorded values of a sweep."""
+"""Most samples of a step, of all inputs, which are kept until its end; also most recorded values of a sweep."""
 FEWEST_SAMPLES = 20
-"""Of a forcing period: with fewer its extrema lie between samples."""
+"""Fewest samples of a forcing period; with fewer its extrema lie between samples."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 Terminal = Annotated[str, Field(pattern=r"^[A-Za-z][\w-]*/[\w/]+$")]
@@ -44,7 +44,7 @@ Role = Literal["displacement", "load_cell", "drive"]
 
 
 class OutputTable(BaseModel):
-    """`[output]`: the voltage that drives, and within which limits."""
+    """`[output]`: the driving voltage and its limits."""
 
     model_config = _STRICT
 
@@ -59,7 +59,7 @@ class OutputTable(BaseModel):
 
 
 class SweepTable(BaseModel):
-    """`[sweep]` but for its frequencies."""
+    """`[sweep]` without its frequencies."""
 
     model_config = _STRICT
 
@@ -78,7 +78,7 @@ class SweepTable(BaseModel):
 
 
 class InputTable(BaseModel):
-    """`[[input]]`: what is measured."""
+    """`[[input]]`: a measured input."""
 
     model_config = _STRICT
 
@@ -94,13 +94,13 @@ class InputTable(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class SweepSettings:
-    """A sweep as its file says it, checked."""
+    """A checked sweep from its file."""
 
     source: str
     text: str
     """The file is `source`, its content `text`."""
     rig: str | None
-    """Where `--rig` says nothing."""
+    """Used without `--rig`."""
     output: OutputTable
     sweep: SweepTable
     frequencies: tuple[float, ...]
@@ -111,7 +111,7 @@ class SweepSettings:
 
     @property
     def steps(self) -> tuple[tuple[Direction, float], ...]:
-        """Direction and frequency (Hz) of each step in the order of the path."""
+        """Direction and frequency (Hz) of each step, in the order of the path."""
         up = [(Direction.up, f) for f in self.frequencies]
         down = [(Direction.down, f) for f in reversed(self.frequencies)]
         return tuple({"up": up, "down": down, "up-down": up + down}[self.sweep.path])
@@ -123,16 +123,16 @@ class SweepSettings:
 
     @property
     def measured(self) -> list[Input]:
-        """The inputs as the acquisition takes them."""
+        """The inputs in the form of an acquisition."""
         return [Input(each.name, each.terminal, each.range) for each in self.inputs]
 
     def place_of(self, role: Role) -> int | None:
-        """Return which of the inputs has a role; None where none has."""
+        """Return the index of the input with a role; None without one."""
         return next((place for place, each in enumerate(self.inputs) if each.role == role), None)
 
     @property
     def content(self) -> dict[str, Any]:
-        """Everything that what is measured depends on, by key; layout and comments do not count."""
+        """All keys that affect the measurement; layout and comments do not count."""
         tables = {
             "output": self.output.model_dump(),
             "sweep": {**self.sweep.model_dump(exclude={"resume_periods"}), "frequency": self.frequencies},
@@ -149,13 +149,13 @@ class SweepSettings:
 def read_sweep(path: Path) -> SweepSettings:
     """Read the file of a sweep.
 
-    UsageError has all problems, a line for each: it cannot be read, is no TOML, or describes no sweep.
+    UsageError has all problems, a line for each: the file cannot be read, is no TOML, or describes no sweep.
     """
     return parse_sweep(text_of(path, "the file of a sweep", _MOST_BYTES), str(path))
 
 
 def parse_sweep(text: str, source: str) -> SweepSettings:
-    """Return the sweep that a TOML text describes; `source` is what messages call it.
+    """Return the sweep of a TOML text; `source` is its name in messages.
 
     UsageError has all problems, a line for each.
     """
@@ -223,7 +223,7 @@ def _inputs(listed: Any, problems: list[Problem]) -> list[InputTable]:
 
 
 def _misfits(settings: SweepSettings) -> Sequence[Problem]:
-    """Return what does not fit together of a sweep whose keys are right each by itself."""
+    """Return the contradictions between keys of a sweep that are each valid."""
     output, fastest, slowest = settings.output, settings.frequencies[-1], settings.frequencies[0]
     problems = []
     if output.amplitude > output.highest:

@@ -1,5 +1,5 @@
-"""Pairs of bodies that hit each other, and bodies of other tools at rigid stops, which are pairs of one that stays.
+"""Pairs of bodies that hit each other. A body of another tool at a rigid stop is a pair whose second body stays.
 
-`pair` is a pair, `all_pairs` all of a run, `ends` are their contact points, `meeting` finds where these meet.
-`force` is what they hold on each other, `rigid_stops` are those of which one never moves.
+`pair` is one pair, `all_pairs` all pairs of a run. `ends` are the contact points of a pair, `meeting` finds the
+instant of contact. `force` is the mutual force in a contact. `rigid_stops` are pairs with one body that never moves.
 """

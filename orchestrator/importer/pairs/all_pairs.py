@@ -1,4 +1,4 @@
-"""All pairs of bodies of a run that hit each other: impulses of one instant, forces of all that rest."""
+"""All pairs of a run: the impulses at one instant, and the forces of all bodies at rest on each other."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
-#: Impulses at one instant.
+#: Most impulses at one instant; more are an error.
 MOST_IMPULSES = 10_000
-#: Forces of bodies at rest agree to this, relative to the largest.
+#: Change of the forces of bodies at rest, relative to the largest force, below which they agree.
 REST_TOLERANCE = 1e-10
 
 
@@ -31,20 +31,20 @@ class Pairs:
         inputs: dict[tuple[str, str], ForceInput],
     ) -> None:
         self.scale = Scale()
-        """What is small beside the motion of any of them."""
+        """Largest displacement and speed of all pairs, by which others are small."""
         self.pulses = Pulses(components)
-        """The impulses of bodies of other tools."""
+        """The impulses of other tools' bodies."""
         self.specified = []
-        """In the order of their specifications."""
+        """All pairs, in the order of their specifications."""
         for spec in specs:
             impulses = self.pulses if spec.law == "restitution" else None
             lower, upper = (end_of(components, end, inputs, impulses) for end in (spec.lower, spec.upper))
             self.specified.append(Pair(spec, lower, upper, self.scale, self.pulses))
         self.pairs = self.specified
-        """These, and the bodies of other tools at the rigid stops of the run."""
+        """The specified pairs, and other tools' bodies at the rigid stops of the run."""
 
     def begin(self, time: float, stops: Sequence[Pair] = ()) -> None:
-        """Start a run: initialization has ended, and these are its rigid stops."""
+        """Start a run after initialization; `stops` are its rigid stops."""
         self.scale.displacement = self.scale.speed = 0.0
         self.pulses.begin()
         self.pairs = [*self.specified, *stops]
@@ -60,13 +60,13 @@ class Pairs:
             pair.begin(time)
 
     def __bool__(self) -> bool:
-        """Is there any pair?"""
+        """Whether there is any pair."""
         return bool(self.pairs)
 
     def resolve(self, time: float) -> list[str]:
-        """Give the impulses of the instant `time`, s, if there are any; return the lower body of each impact.
+        """Give the impulses of the instant `time`, s; return the lower body of each impact.
 
-        Impulses that do not end, or bodies that are pressed together, raise ComponentError.
+        ComponentError: impulses do not end, or bodies are pressed together.
         """
         hit: list[str] = []
         if not any(pair.is_due(pair.look(), time) for pair in self.pairs):
@@ -121,7 +121,7 @@ class Pairs:
         )
 
     def free(self) -> None:
-        """Give back what trials have saved, before the bodies are freed."""
+        """Free the states saved for trials, before the bodies are freed."""
         self.pulses.free()
         for pair in self.specified:
             pair.lower.free()

@@ -1,4 +1,4 @@
-"""The ends of a pair of bodies: their contact points, how they move, and what is small beside that."""
+"""The ends of a pair of bodies: their contact points, their motion, and the scale of that motion."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import LOWER_SID
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
-#: Touching pairs are nearer than what the fastest body moves in this many times the precision of an impact ...
+#: Factor of the touching distance: bodies touch below the way of the fastest body in this many impact precisions ...
 TOUCHING_TIMES = 64.0
-#: ... and this times the largest displacement.
+#: ... plus this part of the largest displacement.
 TOUCHING_SIZE = 1e-12
-#: Closing speeds below this times the largest speed of a body are no impacts, unless the bodies sink into each other.
+#: Closing speed, relative to the largest speed of a body, below which bodies that touch have no impact. Bodies that
+#: overlap have one at any closing speed.
 SLOW = 1e-9
 
 
@@ -33,7 +34,7 @@ class Motion(NamedTuple):
 class PortEnd:
     """The contact port of a body of this package, as one end of a pair.
 
-    Its name is `body.contact[k]`; its mass is impulse over the change of its velocity, kg, known once a run has begun.
+    Its name is `body.contact[k]`. Its mass is impulse over the change of its velocity, kg, known once a run has begun.
     """
 
     def __init__(
@@ -57,8 +58,8 @@ class PortEnd:
         self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
         self._input.parts.clear()
 
-    def asked_rate(self, time: float, size: float) -> float:
-        """It says all that it is asked: `BodyRate`."""
+    def required_rate(self, time: float, size: float) -> float:
+        """Return 0: the body gives all its rates itself (`BodyRate`)."""
         return 0.0
 
     def press(self, pair: str, force: float) -> None:
@@ -72,7 +73,7 @@ class PortEnd:
         return float(displacement), float(velocity)
 
     def strike(self, impulse: float) -> None:
-        """Give the point an impulse along its displacement, N s; a body with event mode is in it."""
+        """Give the point an impulse along its displacement, N s; a body with event mode is in that mode."""
         self._impulse.values[0] = impulse
         self._impulse.set()
         instance = self.body.instance
@@ -80,11 +81,11 @@ class PortEnd:
             instance.check(instance.update_call(), "UpdateDiscreteStates")
 
     def free(self) -> None:
-        """It has saved nothing."""
+        """There is no saved state to free."""
 
 
 class PointEnd:
-    """The point of a body of any tool, as one end of a pair: it takes a force, and an impulse as a pulse of that."""
+    """The point of a body of any tool as one end of a pair: it takes a force, or an impulse as a pulse."""
 
     def __init__(
         self,
@@ -101,23 +102,23 @@ class PointEnd:
         self._input = inputs.setdefault(place, ForceInput(self.body, point.force))
         self._trials = TrialSteps(self.body, point.velocity, self._input)
         self.pulse = None if pulses is None else pulses.of(point, self._input)
-        """Its impulses; None where the law yields."""
+        """Its impulses; None with a yielding law."""
 
     @property
     def mass(self) -> float:
-        """Impulse over the change of the velocity, kg: the given one, or what pulses have measured."""
+        """Impulse over the change of the velocity, kg: the given mass, or the mass that pulses have measured."""
         return self._given if self.pulse is None else self.pulse.mass
 
     def begin(self, time: float) -> None:
-        """Start a run at `time`, s: impulses need a body that answers them."""
+        """Start a run at `time`, s: a point with impulses tests that the body answers them."""
         self._input.parts.clear()
         if self.pulse is not None:
             self.pulse.begin(time)
 
-    def asked_rate(self, time: float, size: float) -> float:
-        """Return its fastest rate, rad/s, by trials of at most a step of `size` s; 0 of a slower one.
+    def required_rate(self, time: float, size: float) -> float:
+        """Return the body's fastest rate, rad/s, by trials of at most `size` s; 0 for a slower body.
 
-        Where the law yields its steps follow from the given mass: that is compared with trials, and no rate is asked.
+        With a yielding law the steps follow from the given mass: trials check that mass, and no rate is needed.
         """
         if self.pulse is not None:
             return self._trials.rate(self.pulse.mass, time, size)
@@ -130,24 +131,24 @@ class PointEnd:
         self._input.write()
 
     def look(self) -> tuple[float, float]:
-        """Return displacement (m) and velocity (m/s), with the impulse that it is still to be given."""
+        """Return displacement (m) and velocity (m/s); the velocity includes the impulse still to be given."""
         displacement, velocity = (float(value) for value in self._motion.get())
         if self.pulse is not None:
             velocity += self.pulse.owed / self.pulse.mass
         return displacement, velocity
 
     def strike(self, impulse: float) -> None:
-        """Give the point an impulse along its displacement, N s: the body gets it in the next step."""
+        """Give the point an impulse along its displacement, N s: the body receives it in the next step."""
         assert self.pulse is not None
         self.pulse.owed += impulse
 
     def free(self) -> None:
-        """Give back what trial steps have saved."""
+        """Free the states that trial steps have saved."""
         self._trials.free()
 
 
 class SurfaceEnd:
-    """The surface of a rigid stop, at a position in m, as one end of a pair: nothing moves it, its mass is infinite."""
+    """The surface of a rigid stop, at a position in m, as one end of a pair: it never moves, its mass is infinite."""
 
     mass, position = math.inf, 0.0
 
@@ -157,22 +158,22 @@ class SurfaceEnd:
     def begin(self, time: float) -> None:
         """Start a run at `time`, s."""
 
-    def asked_rate(self, time: float, size: float) -> float:
-        """It has none."""
+    def required_rate(self, time: float, size: float) -> float:
+        """Return 0: a surface has no rate."""
         return 0.0
 
     def press(self, pair: str, force: float) -> None:
-        """No force moves it."""
+        """Do nothing: no force moves the surface."""
 
     def look(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s)."""
         return self.position, 0.0
 
     def strike(self, impulse: float) -> None:
-        """No impulse moves it."""
+        """Do nothing: no impulse moves the surface."""
 
     def free(self) -> None:
-        """It has saved nothing."""
+        """There is no saved state to free."""
 
 
 PairEnd = PortEnd | PointEnd | SurfaceEnd
@@ -184,14 +185,14 @@ def end_of(
     inputs: dict[tuple[str, str], ForceInput],
     pulses: Pulses | None,
 ) -> PairEnd:
-    """Return one end of a pair; `pulses` gives it impulses; None where the law yields."""
+    """Return one end of a pair; `pulses` gives it impulses, None with a yielding law."""
     if isinstance(end, BodyPoint):
         return PointEnd(components, end, inputs, pulses)
     return PortEnd(components, end, inputs)
 
 
 class Scale:
-    """The largest displacement (m) and speed (m/s) that any body of a pair has had, by which others are small."""
+    """Largest displacement (m) and speed (m/s) of the bodies of all pairs: the scale of small gaps and speeds."""
 
     def __init__(self) -> None:
         self.displacement = self.speed = 0.0
@@ -203,12 +204,12 @@ class Scale:
 
     @property
     def slow(self) -> float:
-        """Closing speed that is none, m/s."""
+        """Closing speed below which there is no impact, m/s."""
         return SLOW * self.speed
 
 
 class BodyRate:
-    """The fastest rate that a body says of itself, rad/s; 0 where it says none."""
+    """The fastest rate that a body's variables give, rad/s; 0 without such variables."""
 
     def __init__(self, body: Component) -> None:
         def group(names: Sequence[str]) -> Callable[[], list[float]]:
@@ -225,7 +226,7 @@ class BodyRate:
         )
 
     def fastest(self) -> float:
-        """Return it; the parameters are set."""
+        """Return the fastest rate, rad/s; the parameters are set."""
         rates = [0.0, *self._natural(), *self._forcing()]
         spring = self._spring()
         if spring:
@@ -235,5 +236,5 @@ class BodyRate:
 
 
 def precision_at(time: float) -> float:
-    """Seconds to which an impact is located."""
+    """Return the precision of the instant of an impact, s."""
     return PRECISION + 2.0 * math.ulp(time)

@@ -1,11 +1,11 @@
 """The force that two bodies in contact hold on each other over a step: equal and opposite, so that momentum is exact.
 
-- Of a law that yields it is the force that does over the step the work of the law: the mean of its elastic part over
-  the way (a discrete gradient, so that energy is closed), and of the rest over time.
-- Of two bodies that rest on each other after their impacts (law restitution) it is the force that leaves them without
-  relative velocity at the end of the step.
+- With a yielding law the force does the work of the law over the step. It is the mean of the elastic part over the way
+  (a discrete gradient, so that energy is closed) and of the rest over time.
+- With the law restitution, bodies rest on each other after their impacts. Their force leaves no relative velocity at
+  the end of the step.
 
-Either depends on where the step ends, which is repeated until both agree.
+Both forces depend on the end of the step, which is repeated until end and force agree.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from vibroimpact.orchestrator.importer.pairs.ends import Motion
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath
 
-#: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
+#: Difference of the held force from the force that the step requires, relative to the contact's largest; below it they
+#: agree.
 FORCE_TOLERANCE = 1e-12
-#: A way shorter than this part of the penetration has one force.
+#: Way over a step, relative to the penetration, below which the elastic force is taken in its middle.
 SHORT_WAY = 1e-7
-#: Part of the gap that has opened between two resting bodies which a step closes again.
+#: Part of the gap that has opened between two resting bodies, closed again in one step.
 CLOSING = 0.2
 
 
 class PairLaw:
-    """A law that yields: force and potential of a penetration (m) and its rate (m/s)."""
+    """A yielding law: force and potential of a penetration (m) and its rate (m/s)."""
 
     def __init__(self, spec: PairSpec) -> None:
         self._stiffness = spec.stiffness
@@ -54,12 +55,12 @@ class PairLaw:
         return self._exponent * self.elastic(penetration) / penetration if penetration > 0.0 else 0.0
 
     def depth(self, energy: float) -> float:
-        """Return the penetration that takes this energy (J), m."""
+        """Return the penetration that stores this energy (J), m."""
         power = self._exponent + 1.0
         return float((power * energy / self._stiffness) ** (1.0 / power))
 
     def mean(self, path: StepPath) -> float:
-        """Return the force that does over a step the work of the law, N; `path` is that of the penetration."""
+        """Return the force that does the law's work over a step, N; `path` is the path of the penetration."""
         first, last = path.start, path.end
         way = last - first
         if abs(way) > SHORT_WAY * max(abs(first), abs(last)):
@@ -94,13 +95,13 @@ class PairForce:
         self._before: tuple[float, float] | None = None
 
     def start(self, gap: float, closing: float, size: float) -> None:
-        """Guess the force of a step of `size` s that begins at this gap (m) and closing speed (m/s)."""
+        """Guess the force of a step of `size` s that starts at this gap (m) and closing speed (m/s)."""
         self._gap, self._closing, self._before = gap, closing, None
         if self.law is not None:
             self.value = self.law.force(-gap + 0.5 * closing * size, closing)
 
     def arrive(self, closing: float) -> None:
-        """A contact begins with this closing speed, m/s: how long it takes says how long its steps may be."""
+        """Start a contact at this closing speed, m/s: its duration limits its steps."""
         assert self.law is not None
         depth = self.law.depth(0.5 * self._mass * closing * closing) if closing > 0.0 else 0.0
         self._arrival_limit = math.pi * depth / closing if depth > 0.0 else math.inf
@@ -113,7 +114,7 @@ class PairForce:
         return min(own, self._arrival_limit)
 
     def corrects(self, gap: float, closing: float, size: float) -> bool:
-        """Take the force that the end of a step asks for; returns whether it is another one."""
+        """Take the force that the end of a step requires, N; returns whether it is a new force."""
         assert self.law is not None
         answer = self.law.mean(StepPath(-self._gap, self._closing, -gap, closing, size))
         self._largest = max(self._largest, abs(answer))
@@ -125,27 +126,27 @@ class PairForce:
         return self.value != force
 
     def at(self, now: Motion) -> float:
-        """Return the force of the law where the bodies are now, N."""
+        """Return the force of the law at the present positions, N."""
         assert self.law is not None
         return self.law.force(-now.gap, now.closing)
 
     def excess(self, gap: float, closing: float, size: float) -> float:
-        """Return the closing speed that a force at rest has left at the end of a step, m/s."""
+        """Return the closing speed that a force at rest leaves at the end of a step, m/s."""
         self._pace = max(self._pace, size)
         return closing - CLOSING * (gap - self._rest_gap) / self._pace
 
     def rest(self, gap: float) -> None:
-        """The bodies stay together from now on, at this gap, m."""
+        """Keep the bodies together from now on, at this gap, m."""
         self.resting, self.value, self._rest_gap = True, 0.0, gap
         self._largest = self._pace = 0.0
 
     def let_go(self) -> None:
-        """They do not press each other any more."""
+        """End the force between the bodies."""
         self.resting, self.value = False, 0.0
 
 
 def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:
-    """Where a straight line through two answers equals its argument; without a second one the answer itself."""
+    """Return the fixed point of the straight line through two answers; with one answer, that answer."""
     if before is None or force == before[0]:
         return answer
     slope = (answer - before[1]) / (force - before[0])

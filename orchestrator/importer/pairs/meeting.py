@@ -1,4 +1,4 @@
-"""Where two bodies meet within a step: cubics through gap and closing speed, compared with the bodies' own motion."""
+"""The instant at which two bodies meet: cubics through gap and closing speed, compared with the bodies' own motion."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from vibroimpact.orchestrator.importer.pairs.ends import Motion, Scale
 from vibroimpact.orchestrator.importer.revision import Bracket, refine
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import StepPath
 
-#: Halvings of a step in search of a contact.
+#: Most halvings of a step in search of a contact.
 MOST_HALVINGS = 40
-#: A gap this many times larger than what the bodies close at their speeds over a step is not looked into.
+#: Gap over the change of the gap in a step at the speeds of its ends; above it the step is not searched.
 FAR = 4.0
-#: Allowance for the error of a cubic over the defect that it has in its middle.
+#: Allowed error of a cubic, over its error in the middle of the step.
 MARGIN = 2.0
-#: Rounding of a gap, over the gap below which bodies touch.
+#: Rounding of a gap, relative to the gap below which bodies touch.
 ROUNDING = 0.01
 
 
 class MeetingSearch:
     """The search of one step for the first instant at which two bodies meet: their gap is below `room`, m.
 
-    `motion_at` takes the bodies to so many seconds into the step, and returns the pair there. The scale is the largest
-    displacement and speed.
+    `motion_at` steps the bodies to a number of seconds into the step, and returns the pair there. The scale is the
+    largest displacement and speed.
     """
 
     def __init__(self, motion_at: Callable[[float], Motion], scale: Scale, room: float) -> None:
         self._motion_at, self._scale, self._room = motion_at, scale, room
 
     def level(self, start: Motion) -> float:
-        """The gap at which bodies meet: 0, or a little less where they touch already and do not close."""
+        """Return the gap at which bodies meet, m: 0, or a little less where they touch already and do not close."""
         return 0.0 if start.gap > self._room else min(start.gap, 0.0) - self._room
 
     def keeps_clear(self, first: Motion, last: Motion) -> bool:
-        """Is the gap too large to be closed at such speeds, or do both lie idle beside each other?"""
+        """Is the gap too large to be closed at such speeds, or do both bodies lie idle on each other?"""
         is_idle = max(abs(first.closing), abs(last.closing)) <= self._scale.slow
         if is_idle and max(abs(first.gap), abs(last.gap)) <= self._room:
             return True
@@ -55,7 +55,7 @@ class MeetingSearch:
         )
 
     def _bracket(self, first: Motion, last: Motion, halvings: int) -> tuple[Motion, Motion] | None:
-        """Return the ends of a part of the step in which the bodies meet for the first time; None where they do not."""
+        """Return the ends of a part of the step in which the bodies first meet; None if they do not meet."""
         if self.keeps_clear(first, last):
             return None
         level = self.level(first)

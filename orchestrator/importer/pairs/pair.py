@@ -1,12 +1,12 @@
-"""Bodies that hit each other: where two contact points meet, and what they do to each other.
+"""Bodies that hit each other: the instant at which two contact points meet, and their mutual impulse or force.
 
-The gap of a pair is `clearance + displacement of the upper body - displacement of the lower one`. No body knows of it,
-so their step is looked at from outside: a cubic through gap and closing speed at both ends is compared with the gap
-in the middle, and the step is halved until both agree and the cubic keeps clear of 0; the first crossing is refined on
-the bodies' own motion, and all components are stepped to it.
+The gap of a pair is `clearance + displacement of the upper body - displacement of the lower one`. No body knows its
+gap, so the step is searched from outside. A cubic through gap and closing speed at both ends is compared with the gap
+in the middle. The step is halved until both agree and the cubic keeps clear of 0. The first crossing is refined on the
+bodies' own motion, and all components are stepped to it.
 
-At that instant the pairs that touch and close give each other impulses, one pair after the other, the fastest first,
-until none closes: docs/equations.md 3.5.
+At that instant the pairs that touch and close give each other impulses until none closes. They do so one pair after
+the other, the fastest first: docs/equations.md 3.5.
 """
 
 from __future__ import annotations
@@ -31,35 +31,36 @@ from vibroimpact.orchestrator.importer.pairs.meeting import MeetingSearch
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
-#: Likewise of bodies that rest on each other, whose force makes up for less.
+#: Closing speed of bodies at rest on each other, relative to the largest speed, above which they hit: their force
+#: corrects smaller speeds.
 HIT_AT_REST = 1e-4
-#: Bodies sunk into each other by this many times the distance at which they touch are pressed together.
-SUNK = 100.0
-#: Likewise, at any time, by this part of the largest displacement.
-DEEP = 1e-3
-#: A step is at most this part of the shortest period of a body that says its own.
+#: Overlap in touching distances, above which bodies with impacts are pressed together.
+PRESSED_OVERLAP = 100.0
+#: Overlap at the end of a step, relative to the largest displacement, above which bodies are pressed together.
+PRESSED_END_OVERLAP = 1e-3
+#: Longest step, as a part of the shortest period of a body that states its periods.
 PART_OF_PERIOD = 0.125
-#: A step of two bodies that rest on each other is this much shorter again.
+#: A step of two bodies that rest on each other is shorter by this factor.
 RESTING_STEPS = 16.0
-#: Bounces still to come that take less than this part of the longest one are summed to their end.
+#: Time of all bounces still to come, relative to the longest bounce, below which they are summed to their end.
 ACCUMULATED = 1e-3
-#: A bounce whose closing speed times its duration is below this times the distance of touching is none.
-LOW = 64.0
-#: A bounce is small below this times the longest step and the largest speed; after so many in a row elastic bodies are
-#: pressed together.
-SMALL = 1e-3
+#: Closing speed times duration of a bounce, in touching distances, below which there is no bounce.
+LEAST_BOUNCE = 64.0
+#: Duration over the longest step, and closing speed over the largest speed: a bounce is small with both below this
+#: part. After `MOST_SMALL_BOUNCES` of them in a row elastic bodies are pressed together.
+SMALL_BOUNCE = 1e-3
 MOST_SMALL_BOUNCES = 1000
-#: Distance of bodies at rest on each other that a reader is told of, relative to the largest displacement.
-TOLD_DISTANCE = 1e-9
-#: A step longer than its limit by more than this factor, as its end shows, is made shorter.
+#: Distance of bodies at rest on each other, relative to the largest displacement, above which a remark reports it.
+REPORTED_DISTANCE = 1e-9
+#: Length of a step over its limit as known at its end, above which the step is shortened.
 SLACK = 1.5
 
 
 class Pair:
     """Two bodies that hit each other, named `lower.contact[k] - upper.contact[k]`; their steps may always be repeated.
 
-    The gap between them closes as the displacement of the lower one grows. `begins_pressed`: the step under way is the
-    first, and a contact that yields begins with it.
+    The gap between them closes as the displacement of the lower body grows. `begins_pressed`: the step under way is
+    the first, and a yielding contact begins with it.
     """
 
     active = True
@@ -85,14 +86,14 @@ class Pair:
         self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
         self._scale = scale
         self.impacts = ContactImpacts()
-        # what variables of other tools' bodies mean is not known
+        # the meaning of the variables of other tools' bodies is unknown
         self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
         self.take(spec)
 
     def take(self, spec: PairSpec) -> None:
         """Take the numbers of a specification, for the next run."""
         self.clearance, self.restitution = spec.clearance, spec.restitution
-        self._surface = 0.0  # where bodies that have rested on each other part: not quite at a gap of 0
+        self._surface = 0.0  # gap at which bodies part after a rest: not quite 0
         self._force = PairForce(spec)
         self.yields = self._force.law is not None
 
@@ -108,8 +109,8 @@ class Pair:
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
-        self._overlap = self._opening = 0.0  # of bodies at rest, m
-        self._most_force = 0.0  # likewise, N
+        self._overlap = self._opening = 0.0  # largest overlap and opening of bodies at rest, m
+        self._most_force = 0.0  # largest force between bodies at rest, N
         self.arrived = self.closed = self._pressed = self.begins_pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
@@ -122,7 +123,7 @@ class Pair:
 
     @property
     def struck(self) -> Component:
-        """The body whose event an impact is."""
+        """The body that gets the event of an impact."""
         return self.lower.body
 
     @property
@@ -131,7 +132,7 @@ class Pair:
         return 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
 
     def look(self, seconds: float = 0.0) -> Motion:
-        """Return the pair as it is now, `seconds` into a step."""
+        """Return the motion of the pair now, `seconds` into a step."""
         low, low_speed = self.lower.look()
         high, high_speed = self.upper.look()
         scale = self._scale
@@ -140,7 +141,7 @@ class Pair:
         return Motion(seconds, self.clearance + high - low - self._surface, low_speed - high_speed)
 
     def is_due(self, now: Motion, time: float) -> bool:
-        """Do the bodies touch and close, and hit each other?"""
+        """Do the bodies touch and close fast enough for an impact?"""
         if self.yields:
             return False
         room = self._scale.room(time)
@@ -151,7 +152,7 @@ class Pair:
     # ---- a step ----
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
-        """Look at the pair before a step; returns where it should end, s."""
+        """Prepare the pair for a step; returns where the step should end, s."""
         is_first, self._is_at_start, self.begins_pressed = self._is_at_start, False, False
         if self._is_new and not self._pulses.under_way:
             self._ask_bodies(time, target - time)
@@ -187,25 +188,25 @@ class Pair:
         return target
 
     def _ask_bodies(self, time: float, size: float) -> None:
-        """Ask bodies of other tools, before their first step, what ours say of themselves."""
-        rate = max(end.asked_rate(time, size) for end in (self.lower, self.upper))
+        """Find the fastest rates of other tools' bodies by trials, before their first step."""
+        rate = max(end.required_rate(time, size) for end in (self.lower, self.upper))
         if rate > 0.0:
             self._longest = min(self._longest, PART_OF_PERIOD * 2.0 * math.pi / rate)
         self._is_new = False
 
     def apply(self) -> None:
-        """Give both bodies the force of the contact."""
+        """Write the force of the contact to both bodies."""
         if self.closed or self._pressed:
             self.lower.press(self.name, -self._force.value)
             self.upper.press(self.name, self._force.value)
             self._pressed = self._force.value != 0.0
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not self.closed:
             return None if self._pulses.under_way else self._meeting(time, end)
         if not self.yields:
-            return None  # all that rest are looked at together
+            return None  # `Pairs.rest_end` handles all bodies at rest together
         now, size = self.look(end - time), end - time
         scale = self._force.time_scale(now.gap) / self._steps
         if size > SLACK * scale:
@@ -228,29 +229,29 @@ class Pair:
         self._force.value = value
 
     def excess(self, size: float) -> float:
-        """Return the closing speed that is left at the end of a step of bodies that rest, m/s."""
+        """Return the closing speed left at the end of a step of bodies at rest, m/s."""
         now = self.look(size)
         return self._force.excess(now.gap, now.closing, size)
 
     def mobility(self, other: Pair) -> float:
-        """Return the closing speed that a unit of impulse between another pair takes from this one, 1/kg."""
+        """Return the closing speed that a unit of impulse between another pair takes from this pair, 1/kg."""
         ends = ((self.lower, 1.0), (self.upper, -1.0))
         others = ((other.lower, 1.0), (other.upper, -1.0))
         return sum(s * t / a.mass for a, s in ends for b, t in others if a.name == b.name)
 
     def stop_resting(self) -> None:
-        """In the step under way the bodies do not press each other."""
+        """Part the bodies in the step under way: they do not press each other."""
         self._part(self._start.gap)
         self._start = self._start._replace(gap=max(self._start.gap, 0.0))
         self.closed = False
 
     def end_step(self, size: float) -> None:
-        """The step of `size` s counts.
+        """Accept the step of `size` s.
 
-        ComponentError: the bodies have come deep into each other, as the forces of several at rest did not agree.
+        ComponentError: the bodies overlap deeply, as the forces of several bodies at rest did not agree.
         """
         end = self._time + size
-        deep = DEEP * max(self._scale.displacement, self._held_back()) + self._room
+        deep = PRESSED_END_OVERLAP * max(self._scale.displacement, self._held_back()) + self._room
         if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
         if self.closed and self.yields:
@@ -262,9 +263,9 @@ class Pair:
         self.arrived = self.yields and not self.closed and met
 
     def _held_back(self) -> float:
-        """Return how far the force of rests has kept the bodies from moving in a longest step, m; 0 without a rest.
+        """Return the distance over which the force at rest held the bodies back in a longest step, m; else 0.
 
-        Bodies that rest on each other from the start have not moved: nothing else says what is far for them.
+        Bodies that rest on each other from the start have not moved, so only this distance gives their scale.
         """
         if self.rests:
             self._most_force = max(self._most_force, abs(self._force.value))
@@ -274,22 +275,22 @@ class Pair:
         return 0.5 * self._most_force / self._reduced * longest * longest
 
     def remark(self) -> str:
-        """Return what a reader of the results must know of bodies at rest; empty where there is nothing."""
-        if not max(self._overlap, self._opening) > TOLD_DISTANCE * self._scale.displacement:
+        """Return a remark on the overlap and opening of bodies at rest; empty where both are small."""
+        if not max(self._overlap, self._opening) > REPORTED_DISTANCE * self._scale.displacement:
             return ""
-        told = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
-        return f"{self.name}: bodies at rest on each other {told}. Use a shorter macro_step"
+        distances = f"overlap by up to {self._overlap:.2g} m and part by up to {self._opening:.2g} m"
+        return f"{self.name}: bodies at rest on each other {distances}. Use a shorter macro_step"
 
     def _touches(self, now: Motion) -> bool:
         return now.gap < -self._room or (now.gap <= self._room and now.closing > 0.0)
 
     def _meeting(self, time: float, end: float) -> float | None:
-        """Return the instant in the step just made at which the bodies meet first, s; None without one before `end`."""
+        """Return the instant of the step just made at which the bodies first meet before `end`, s, or None."""
         precision = precision_at(time)
         size = end - time
         last = self.look(size)
         search = MeetingSearch(lambda seconds: self._motion_at(time, seconds), self._scale, self._room)
-        # other inputs of a step that ends elsewhere, and forces that hold others, may have moved them since
+        # a step that ends elsewhere has other inputs and forces, which may have moved the bodies since
         if abs(end - self._agreed) <= precision and last.gap >= search.level(self._start) - self._room:
             return None
         if search.keeps_clear(self._start, last):
@@ -317,9 +318,9 @@ class Pair:
         return self.look(seconds)
 
     def strike(self, now: Motion, time: float, *, is_first: bool) -> None:
-        """Give both bodies, now before their impact, its impulse; bounces that accumulate end in rest.
+        """Give both bodies, now before their impact, its impulse; accumulating bounces end in rest.
 
-        The first has bodies that met by themselves: no other impact of this instant has thrown them at each other.
+        `is_first`: the bodies met by themselves, and no other impact of this instant has thrown them at each other.
         """
         restitution = 0.0 if is_first and self._accumulates(now, time) else self.restitution
         impulse = (1.0 + restitution) * now.closing * self._reduced
@@ -334,7 +335,7 @@ class Pair:
             self._force.rest(now.gap)
 
     def _part(self, gap: float) -> None:
-        """Bodies that have rested on each other part where they are."""
+        """Part bodies that have rested on each other, at their present gap."""
         self._force.let_go()
         self._surface += min(gap, 0.0)
 
@@ -348,22 +349,24 @@ class Pair:
         )
 
     def is_pressed(self, now: Motion, time: float) -> bool:
-        """Have the bodies sunk into each other, or made many small bounces in a row?"""
-        is_sunk = now.gap < -SUNK * self._scale.room(time) and not self._force.resting
-        return is_sunk or self._small_bounces > MOST_SMALL_BOUNCES
+        """Return whether the bodies overlap, or have made many successive small bounces."""
+        overlaps = now.gap < -PRESSED_OVERLAP * self._scale.room(time) and not self._force.resting
+        return overlaps or self._small_bounces > MOST_SMALL_BOUNCES
 
     def _accumulates(self, now: Motion, time: float) -> bool:
-        """Would the bounces still to come end in next to no time, or be no higher than bodies that touch are apart?"""
+        """Are the bounces still to come short in sum, or no higher than the touching distance?"""
         flight, before = time - self._last_impact, self._last_flight
         self._last_impact, self._last_flight = time, flight
         if math.isfinite(flight):
             self._longest_flight = max(self._longest_flight, flight)
-        is_small = flight < SMALL * self._longest_step and now.closing < SMALL * self._scale.speed
+        is_small = (
+            flight < SMALL_BOUNCE * self._longest_step and now.closing < SMALL_BOUNCE * self._scale.speed
+        )
         self._small_bounces = self._small_bounces + 1 if is_small else 0
         if self.restitution in (0.0, 1.0):
             return self.restitution == 0.0
         shrinks = flight < 0.5 * (1.0 + self.restitution) * before
         longest = min(self._longest, self._longest_flight)
         left = flight * self.restitution / (1.0 - self.restitution)
-        low = now.closing * flight < LOW * self._scale.room(time)
+        low = now.closing * flight < LEAST_BOUNCE * self._scale.room(time)
         return low or (shrinks and left < ACCUMULATED * longest)

@@ -1,4 +1,4 @@
-"""A body of any tool at a rigid stop (an ImpactStop with restitution): a pair of which one body never moves."""
+"""A body of any tool at a rigid stop (an ImpactStop with restitution): a pair whose second body never moves."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from vibroimpact.orchestrator.importer.stop_contacts.pulse import UNKNOWN_MASS, 
 class RigidStop(Pair):
     """A body of any tool, and a stop that answers the speed of each impact with a coefficient of restitution.
 
-    The stop of the contact says in each run whether it is rigid. The pairs of the importer share the scale of its
-    motion and the impulses of its body; `inputs` are the force inputs so far.
+    The contact's stop says in each run whether it is rigid. All pairs of the importer share the scale of motion and
+    the impulses of a body. `inputs` are the force inputs so far.
     """
 
     def __init__(
@@ -40,11 +40,11 @@ class RigidStop(Pair):
 
     @property
     def struck(self) -> Component:
-        """The body whose event an impact is."""
+        """The body that gets the event of an impact."""
         return self._bond.body
 
     def begin(self, time: float) -> None:
-        """Start a run: the stop says on which side it is, and where."""
+        """Start a run with the side and the position of the stop."""
         stop, pulse = self._bond.stop, self._point.pulse
         assert isinstance(pulse, Pulse)
         pulse.given = self._bond.given_mass
@@ -54,10 +54,10 @@ class RigidStop(Pair):
         super().begin(time)
 
     def strike(self, now: Motion, time: float, *, is_first: bool) -> None:
-        """Give the body the impulse of its impact, as `Pair` does, by what the stop answers to its speed."""
+        """Give the body the impulse of its impact, as `Pair` does, with the stop's restitution at this speed."""
         self.restitution = self._bond.stop.restitution(now.closing)
         super().strike(now, time, is_first=is_first)
 
     def free(self) -> None:
-        """Give back what trials have saved."""
+        """Free the states that trial steps have saved."""
         self._point.free()

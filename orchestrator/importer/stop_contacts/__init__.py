@@ -1,7 +1,7 @@
-"""Contacts of bodies with stops that are other components: forces that both agree on over each step.
+"""Contacts of bodies with stops that are other components: body and stop agree on the force over each step.
 
-`contact_bond` where the body follows the force of its stop, `held_force` where it is another tool's and holds one:
-`asked_stop` says what the stop answers, `step_path` where the contact point goes over a step, `force_input` what a
-force does to the body, `pulse` is the impulse of a body that takes forces only. `plain_contacts` is what a plain
-connection does instead.
+`contact_bond` is for a body that follows the force of its stop, `held_force` for a body of another tool, which holds a
+force. `asked_stop` evaluates the stop's force, and `step_path` is the path of the contact point over a step.
+`force_input` is the effect of a force on a body, `pulse` the impulse of a body that takes only forces.
+`plain_contacts` measures the error of a plain connection.
 """

@@ -1,4 +1,4 @@
-"""A stop that is asked for its force at motions that nobody has made, from a saved state and without a trace."""
+"""A stop that gives its force at trial motions, from a saved state, which is restored afterwards."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
 LOWER_SIDE = 2
-#: Search for the depth that stops a body: evaluations, and the misfit of the energy (logarithm) that ends it.
+#: Search for the depth that stops a body: most evaluations, and the misfit of the energy (logarithm) that ends it.
 PROBES = 40
 PROBE_MISFIT = 0.2
-#: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
+#: Exponent of the depth in the stored energy: 2 for a spring, 2.5 for an elastic contact of two bodies; between them.
 ENERGY_EXPONENT = 2.25
-#: Part of a step within which a force that has fallen to 0 fell at the end of it.
+#: Last part of a step: a force that falls to 0 within it falls at the end of the step.
 AT_END = 1e-6
-#: Search for a surface: its first way, times (1 + |displacement|), m, and how often the way is doubled.
+#: Search for a surface: its first distance, over (1 + |displacement|), m, and most doublings of the distance.
 FIRST_WAY = 1e-9
 WAYS = 60
-#: How the search goes deeper where the stop does not answer yet.
+#: Factor of the depth where the stop does not answer yet.
 DEEPER = 16.0
 
 
 def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: float) -> float | None:
-    """Return a depth at which force times depth is about an energy, m; None where the stop does not answer so.
+    """Return a depth at which force times depth is about an energy, m; None if the stop gives no such depth.
 
-    The stop's force is in N at a depth in m; the energy, mass * speed^2 (J), and the guess of a depth (m) are > 0.
+    The stop's force is in N at a depth in m. The energy, mass * speed^2 (J), and the guess of a depth (m) are > 0.
 
     >>> depth = depth_that_stops(lambda depth: 1e4 * depth, 1.0, 1e-3)
     >>> 0.8 < 1e4 * depth**2 < 1.25
@@ -51,7 +51,7 @@ def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: f
 
 
 class ContactWork:
-    """The energy that contacts take up, from the work of each step; `steps` and `contacts` are counted."""
+    """The energy that contacts take up, from the work of each step; it counts `steps` and `contacts`."""
 
     def __init__(self) -> None:
         self.steps = self.contacts = 0
@@ -71,10 +71,10 @@ class ContactWork:
         self.contacts += self._sum == 0.0 and self._largest == 0.0
         self.steps += 1
         self._sum += work
-        self._largest = max(self._largest, abs(self._sum))  # one that begins pressed in gives energy back
+        self._largest = max(self._largest, abs(self._sum))  # a contact pressed in at first gives energy
 
     def share(self, residual: float) -> str:
-        """Return in words what a residual, J, has done to this energy."""
+        """Return the share of a residual, J, in this energy, in words."""
         word, size = "added" if residual > 0.0 else "taken", abs(residual)
         part = size / max(self.energy, size)
         return f"{word} {size:.3g} J, {part:.2g} of the energy of its contacts"
@@ -83,8 +83,8 @@ class ContactWork:
 class AskedStop:
     """The stop of a contact, in the direction into it: displacements grow on the way in.
 
-    The sign is 1 for a stop above the body, -1 for one below: displacement into it = sign * displacement. Its force
-    begins at the surface, in that direction, m; None while nobody knows.
+    The sign is 1 for a stop above the body, -1 for a stop below: displacement into it = sign * displacement. `surface`
+    is the displacement, m, at which its force begins; None while unknown.
     """
 
     def __init__(self, component: Component, spec: StopContactSpec) -> None:
@@ -106,18 +106,18 @@ class AskedStop:
 
     @property
     def is_rigid(self) -> bool:
-        """Does it answer with a coefficient of restitution, and no force?"""
+        """Does the stop answer with a coefficient of restitution, and no force?"""
         return self._law is not None and int(self._law.get()[0]) in rigid_law_numbers()
 
     def restitution(self, speed: float) -> float:
-        """Return its coefficient of restitution for an impact at this speed, m/s; it is rigid."""
+        """Return the coefficient of restitution of a rigid stop for an impact at this speed, m/s."""
         assert self._coefficient is not None
         self.show(self.position, speed)
         return float(self._coefficient.get()[0])
 
     @property
     def position(self) -> float:
-        """Where a stop of ours is, in the direction into it, m."""
+        """Position of a stop of ours, in the direction into it, m."""
         assert self.surface is not None
         return self.surface
 
@@ -128,7 +128,7 @@ class AskedStop:
         self.surface = None if self._position is None else self.sign * float(self._position.get()[0])
 
     def mark(self, time: float) -> None:
-        """Take its present state for that at the start of a step, at `time`, s."""
+        """Save the stop's state as that at the start of a step, at `time`, s."""
         if not self._is_ours:
             self.component.instance.save(self._start)
         self._time = time
@@ -136,7 +136,7 @@ class AskedStop:
 
     @contextmanager
     def asking(self) -> Iterator[None]:
-        """Leave what is asked inside without a trace."""
+        """Restore the stop's state on exit: trials inside leave no trace."""
         instance = self.component.instance
         instance.save(self._now)
         kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
@@ -161,7 +161,7 @@ class AskedStop:
         return float(self._answer.get()[0])
 
     def show(self, displacement: float, velocity: float) -> None:
-        """Give it this motion into it."""
+        """Set this motion into the stop as its inputs."""
         values = self._inputs.values
         values[0] = self.sign * displacement
         if len(values) > 1:
@@ -169,9 +169,9 @@ class AskedStop:
         self._inputs.set()
 
     def search_surface(self, displacement: float, velocity: float, size: float) -> None:
-        """Search where its force begins, from this motion on; nothing is found where it never answers.
+        """Search the start of the stop's force from this displacement; `surface` stays None if the force never begins.
 
-        Further and further ways are tried, in where it is free and out where it is pressed.
+        The search goes ever further: inward from a free point, outward from a pressed point.
         """
         pressed = self.force(displacement, velocity, size) > 0.0
         way = FIRST_WAY * (1.0 + abs(displacement)) * (-1.0 if pressed else 1.0)
@@ -195,7 +195,7 @@ class AskedStop:
                 free = middle
 
     def work(self, path: StepPath) -> float:
-        """Work that its law takes from the body on a way, J."""
+        """Return the work that the stop's law takes from the body on a path, J."""
         if self._last is None or self._last[0] != path:
             powers = self._powers(path, 0.0, 1.0)
             smooth = all(powers) and self.force(*path.at(1.0 - AT_END), path.size) > 0.0
@@ -204,7 +204,7 @@ class AskedStop:
         return self._last[1]
 
     def _powers(self, path: StepPath, begin: float, finish: float) -> list[float]:
-        """Parts of the work between two fractions of the step, J; each is 0 only where there is no force."""
+        """Return the parts of the work between two fractions of the step, J; each part is 0 only without force."""
         found, share = [], finish - begin
         for u, weight in NODES:
             at = begin + u * share
@@ -214,7 +214,7 @@ class AskedStop:
         return found
 
     def _marks(self, path: StepPath) -> list[float]:
-        """Fractions of a step between which the force is smooth: where it begins and ends."""
+        """Return the fractions of a step between which the force is smooth: its start and its end."""
 
         def is_pressed(u: float) -> bool:
             return self.force(*path.at(u), path.size) > 0.0
@@ -233,7 +233,7 @@ class AskedStop:
         return [last_true(is_free, 0.0, turn), turn, last_true(is_pressed, turn)]
 
     def leaves(self, path: StepPath) -> float | None:
-        """Fraction of a step at which the force has fallen to 0; None where it has not, or at its end."""
+        """Return the fraction of a step at which the force has fallen to 0; None if it has not, or only at the end."""
 
         def is_pressed(u: float) -> bool:
             return self.force(*path.at(u), path.size) > 0.0
@@ -243,7 +243,7 @@ class AskedStop:
         return last_true(is_pressed, AT_END)
 
     def free(self) -> None:
-        """Give back its saved states, before it is freed."""
+        """Free its saved states, before the component is freed."""
         for slot in (self._start, self._now):
             if slot and not self.component.instance.is_fatal:
                 self.component.instance.free_state(slot)

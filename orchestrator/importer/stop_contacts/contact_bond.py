@@ -1,14 +1,14 @@
-"""Contacts with stops that yield: what the importer does so that body and stop agree over a step.
+"""Contacts with yielding stops whose force the body follows: body and stop agree over a step.
 
-A body whose contact law is `external_force` presses a stop in through many steps. Over each it follows the stop's force
-as `applied_force + applied_stiffness * (penetration - at the start) + applied_damping * (rate - at the start)`, on its
-exact flow: a linearly implicit exchange, exact for a linear stop. Here is decided
+A body whose contact law is `external_force` presses a stop in through many steps. Over each step it follows the stop's
+force as `applied_force + applied_stiffness * (penetration - at the start) + applied_damping * (rate - at the start)`,
+on its exact flow. This is a linearly implicit exchange, exact for a linear stop. This module decides
 
-- how long a step in a contact may be: a fraction of the time that the contact takes, which the law of the stop
-  says for the speed of arrival;
-- which slopes the body gets from a stop that answers with a force alone: those of a straight line (in penetration and
-  rate) through the stop's own answers at both ends of the step, which is repeated until they settle (Broyden's
-  method). A stop that cannot go back to a saved state gets those of the step before.
+- the length of a step in a contact: a fraction of the contact's duration, which follows from the stop's law and the
+  speed of arrival;
+- the slopes for a stop that answers with a force alone. They belong to a straight line (in penetration and rate)
+  through the stop's answers at both ends of the step. The step is repeated until they settle (Broyden's method). With
+  a stop that cannot go back to a saved state the slopes of the step before are used.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import DEEPER, LOWER_SIDE, depth_that_stops
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
-#: What a body's contact port must have, beside the inputs.
+#: Outputs that a body's contact port must have, besides the inputs.
 PORT_OUTPUTS = ("displacement", "velocity")
 FORCE, STIFFNESS, DAMPING = "applied_force", "applied_stiffness", "applied_damping"
-#: A body on the surface is there within this times the sizes that its displacement is the sum of: the stop's position,
-#: the largest displacement before, and the way in the time of the run.
+#: Distance to the surface, below which a body is on it, relative to a sum. The sum is the largest displacement so
+#: far, with twice the stop's position, and the present rate times the time of the run.
 SURFACE_ROUNDING = 1e-15
-#: A step longer than its limit by more than this factor, as its end shows, is repeated.
+#: Length of a step over its limit as known at its end, above which the step is repeated.
 SLACK = 1.5
-#: A straight line that misses the stop's answer by less than this, relative to the largest force, hits it.
+#: Misfit of the straight line at the stop's answer, relative to the largest force; below it line and answer agree.
 FORCE_TOLERANCE = 1e-11
 MOST_REPETITIONS = 20
-#: A first step from rest on the surface is not looked for below this times (1 + |time|), s.
+#: Shortest first step from rest on the surface, over (1 + |time|), s.
 SHORTEST = 1e-9
-#: A way of which one end is this much nearer to the surface than the other is near it.
+#: Ratio of the smaller penetration of a path's ends to the larger, below which the force is taken as a power.
 NEAR_SURFACE = 0.5
-#: A force this close to a straight line through the surface, relative, is one.
+#: Relative difference of a force from a straight line through the surface, below which the force is linear.
 STRAIGHT = 1e-9
 
 
@@ -54,16 +54,16 @@ class _Answer:
     damping: float = 0.0
 
     def force_at(self, penetration: float, rate: float) -> float:
-        """Return what the body makes of it elsewhere, before it clips what pulls, N."""
+        """Return the body's force at another motion, before it clips negative forces, N."""
         return (
             self.force + self.stiffness * (penetration - self.penetration) + self.damping * (rate - self.rate)
         )
 
 
 class ContactBond:
-    """One contact port of a body, and the component that answers it with a force.
+    """One contact port of a body, and the component that answers its motion with a force.
 
-    Its name is `body.contact[k]`, and `start` the contact at the start of the step under way.
+    Its name is `body.contact[k]`. `start` is the contact at the start of the step under way.
     """
 
     def __init__(
@@ -81,8 +81,8 @@ class ContactBond:
         self.gives_slopes = any(self._answers[last] is not None for last in (STIFFNESS, DAMPING))
         """The stop answers with slopes."""
         found = [connection for connection in self._answers.values() if connection is not None]
-        self._asked = self.stop.group("Float64", [c.source[1] for c in found])
-        self._told = list(self._answers.values())
+        self._stop_outputs = self.stop.group("Float64", [c.source[1] for c in found])
+        self._connections = list(self._answers.values())
         self._outputs = self.body.group("Float64", [f"{self.port}.{last}" for last in PORT_OUTPUTS])
         self._line = self.body.group("Float64", [f"{self.port}.{x}" for x in (FORCE, STIFFNESS, DAMPING)])
         self._law = self.body.group("Int64", [f"{self.port}.law", f"{self.port}.side"])
@@ -98,7 +98,7 @@ class ContactBond:
         self._probe_state = c_void_p()
         self.follows = False
         self.active = False
-        """The contact is closed in the step under way, or may be."""
+        """The contact is closed in the step under way, or may close in it."""
 
     @staticmethod
     def _connection(transfers: Sequence[Transfer], target: str) -> ConnectionSpec | None:
@@ -107,7 +107,7 @@ class ContactBond:
 
     @property
     def revisable(self) -> bool:
-        """Can a step of both sides be repeated?"""
+        """Can a step of body and stop be repeated?"""
         return self.body.has_states and self.stop.has_states
 
     # ---- a run ----
@@ -125,7 +125,7 @@ class ContactBond:
             return
         self.sign = -1.0 if side == LOWER_SIDE else 1.0
         self._position, self._mass = (float(v) for v in self._constants.get())
-        self._gains = [self._gain(self._transfers, c) for c in self._told]
+        self._gains = [self._gain(self._transfers, c) for c in self._connections]
         self._input_gains = [self._gain(self._inward, c) for _, c in self._feeding]
         self._stiffness = self._damping = 0.0
         self._depth: float | None = None
@@ -143,19 +143,19 @@ class ContactBond:
     # ---- a step ----
 
     def look(self) -> _Answer:
-        """Read both sides as they are now: the body's motion, and the stop's last answer."""
+        """Return the contact now: the body's motion, and the stop's last answer."""
         displacement, velocity = (float(v) for v in self._outputs.get())
-        values = iter(self._asked.get())
+        values = iter(self._stop_outputs.get())
         force, stiffness, damping = (
             0.0 if connection is None else gain * float(next(values))
-            for gain, connection in zip(self._gains, self._told, strict=True)
+            for gain, connection in zip(self._gains, self._connections, strict=True)
         )
         return _Answer(self.penetration_at(displacement), self.sign * velocity, force, stiffness, damping)
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
-        """Look at the contact before a step from `time` to `target` (s); returns where the step should end, s.
+        """Prepare the contact for a step from `time` to `target` (s); returns where the step should end, s.
 
-        A contact is divided into so many steps.
+        `steps` is the number of steps of a contact.
         """
         if not self.follows:
             return target
@@ -182,33 +182,33 @@ class ContactBond:
         return min(target, time + self._longest)
 
     def _is_closed(self, now: _Answer, time: float) -> bool:
-        """Pressed in, or on the surface and perhaps about to be."""
+        """Is the contact pressed in, or on the surface and perhaps about to be?"""
         size = abs(now.penetration) + 2.0 * abs(self._position)
         self._largest_displacement = max(self._largest_displacement, size)
-        # a stop at 0 is met within a rounding of the flight before, not of its position
+        # the position of a stop at 0 has no rounding, but the flight before the contact has
         on_surface = abs(now.penetration) <= SURFACE_ROUNDING * (
             self._largest_displacement + abs(time * now.rate)
         )
         return now.force > 0.0 or (now.rate >= 0.0 if on_surface else now.penetration > 0.0)
 
     def _time_scale(self, stiffness: float) -> float:
-        """Half a period of the contact mass on this stiffness, divided into the steps, s."""
+        """Return half a period of the contact mass on this stiffness, divided by the number of steps, s."""
         return math.pi * math.sqrt(self._mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
 
     def apply(self) -> None:
-        """Give the body the straight line that it follows, where it is not the stop's own answer."""
+        """Write the straight line that the body follows, unless it is the stop's own answer."""
         if self.active and (self._corrected or not self.gives_slopes):
             self._line.values[:] = self.start.force, self.start.stiffness, self.start.damping
             self._line.set()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not (self.active and self.revisable):
             return None
         now = self.look()
         self._largest_force = max(self._largest_force, now.force)
         if self._is_blind and not now.penetration > 0.0 and end - time > SHORTEST * (1.0 + abs(time)):
-            return time + (end - time) / DEEPER  # it went who knows how far in, and came back
+            return time + (end - time) / DEEPER  # it went in by an unknown depth, and came back
         scale = self._time_scale(self._slope_at(now))
         if end - time > SLACK * scale:
             return time + scale
@@ -216,7 +216,7 @@ class ContactBond:
         return end if changed else None
 
     def end_step(self, size: float) -> None:
-        """The step of `size` s counts: what it shows of the slopes serves the next one."""
+        """Accept the step of `size` s; its slopes serve the next step."""
         if self.active and not self.gives_slopes:
             if not self.revisable:
                 self._pace = 1.0 / size if size > 0.0 else 1.0
@@ -224,7 +224,7 @@ class ContactBond:
             self._stiffness, self._damping = self.start.stiffness, self.start.damping
 
     def _slope_at(self, now: _Answer) -> float:
-        """Stiffness at the end of a step; a stop without slopes is taken for a spring."""
+        """Return the stiffness at the end of a step, N/m; a stop without slopes counts as a spring."""
         if not now.force > 0.0:
             return 0.0
         if self.gives_slopes:
@@ -232,17 +232,17 @@ class ContactBond:
         return now.force / now.penetration if now.penetration > 0.0 else 0.0
 
     def _correct(self, now: _Answer) -> bool:
-        """Make the line's mean that of the stop's force over the step, once; returns whether it has changed.
+        """Give the line the mean of the stop's force over the step, once; returns whether it has changed.
 
-        Of a force with slopes at both ends the mean over the way between them is known to the fourth order; near the
-        surface the force is taken for a power of the penetration. A linear stop's force is on its line already.
+        With slopes at both ends the mean force over the way is known to the fourth order. Near the surface the force
+        is taken as a power of the penetration. The force of a linear stop is on its line already.
         """
         start = self.start
         lets_go = start.force > 0.0 >= now.force
         missed = now.force - max(0.0, start.force_at(now.penetration, now.rate))
         if self._corrected or (abs(missed) <= FORCE_TOLERANCE * self._largest_force and not lets_go):
             return False
-        # a touch-down may find the point a rounding inside: a line bent from there may let go at once
+        # at touch-down the point may be a rounding inside: a line bent there may separate at once
         if start.force > FORCE_TOLERANCE * self._largest_force and now.force > 0.0:
             self._bend(now)
         elif now.force > 0.0:
@@ -254,7 +254,7 @@ class ContactBond:
         return True
 
     def _bend(self, now: _Answer) -> None:
-        """The line with the mean of the stop's force, parallel to the chord unless that would let go too early."""
+        """Set the line with the mean of the stop's force, parallel to the chord unless that separates too early."""
         start = self.start
         first, last, mean = start.force, now.force, self._mean(now)
         moved, sped = now.penetration - start.penetration, now.rate - start.rate
@@ -269,7 +269,7 @@ class ContactBond:
         start.force = first
 
     def _mean(self, now: _Answer) -> float:
-        """Mean of the stop's force over the way: of a cubic, near the surface of a power."""
+        """Return the mean of the stop's force over the way, N, from a cubic; near the surface from a power."""
         start = self.start
         moved, sped = now.penetration - start.penetration, now.rate - start.rate
         near, far = sorted((start.penetration, now.penetration))
@@ -281,9 +281,9 @@ class ContactBond:
         return 0.5 * (start.force + now.force) + bend / 12.0
 
     def _lets_go_at_surface(self, now: _Answer) -> bool:
-        """On the way out: the line that ends at the surface and does the work of a power of the penetration.
+        """On the way out, end the line at the surface with the work of a power of the penetration.
 
-        A spring and a dashpot let go before the surface, where their straight line says.
+        A spring and a dashpot separate before the surface, as their straight line gives.
         """
         start = self.start
         elastic = start.force - start.damping * start.rate
@@ -296,9 +296,9 @@ class ContactBond:
         return True
 
     def _learn(self, now: _Answer) -> bool:
-        """Make the slopes fit the stop's answer at the end of the step; returns whether they have changed."""
+        """Fit the slopes to the stop's answer at the end of the step; returns whether they have changed."""
         start = self.start
-        penetration = max(now.penetration, 0.0)  # beyond the surface the force is that at the surface: none
+        penetration = max(now.penetration, 0.0)  # outside the stop its force is 0, as at the surface
         defect = now.force - start.force_at(penetration, now.rate)
         if now.force <= 0.0 and defect >= 0.0:
             return False  # both have let go
@@ -309,8 +309,7 @@ class ContactBond:
     def _turn(self, moved: float, sped: float, defect: float) -> bool:
         """Turn the line so that it rises by `defect` more on this way.
 
-        Broyden's update is the smallest change of the slopes that does it, penetration and rate being measured by the
-        contact's own time.
+        Broyden's update is the smallest such change of the slopes; the contact's own time scales penetration to rate.
         """
         size = (self._pace * moved) ** 2 + sped * sped
         if size == 0.0:
@@ -319,13 +318,13 @@ class ContactBond:
         self.start.damping += defect * sped / size
         return True
 
-    # ---- how long a contact takes ----
+    # ---- duration of a contact ----
 
     def _contact_time(self, start: _Answer, time: float, target: float) -> float:
-        """Time that a contact takes which begins like this, s; infinite where the slope given says it.
+        """Return the duration of a contact that begins like this, s; infinite if the stop's slope sets the step.
 
-        The depth at which the stop's force has done about as much work as the body has energy, `mass * rate^2`, is
-        asked from the stop itself. A spring of that depth takes pi * depth / rate, exactly; other laws about that.
+        The stop is evaluated for the depth at which force times depth is the energy `mass * rate^2`. A spring of that
+        depth takes exactly pi * depth / rate; other laws take about that.
         """
         if start.stiffness > 0.0 and self.gives_slopes:
             return math.inf
@@ -348,15 +347,15 @@ class ContactBond:
         return found
 
     def _force_at(self, penetration: float, rate: float, time: float, size: float) -> float:
-        """Ask the stop what it would answer, N; its state is left changed."""
+        """Return the stop's force at this motion, N; the stop's state is left changed."""
         instance = self.stop.instance
         instance.restore(self._probe_state)
         self._write_inputs(penetration, rate)
         instance.step_undiscarded(time, size)
-        return self._gains[0] * float(self._asked.get()[0])
+        return self._gains[0] * float(self._stop_outputs.get()[0])
 
     def _write_inputs(self, penetration: float, rate: float) -> None:
-        """Give the stop this motion of the contact point."""
+        """Write this motion of the contact point to the stop."""
         values = {
             "displacement": self._position + self.sign * penetration,
             "velocity": self.sign * rate,
@@ -365,21 +364,21 @@ class ContactBond:
             self._inputs.values[i] = self._input_gains[i] * values[last]
         self._inputs.set()
 
-    # ---- seen from the energy's side ----
+    # ---- for the energy residual ----
 
     def force_of_stop(self) -> float:
-        """Force that the stop answers now, N."""
-        return self._gains[0] * float(self._asked.get()[0])
+        """Return the present force of the stop, N."""
+        return self._gains[0] * float(self._stop_outputs.get()[0])
 
     def penetration_at(self, displacement: float) -> float:
-        """Return how far the contact point is in the stop, m."""
+        """Return the penetration of the contact point at this displacement, m."""
         return self.sign * (displacement - self._position)
 
     def show_stop(self, displacement: float, velocity: float) -> None:
-        """Give the stop this motion of the contact point."""
+        """Write this motion of the contact point to the stop."""
         self._write_inputs(self.penetration_at(displacement), self.sign * velocity)
 
     def free(self) -> None:
-        """Give back its saved state, before the stop is freed."""
+        """Free its saved state, before the stop is freed."""
         if self._probe_state and not self.stop.instance.is_fatal:
             self.stop.instance.free_state(self._probe_state)

@@ -1,4 +1,4 @@
-"""The force input of a body of any tool, and what a force does to the body: trial steps that leave no trace."""
+"""The force input of a body of any tool, and trial steps that show the effect of a force and leave no trace."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ from ctypes import c_void_p
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 
-#: Trial step: part of the communication step, change of the velocity relative to it, and rounds to get there.
+#: Trial step: part of the communication step, target change of the velocity relative to it, most rounds.
 TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
-#: Change of the velocity, relative, that rounding does not blur.
+#: Relative change of the velocity, below which rounding blurs it.
 VISIBLE = 1e-9
-#: Deviation from the mass alone at which a trial step is short enough, and below which there is none.
+#: Relative deviation of the response from the mass alone: a trial step is short enough below NEARLY, and a deviation
+#: below ALONE counts as 0.
 NEARLY, ALONE = 0.1, 1e-6
-#: What is said of a body that takes no steps of other sizes, though its description declares that it does.
+#: Hint for a body that takes no steps of other sizes, although its description declares that it does.
 OWN_STEPS = (
     "A body that makes steps of its own takes no [[contact]]: its description should say so "
     "(canHandleVariableCommunicationStepSize = false, fixedInternalStepSize)."
 )
-#: Largest relative difference between a mass that is given and the one that a trial step finds.
+#: Largest relative difference between a given mass and the mass that a trial step finds.
 MASS_TOLERANCE = 0.05
 
 
 class ForceInput:
     """An input that takes the sum of the forces of one or several contacts.
 
-    The parts are the force of each contact, along the displacement, N.
+    `parts` holds the force of each contact along the displacement, N.
     """
 
     def __init__(self, body: Component, name: str) -> None:
@@ -37,15 +38,15 @@ class ForceInput:
         self.parts: dict[str, float] = {}
 
     def write(self, more: float = 0.0) -> None:
-        """Give the body the sum, and `more` N."""
+        """Write the sum of the parts, plus `more` N, to the body."""
         self._group.values[0] = sum(self.parts.values()) + more
         self._group.set()
 
 
 class TrialSteps:
-    """Steps of a body with states from where it is now, each with another force on a point.
+    """Steps of a body with states from its present state, each with another force on a point.
 
-    The velocity is the output that says the velocity of the point.
+    `velocity` is the output with the velocity of the point.
     """
 
     def __init__(self, body: Component, velocity: str, force: ForceInput) -> None:
@@ -58,7 +59,7 @@ class TrialSteps:
 
     @contextmanager
     def untraced(self, time: float) -> Iterator[None]:
-        """Leave what is tried inside, from `time` (s) on, without a trace."""
+        """Restore the body's state on exit: trials inside, from `time` (s) on, leave no trace."""
         instance = self.body.instance
         instance.save(self._state)
         self._time = time
@@ -77,7 +78,7 @@ class TrialSteps:
         return float(self._velocity.get()[0])
 
     def velocity(self, size: float, force: float = 0.0) -> float:
-        """Return the velocity after a step of `size` s with `force` N more, m/s."""
+        """Return the velocity after a step of `size` s with an additional force, N, in m/s."""
         instance = self.body.instance
         instance.restore(self._state)
         self._input.write(force)
@@ -87,7 +88,7 @@ class TrialSteps:
     def found_mass(self, time: float, trial: float, longest: float) -> float:
         """Return the effective mass of the point, kg, by steps of `trial` s with and without a small force.
 
-        The steps grow up to `longest`, s, where no force changes the velocity; if none does, it is not a number.
+        The steps grow up to `longest`, s, while no force changes the velocity. Without any change the mass is NaN.
         """
         start, force, mass = self.now(), 1.0, math.nan
         with self.untraced(time):
@@ -95,22 +96,22 @@ class TrialSteps:
                 free = self.velocity(trial)
                 reached = self.velocity(trial, force)
                 changed = reached - free
-                wanted = TRIAL_CHANGE * max(abs(start), abs(reached))
+                target = TRIAL_CHANGE * max(abs(start), abs(reached))
                 if abs(changed) <= VISIBLE * abs(reached):
                     force *= 1e6
                     if changed == 0.0:
                         trial = min(2.0 * trial, longest)
                     continue
                 mass = force * trial / changed
-                if abs(changed) <= 2.0 * wanted or wanted == 0.0:
+                if abs(changed) <= 2.0 * target or target == 0.0:
                     break
-                force *= wanted / abs(changed)
+                force *= target / abs(changed)
         return mass
 
     def check_mass(self, given: float, time: float, size: float) -> None:
-        """Compare a mass that is given (kg) with what a communication step of `size` s says, whole and a part of it.
+        """Compare a given mass (kg) with the masses found by a communication step of `size` s and by a part of it.
 
-        A body whose velocity answers no trial is taken at its word. ComponentError: neither agrees.
+        A given mass stands if no trial changes the velocity. ComponentError: the given mass agrees with neither.
         """
         trials = (TRIAL_STEP * size, size)
         found = [self.found_mass(time, trial, size) for trial in trials]
@@ -120,10 +121,11 @@ class TrialSteps:
             raise self.mass_error(given, answers, time)
 
     def rate(self, mass: float, time: float, size: float) -> float:
-        """Return a rate (rad/s) at which the body answers a force otherwise than its mass (kg) alone.
+        """Return the rate (rad/s) at which the body's response to a force departs from its mass (kg) alone.
 
-        What a force adds to the velocity over a step h is below h/mass by (rate h)^2/6 for a spring. Trial steps begin
-        with `size`, s, and are halved until it is nearly h/mass; 0 where it is that to rounding, or never.
+        For a spring, a force changes the velocity over a step h by (rate h)^2/6 less than h/mass, relatively. Trial
+        steps begin with `size`, s, and are halved until the change is nearly h/mass. The result is 0 if the change is
+        h/mass to rounding, or never near it.
         """
         change = abs(self.now()) or 1.0
         with self.untraced(time):
@@ -138,7 +140,7 @@ class TrialSteps:
     def measured_mass(self, time: float, size: float) -> float:
         """Return the effective mass of the point by a part of a communication step of `size` s, kg.
 
-        ComponentError: the whole step changes the velocity as the part does.
+        ComponentError: the whole step changes the velocity as much as the part does.
         """
         trials = (TRIAL_STEP * size, size)
         found = [self.found_mass(time, trial, size) for trial in trials]
@@ -146,7 +148,7 @@ class TrialSteps:
         return found[0]
 
     def _refuse_own_steps(self, trials: Sequence[float], found: Sequence[float], time: float) -> None:
-        """Raise the error of a body that makes one step of its own, whatever size it is asked for."""
+        """Raise ComponentError for a body that makes one step of its own, whatever size is requested."""
         if not (all(map(math.isfinite, found)) and agrees(found[0], TRIAL_STEP * found[1])):
             return
         raise ComponentError(
@@ -157,7 +159,7 @@ class TrialSteps:
         )
 
     def mass_error(self, given: float, found: Sequence[float], time: float) -> ComponentError:
-        """Return the error of a mass that is none of those that trial steps find."""
+        """Return the error of a given mass that no trial step finds."""
         least, most = min(found), max(found)
         masses = f"{most:.6g}" if agrees(least, most) else f"{least:.6g} to {most:.6g}"
         return ComponentError(
@@ -168,13 +170,13 @@ class TrialSteps:
         )
 
     def free(self) -> None:
-        """Give back the saved state, before the body is freed."""
+        """Free the saved state, before the body is freed."""
         if self._state and not self.body.instance.is_fatal:
             self.body.instance.free_state(self._state)
 
 
 def agrees(given: float, found: float) -> bool:
-    """Is a given mass the one that was found, as far as steps are chosen by it?
+    """Does a given mass agree with a found mass well enough to choose steps by it?
 
     >>> agrees(1.0, 1.01), agrees(1000.0, 1.0)
     (True, False)

@@ -1,15 +1,15 @@
-"""A contact of any body with a stop that yields: the force that is held over each step, so that energy is closed.
+"""A contact of any body with a yielding stop: the force held over each step closes the energy balance.
 
-A body of another tool takes a force and holds it over a step. The one force that does over the step the work of the
-stop's law is that work over the way, `force = integral of law * velocity / displacement`; where the way turns within
-the step, it is the mean of the elastic part over the displacement (Gonzalez, J. Nonlinear Sci. 6, 1996: a discrete
-gradient) and of the rest over time. It depends on where the step ends, and so on itself:
+A body of another tool takes a force and holds it over a step. The held force does the work of the stop's law over the
+step: `force = integral of law * velocity / displacement`. If the motion turns within the step, the force is the sum of
+two means: the elastic part over the displacement (Gonzalez, J. Nonlinear Sci. 6, 1996: a discrete gradient) and the
+rest over time. The force depends on the end of the step, and so on itself:
 
-- a motion with constant accelerations is foreseen, from the effective mass and the step before;
-- where the body can go back, the step is repeated with the force that its true end asks for, until both agree.
+- a motion with constant accelerations is predicted, from the effective mass and the step before;
+- if the body can go back, the step is repeated with the force for its true end, until both agree.
 
-Steps begin where the body reaches the surface (step revision; foreseen where it cannot go back) and end where the
-force falls to 0.
+Steps begin where the body reaches the surface and end where the force falls to 0. Step revision finds the surface; for
+a body that cannot go back it is predicted.
 """
 
 from __future__ import annotations
@@ -38,32 +38,33 @@ from vibroimpact.orchestrator.importer.stop_contacts.force_input import (
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import PART
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
 
-#: A body on the surface is there within this times its displacement and the surface's.
+#: Distance to the surface below which a body is on it, relative to its displacement plus the surface's position.
 SURFACE_ROUNDING = 4.0 * np.finfo(float).eps
-#: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
+#: Difference of the held force from the force that the step requires, relative to the contact's largest; below it they
+#: agree.
 FORCE_TOLERANCE = 1e-12
-#: Iterations of a foreseen step, and rounds in which it is made shorter.
+#: Most iterations of a predicted step, and most rounds in which it is shortened.
 FORESIGHTS, SHORTENINGS = 12, 12
 MOST_SHORTENED = 3.0
-#: Misfit of a foreseen force, relative to the largest, beyond which its step is far too long.
-LOST = 0.1
-#: A step longer than its limit by more than this factor, as its end shows, is made shorter.
+#: Misfit of a predicted force, relative to the largest, above which its step is far too long.
+LARGE_MISFIT = 0.1
+#: Length of a step over its limit as known at its end, above which the step is shortened.
 SLACK = 1.5
-#: A way out of the stop shorter than this, times the limit of a step, is none: the body has left.
-LEFT = 1e-9
-#: A way that turns within this part of a step from one of its ends does not turn within it.
+#: Exit path, as a fraction of the step limit, below which the body counts as separated.
+EXIT_PART = 1e-9
+#: Part of a step at each of its ends; a turn of the motion there does not divide the step.
 NOT_AT_ONCE = 1e-3
-#: Part of the energy of its contacts that a held force may add without a word.
-UNTOLD = 1e-3
-#: A step that is to end where the body turns ends at less than this times its other velocity.
-SLOW = 0.2
-#: Steps are not shorter than this times (1 + |time|), s.
+#: Residual relative to the energy of the contacts, above which a remark reports it.
+REPORTED_RESIDUAL = 1e-3
+#: Ratio of the smaller end velocity to the larger, below which a motion that turns counts as ending at its turn.
+TURNING_RATIO = 0.2
+#: Shortest step, over (1 + |time|), s.
 ROOM = 1e-13
-#: An arrival is foreseen surely where accelerations change the velocity on the way to it by less than this part of
-#: it; else a part of the way is made first.
-SURE, NEARER = 1e-9, 0.75
-#: A step shorter than this times the one before says too little of accelerations.
-TELLING = 0.05
+#: Change of the velocity by a changing acceleration on the way to an arrival, relative to it. Below STEADY_CHANGE
+#: the predicted arrival is certain; above it a step covers the part APPROACH_PART of the time to it.
+STEADY_CHANGE, APPROACH_PART = 1e-9, 0.75
+#: Length of a step over the step before, below which it gives too little information on accelerations.
+INFORMATIVE_PART = 0.05
 
 
 class HeldForceBond:
@@ -90,11 +91,11 @@ class HeldForceBond:
         self.revisable = self.body.has_states
         """Its steps can be repeated."""
         self.given_mass = spec.mass
-        """Effective mass that is given, kg."""
+        """Given effective mass, kg."""
         self.impacts = ContactImpacts()
         self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
-        """Energy that the body was given beyond the law of the stop, J."""
+        """Energy that the body received beyond the law of the stop, J."""
 
     def begin(self) -> None:
         """Start a run: the parameters are set."""
@@ -107,7 +108,7 @@ class HeldForceBond:
         self._is_new = True
         self._work = ContactWork()
         self._other, self._other_slope = 0.0, 0.0
-        self._told: tuple[float, float, float] | None = None
+        self._last_sample: tuple[float, float, float] | None = None
         self._searched = False
         self._checks_mass = self.revisable
         self._agreed = -math.inf
@@ -118,7 +119,7 @@ class HeldForceBond:
     # ---- a step ----
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
-        """Look at the contact before a step; returns where the step should end, s."""
+        """Prepare the contact for a step; returns where the step should end, s."""
         self._steps, self._time, self._room = steps, time, ROOM * (1.0 + abs(time))
         self._start = self._look()
         self.stop.mark(time)
@@ -127,8 +128,8 @@ class HeldForceBond:
         self._misfit = math.inf
         was_closed, self.arrived = self.closed, False
         size = target - time
-        if not self.revisable and self._told is None:
-            size *= TRIAL_STEP  # how it is accelerated is not known yet
+        if not self.revisable and self._last_sample is None:
+            size *= TRIAL_STEP  # the body's acceleration is not known yet
         with self.stop.asking():
             if self.stop.surface is None and not self._searched:
                 self.stop.search_surface(*self._start, size)
@@ -150,12 +151,12 @@ class HeldForceBond:
         return self._planned
 
     def apply(self) -> None:
-        """Give the body its force."""
+        """Write the force to the body."""
         self._input.parts[self.contact.stop] = -self.stop.sign * self._force
         self._input.write()
 
     def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
         if not (self.revisable and end > time):
             return None
         path = self._path(end - time)
@@ -168,18 +169,18 @@ class HeldForceBond:
             if path.size > SLACK * scale:
                 self._last_try = None
                 return time + self._foresee(max(scale, path.size / MOST_SHORTENED))
-            wanted = self._mean_force(path)
-        return end if self._corrects(wanted) else None
+            required = self._mean_force(path)
+        return end if self._corrects(required) else None
 
     def agree(self, time: float, end: float) -> None:
-        """Before the step of a body that cannot repeat it: the step ends at `end`, s, wherever it was to end."""
+        """Adjust the force of a body that cannot repeat its step to the end of the step, s."""
         if not self.revisable and self.closed and end != self._planned:
             with self.stop.asking():
                 self._force = self._foreseen_force(end - time)
             self.apply()
 
     def end_step(self, size: float) -> None:
-        """The step of `size` s counts: sum its residual, and learn from it."""
+        """Accept the step of `size` s: add its residual, and update the accelerations."""
         if not size > 0.0:
             return
         path = self._path(size)
@@ -195,8 +196,8 @@ class HeldForceBond:
         self.stop.show(path.end, path.end_velocity)
 
     def remark(self) -> str:
-        """What a reader of the results must know; empty where there is nothing."""
-        if not abs(self.residual) > UNTOLD * self._work.energy:
+        """Return a remark on the residual; empty where it is small."""
+        if not abs(self.residual) > REPORTED_RESIDUAL * self._work.energy:
             return ""
         why = "" if self.revisable else f" of {self.contact.body}, which cannot restore its state,"
         return f"{self.name}: the held force{why} has {self._work.share(self.residual)}. Use a shorter macro_step"
@@ -209,7 +210,7 @@ class HeldForceBond:
         return StepPath(*self._start, *self._look(), size)
 
     def _learn(self, path: StepPath) -> None:
-        """What accelerates the body beside this contact, now and on the way to the next step; no impulse does."""
+        """Estimate the body's acceleration by all but this contact, now and until the next step; not by impulses."""
         if PART in self._input.parts:
             return
         if self.mass is None:
@@ -220,21 +221,21 @@ class HeldForceBond:
             contact = self._force / self.mass
         middle = self._time + 0.5 * path.size
         other = (path.end_velocity - path.start_velocity) / path.size + contact
-        if self._told is not None:
-            if path.size < TELLING * self._told[2]:
+        if self._last_sample is not None:
+            if path.size < INFORMATIVE_PART * self._last_sample[2]:
                 return
-            self._other_slope = (other - self._told[1]) / (middle - self._told[0])
-        self._told, self._other = (middle, other, path.size), other
+            self._other_slope = (other - self._last_sample[1]) / (middle - self._last_sample[0])
+        self._last_sample, self._other = (middle, other, path.size), other
 
     # ---- touching, arriving ----
 
     def _presses(self, size: float) -> bool:
-        """Is the body in the stop's force at the start of the step, or on its way in?"""
+        """Does the stop press the body at the start of the step, or is the body on its way in?"""
         displacement, velocity = self._start
         return velocity > 0.0 or self.stop.force(displacement, velocity, size) > 0.0
 
     def _touches(self, displacement: float, velocity: float, size: float) -> bool:
-        """Is the body in the stop's force, or on the surface and on its way in?"""
+        """Does the stop press the body, or is the body on the surface and on its way in?"""
         surface = self.stop.surface
         if surface is not None:
             rounding = SURFACE_ROUNDING * (abs(displacement) + abs(surface))
@@ -245,7 +246,7 @@ class HeldForceBond:
         return self.stop.force(displacement, velocity, size) > 0.0
 
     def _arrival(self, time: float, end: float, path: StepPath) -> float | None:
-        """Return the instant at which a free body has come to the surface within the step just made, s."""
+        """Return the instant at which a free body reaches the surface within the step just made, s."""
         if abs(end - self._agreed) <= PRECISION * (1.0 + abs(time)):
             return None
         inside = self._inside(path)
@@ -260,7 +261,7 @@ class HeldForceBond:
         return self._agreed
 
     def _inside(self, path: StepPath) -> float | None:
-        """Seconds into a free step at which the body is in the stop; None where it is nowhere."""
+        """Return the seconds into a free step at which the body is in the stop; None if it never is."""
         if self._touches(path.end, path.end_velocity, path.size):
             if self.stop.surface is None:
                 self.stop.search_surface(path.end, path.end_velocity, path.size)
@@ -269,9 +270,9 @@ class HeldForceBond:
         return turn * path.size if turn and surface is not None and path.at(turn)[0] > surface else None
 
     def _time_of_arrival(self, time: float, path: StepPath, inside: float, precision: float) -> float | None:
-        """Search the body's own way; None where it is not inside there after all."""
+        """Return the arrival on the body's own path, s; None if the body is not inside the stop there after all."""
         surface = self.stop.surface
-        if surface is None:  # its force has no end on the way out
+        if surface is None:  # its force does not end on the way out
             return None
 
         def gap(size: float) -> float:
@@ -288,10 +289,10 @@ class HeldForceBond:
                 self.body.step_from_start(time, u * inside)
                 return not self.stop.force(*self._look(), u * inside) > 0.0
 
-            return last_true(is_free) * inside  # it had let go within the stop, and is back on the law
+            return last_true(is_free) * inside  # it had let go within the stop, and is in contact again
 
     def _foreseen_arrival(self, size: float) -> float:
-        """Seconds to the surface at the accelerations of the step before; `size` where it is farther."""
+        """Return the seconds to the surface at the accelerations of the step before; `size` if it is farther."""
         surface, (displacement, velocity) = self.stop.surface, self._start
         if surface is None or displacement >= surface:
             return size
@@ -302,20 +303,20 @@ class HeldForceBond:
         arrival = 2.0 * gap / (velocity + math.sqrt(square))
         if arrival >= size:
             return size
-        blurred = abs(self._other_slope) * arrival**2 > SURE * abs(velocity)
-        return max(self._room, NEARER * arrival if blurred else arrival)
+        blurred = abs(self._other_slope) * arrival**2 > STEADY_CHANGE * abs(velocity)
+        return max(self._room, APPROACH_PART * arrival if blurred else arrival)
 
     # ---- the beginning of a contact ----
 
     def _begin_contact(self, size: float) -> None:
-        """Find what a step in this contact may be: a part of the time that the contact takes."""
+        """Set the step limit of this contact: a part of the contact's duration."""
         displacement, velocity = self._start
         if self.mass is None:
             self.mass = self._found_mass(size)
         self._largest, self._limit = 0.0, math.inf
         surface = self.stop.surface
         if surface is None:
-            surface = self.stop.surface = displacement  # it began in the stop: nobody has seen it free
+            surface = self.stop.surface = displacement  # the contact began in the stop
         if velocity > 0.0:
             energy = self.mass * velocity * velocity
             guess = velocity * size if self._depth is None else self._depth
@@ -327,18 +328,18 @@ class HeldForceBond:
                 self._depth, self._limit = depth, math.pi * depth / velocity / self._steps
 
     def check_mass(self, time: float, size: float) -> None:
-        """Compare a given mass with that of trial steps of up to `size` s, at the first of a run that can be tried."""
+        """Compare a given mass with trial steps of up to `size` s, at the first step of a run that allows it."""
         if self._checks_mass and self.given_mass is not None:
             self._trials.check_mass(self.given_mass, time, size)
             self._checks_mass = False
 
     def _found_mass(self, size: float) -> float:
-        """The effective mass of the contact point, by steps with and without a small force, kg."""
+        """Return the effective mass of the contact point, kg, by steps with and without a small force."""
         mass = self._trials.measured_mass(self._time, size)
         if not (mass > 0.0 and math.isfinite(mass)):
             got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
             signs = "Look at the variables and signs of [[contact]], or give its mass."
-            # a velocity that stays is most often that of a body that has not made its own step yet
+            # most often a velocity stays because the body has not made its own step yet
             hint = f"{signs} {OWN_STEPS}" if mass < 0.0 else f"{OWN_STEPS} {signs}"
             raise ComponentError(
                 f"{self.contact.body}.{self.contact.velocity}: expected a velocity that grows with the force "
@@ -351,10 +352,10 @@ class HeldForceBond:
     # ---- the force ----
 
     def _other_after(self, size: float) -> float:
-        """Mean acceleration of the body in the next `size` s by all but this contact, into the stop, m/s^2."""
-        if self._told is None:
+        """Return the body's mean acceleration into the stop in the next `size` s by all but this contact, m/s^2."""
+        if self._last_sample is None:
             return 0.0
-        return self._other + self._other_slope * (self._time + 0.5 * size - self._told[0])
+        return self._other + self._other_slope * (self._time + 0.5 * size - self._last_sample[0])
 
     def _foreseen_path(self, size: float, force: float) -> StepPath:
         assert self.mass is not None
@@ -364,7 +365,7 @@ class HeldForceBond:
         return StepPath(displacement, velocity, end, velocity + acceleration * size, size)
 
     def _foreseen_force(self, size: float) -> float:
-        """The force that agrees with the way that it is foreseen to lead to, N."""
+        """Return the force that agrees with the predicted path that it causes, N."""
         force = previous = self._force_half_way(size)
         answer = earlier = math.nan
         for turn in range(FORESIGHTS):
@@ -378,7 +379,7 @@ class HeldForceBond:
         return force
 
     def _is_foreseen(self, path: StepPath) -> bool:
-        """Has the body gone where it was foreseen to go? Then its force is the right one."""
+        """Does the body's path agree with the predicted path? Then its force is right."""
         foreseen = self._foreseen_path(path.size, self._force)
         sped = abs(path.start_velocity) + abs(path.end_velocity)
         return (
@@ -388,7 +389,7 @@ class HeldForceBond:
         )
 
     def _force_half_way(self, size: float) -> float:
-        """A first guess: the force in the middle of a way that begins with the force at its start."""
+        """Return a first guess of the force, N: in the middle of a path that begins with the force at its start."""
         first = self.stop.force(*self._start, size)
         displacement, velocity = self._foreseen_path(size, first).at(0.5)
         return max(0.0, self.stop.force(displacement, velocity, size))
@@ -400,10 +401,10 @@ class HeldForceBond:
             self._force = self._foreseen_force(size)
             path = self._foreseen_path(size, self._force)
             scale = self._time_scale(path)
-            if size > SLACK * scale or self._misfit > LOST * self._largest:
+            if size > SLACK * scale or self._misfit > LARGE_MISFIT * self._largest:
                 size = max(
                     min(scale, size / SLACK), size / MOST_SHORTENED
-                )  # a step far too long says little of the right one
+                )  # a step that is far too long gives little information on the right size
                 continue
             turn, leaves = path.turn, self.stop.leaves(path)
             if turn is not None and NOT_AT_ONCE < turn < 1.0 - NOT_AT_ONCE:
@@ -411,7 +412,7 @@ class HeldForceBond:
                 continue
             if leaves is None:
                 break
-            if leaves * size <= LEFT * min(whole, self._limit) + self._room:
+            if leaves * size <= EXIT_PART * min(whole, self._limit) + self._room:
                 self.closed, self._force = False, 0.0
                 return whole
             size *= leaves
@@ -420,7 +421,7 @@ class HeldForceBond:
         return size
 
     def _time_scale(self, path: StepPath) -> float:
-        """Half a period of the mass on the stiffness that a step has met, divided into the steps, s."""
+        """Return half a period of the mass on the stiffness met in a step, divided by the number of steps, s."""
         assert self.mass is not None
         moved = path.end - path.start
         if moved == 0.0:
@@ -430,10 +431,10 @@ class HeldForceBond:
         return math.pi * math.sqrt(self.mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
 
     def _mean_force(self, path: StepPath) -> float:
-        """The force that does over a step the work of the stop's law, N."""
+        """Return the force that does the work of the stop's law over a step, N."""
         moved = path.end - path.start
         slow, fast = sorted((path.start_velocity, path.end_velocity), key=abs)
-        if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= SLOW * abs(fast)):
+        if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= TURNING_RATIO * abs(fast)):
             return max(0.0, self.stop.work(path) / moved)
         mean = 0.0
         for u, weight in NODES:
@@ -443,24 +444,24 @@ class HeldForceBond:
             mean += weight * (elastic + whole - self.stop.force(displacement, 0.0, u * path.size))
         return max(0.0, mean)
 
-    def _corrects(self, wanted: float) -> bool:
-        """Take the force that the end of a step asks for; returns whether it is another one."""
+    def _corrects(self, required: float) -> bool:
+        """Take the force that the end of a step requires, N; returns whether it is a new force."""
         force = self._force
-        self._largest = max(self._largest, wanted)
-        if abs(wanted - force) <= FORCE_TOLERANCE * self._largest:
+        self._largest = max(self._largest, required)
+        if abs(required - force) <= FORCE_TOLERANCE * self._largest:
             return False
-        self._force = _secant(force, wanted, self._last_try)
-        self._last_try = force, wanted
+        self._force = _secant(force, required, self._last_try)
+        self._last_try = force, required
         return self._force != force
 
     def free(self) -> None:
-        """Give back its saved states, before its components are freed."""
+        """Free its saved states, before its components are freed."""
         self.stop.free()
         self._trials.free()
 
 
 def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:
-    """Where a straight line through two answers equals its argument; without a second one the answer itself."""
+    """Return the fixed point of the straight line through two answers; with one answer, that answer."""
     if before is None or force == before[0]:
         return answer
     slope = (answer - before[1]) / (force - before[0])

@@ -1,7 +1,7 @@
-"""Stops whose force goes to a body by plain connections: what such an exchange adds to the energy of their contacts.
+"""Stops whose force reaches a body by plain connections: the energy error of such an exchange.
 
-A plain force is that of the start of a step, or of the step before, and is held over a step: a lossless contact of n
-steps gains about 5/n of its energy. Nothing of a run shows it but its energy, so it is summed and told.
+A plain force has the value of the start of a step, or of the step before, and is held over a step. A lossless contact
+of n steps gains about 5/n of its energy. Only the energy of a run shows this error, so it is summed and reported.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import AskedStop
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import StepPath
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
-#: What an ImpactStop has beside the force; other components with a force need not be stops.
+#: Variables of an ImpactStop (the first is its force); other components with a force need not be stops.
 FORCE, ANSWER, DISPLACEMENT, VELOCITY = "applied_force", "applied_restitution", "displacement", "velocity"
-#: What a lossless contact of n steps gains of its energy by a plain connection, times n (docs/coupling.md).
+#: Relative energy gain of a lossless contact by a plain connection, times its number of steps (docs/coupling.md).
 GAIN = 5.0
-#: A part of the energy of its contacts that a connection may add without a word.
-UNTOLD = 1e-6
+#: Residual relative to the energy of the contacts, above which a remark reports it.
+REPORTED_RESIDUAL = 1e-6
 
 
 def plain_contact(
     variables: Mapping[str, Container[str]], connections: Sequence[ConnectionSpec], force: ConnectionSpec
 ) -> StopContactSpec | None:
-    """Return the contact that a plain connection of an ImpactStop's force closes; None where it closes none.
+    """Return the contact that a plain connection of an ImpactStop's force closes; None if it closes no contact.
 
-    The variables of each component are given by name, the connections are all of an importer.
+    The variables of each component are given by name, and all connections of an importer.
     """
     (stop, output), (body, target) = force.source, force.target
     port = target.rpartition(".")[0]
     if output != FORCE or ANSWER not in variables[stop] or f"{port}.law" in variables[body]:
         return None
-    told = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
-    if DISPLACEMENT not in told or any(connection.gain != 1.0 for connection in told.values()):
+    by_variable = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
+    if DISPLACEMENT not in by_variable or any(connection.gain != 1.0 for connection in by_variable.values()):
         return None
-    velocity = told.get(VELOCITY)
+    velocity = by_variable.get(VELOCITY)
     return StopContactSpec(
         body,
-        told[DISPLACEMENT].source[1],
-        told[DISPLACEMENT].source[1] if velocity is None else velocity.source[1],
+        by_variable[DISPLACEMENT].source[1],
+        by_variable[DISPLACEMENT].source[1] if velocity is None else velocity.source[1],
         target,
         stop,
         stop_velocity=None if velocity is None else VELOCITY,
@@ -48,9 +48,9 @@ def plain_contact(
 
 
 class PlainContact:
-    """A stop whose force a body gets by a plain connection.
+    """A stop whose force reaches a body by a plain connection.
 
-    The residual is the energy that the body was given beyond the law of the stop, J.
+    The residual is the energy that the body received beyond the law of the stop, J.
     """
 
     def __init__(
@@ -67,17 +67,17 @@ class PlainContact:
     def begin(self, gain: float) -> None:
         """Start a run with this gain."""
         self._gain = gain
-        self._begun = False
+        self._has_started = False
         self._work = ContactWork()
         self.residual = 0.0
 
     def before(self, time: float) -> None:
         """Note the start of a step."""
-        if not self._begun:
+        if not self._has_started:
             self._yields = not self._stop.is_rigid
             if self._yields:
                 self._stop.begin()
-            self._begun = True
+            self._has_started = True
         if self._yields:
             self._start = self._look()
             self._stop.mark(time)
@@ -98,8 +98,8 @@ class PlainContact:
         self._work.count(work)
 
     def remark(self) -> str:
-        """What a reader of the results must know; empty where there is nothing."""
-        if not abs(self.residual) > UNTOLD * self._work.energy:
+        """Return a remark on the residual; empty where it is small."""
+        if not abs(self.residual) > REPORTED_RESIDUAL * self._work.energy:
             return ""
         steps = self._work.steps / max(1, self._work.contacts)
         return (
@@ -109,7 +109,7 @@ class PlainContact:
         )
 
     def free(self) -> None:
-        """Give back its saved states, before its components are freed."""
+        """Free its saved states, before its components are freed."""
         self._stop.free()
 
     def _look(self) -> tuple[float, float]:
@@ -120,9 +120,9 @@ class PlainContact:
 
 
 class ForceThatBegins:
-    """A force from a component of another tool that is moved by one body alone, and perhaps its stop.
+    """A force from a component of another tool, which only one body moves: the component may be a stop.
 
-    It is one where the force begins or ends in a run; nobody knows its law then, and the error is told by its rule.
+    It counts as a stop if the force begins or ends in a run. Its law is unknown, so a rule gives its error.
     """
 
     def __init__(self, components: Mapping[str, Component], connection: ConnectionSpec) -> None:
@@ -134,7 +134,7 @@ class ForceThatBegins:
     def is_one(
         components: Mapping[str, Component], connections: Sequence[ConnectionSpec], force: ConnectionSpec
     ) -> bool:
-        """May this connection be that of a stop?"""
+        """May this connection carry the force of a stop?"""
         (source, output), (body, target) = force.source, force.target
         inward = [c for c in connections if c.target[0] == source]
         at_a_port = f"{target.rpartition('.')[0]}.law" in components[body].variables
@@ -152,7 +152,7 @@ class ForceThatBegins:
         self._steps = self._contacts = self._ended = 0
 
     def look(self) -> None:
-        """Look at the force after a step."""
+        """Count the steps, contacts and ends of contacts, after a step."""
         pressed = float(self._force.get()[0]) != 0.0
         self._contacts += pressed and self._pressed is not True
         self._steps += pressed
@@ -160,7 +160,7 @@ class ForceThatBegins:
         self._pressed = pressed
 
     def remark(self) -> str:
-        """What a reader of the results must know; empty where there is nothing."""
+        """Return a remark on the estimated error; empty if the force never ended."""
         if not self._ended:
             return ""
         steps = self._steps / self._contacts

@@ -1,9 +1,9 @@
-"""The impulse of a body that takes forces only: a force held over one step so short that the body hardly moves in it.
+"""The impulse of a body that takes only forces: a force held over one step so short that the body hardly moves in it.
 
-A pulse of J N s is the force J / size. Its size is a few times the precision to which an impact is located, so that
-what it moves the body by, J size / (2 mass), is below that at which bodies touch. What the body makes of it is tried
-before, from a saved state: twice the size with half the force must change the velocity alike, which gives the mass of
-the point (linear extrapolation to size 0), and the force is corrected until the velocity changes by J / mass.
+A pulse of J N s is the force J / size. Its size is a few times the precision of an impact's instant. It moves the body
+by J size / (2 mass), which is below the touching distance. Its effect is tried before, from a saved state. Twice the
+size with half the force must change the velocity alike; linear extrapolation to size 0 gives the mass of the point.
+The force is corrected until the velocity changes by J / mass.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import BodyPoint
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps, agrees
 
-#: Shortest pulse, s, and in units in the last place of the time; powers of 2, so that it ends at a number.
+#: Shortest pulse, s, and in units in the last place of the time; powers of 2, so that its end is a binary number.
 SHORTEST, SHORTEST_ULPS = 2.0**-39, 64.0
-#: A body that does not answer the shortest pulse is tried with ones this many times as long.
+#: Lengths of pulses to try, over the shortest, until the body answers.
 LONGER = (1.0, 16.0, 256.0)
-#: Relative difference of the masses that two pulses find, beyond which the body takes no impulses.
+#: Relative difference of the masses that two pulses find, above which the body takes no impulses.
 BEND = 1e-3
-#: Corrections of a force, and the misfit of the velocity, relative to it, that ends them.
+#: Most corrections of a force, and the misfit of the velocity, relative to it, that ends them.
 CORRECTIONS, MISFIT = 8, 1e-14
-#: Largest misfit of the velocity, relative to its change, over MISFIT, that is taken where no correction makes it less:
-#: rounding, in a body whose other points move much faster than the one that is hit.
+#: Largest misfit of the velocity, relative to its change, over MISFIT, that is accepted if no correction reduces it.
+#: It is the rounding of a body whose other points move much faster than the point that is hit.
 ROUNDED = 1e5
-#: A step ended before this part of its pulse has left a part of the impulse over.
+#: Part of a pulse's step; a step that ends earlier leaves a part of the impulse over.
 WHOLE = 1.0 - 1e-6
-#: Mass with which the first pulse of a body is tried, kg, where none is given.
+#: Mass of a body's first trial pulse, kg, if no mass is given.
 UNKNOWN_MASS = 1.0
-#: The part of the force input that is a pulse.
+#: The key of a pulse among the parts of the force input.
 PART = "impulse"
 
 
 class Pulse:
-    """The impulses that one point of a body is given; a `ready` one takes part in the run.
+    """The impulses of one point of a body; a `ready` pulse takes part in the run.
 
-    The point has got the impulse `owed` (N s), and its body not yet. Its effective mass (kg) is `given`, if one is, and
-    `mass` by the last measurement.
+    The point has got the impulse `owed` (N s), and its body not yet. Its effective mass (kg) is `given`, if known, and
+    `mass` is the last measurement.
     """
 
     def __init__(self, body: Component, point: BodyPoint, force: ForceInput) -> None:
@@ -52,7 +52,7 @@ class Pulse:
     def begin(self, time: float) -> None:
         """Start a run: find the shortest pulse that the body answers.
 
-        ComponentError: it answers none, or has another mass than the given one.
+        ComponentError: the body answers no pulse, or has another mass than the given one.
         """
         self._size, answers = 0.0, []
         self.mass = self.given or UNKNOWN_MASS
@@ -64,24 +64,24 @@ class Pulse:
         else:
             raise self._no_impulse(time, *answers[-1])
         self.measure(time)
-        self.measure(time)  # again, now that the size of its change is right
+        self.measure(time)  # again, with the right size of the change
         if self.given is not None and not agrees(self.given, self.mass):
             raise self._trials.mass_error(self.given, [self.mass], time)
         self.ready = True
 
     def measure(self, time: float) -> None:
-        """Measure the mass at an impact; ComponentError where pulses of two sizes do not find the same."""
+        """Measure the mass at an impact; ComponentError if pulses of two sizes find different masses."""
         one, two = self._answers(time)
         if not _is_impulse(one, two):
             raise self._no_impulse(time, one, two)
         self.mass = 2.0 * one - two
 
     def size(self, time: float) -> float:
-        """Return how long a pulse at `time` takes, s."""
+        """Return the duration of a pulse at `time`, s."""
         return self._longer * max(SHORTEST, SHORTEST_ULPS * math.ulp(time))
 
     def _answers(self, time: float) -> tuple[float, float]:
-        """Return the masses that a pulse and one of twice its size find, kg; infinite where nothing moves."""
+        """Return the masses that a pulse and one of twice its size find, kg; infinite if nothing moves."""
         size, impulse = self.size(time), self.mass * (abs(self._trials.now()) or 1.0)
         with self._trials.untraced(time):
             one, two = (self._changed(s, impulse / s) for s in (size, 2.0 * size))
@@ -107,47 +107,47 @@ class Pulse:
     # ---- a step ----
 
     def start(self, time: float, size: float) -> None:
-        """Hold the force over the next step, of `size` s, that gives the body what it is owed; none: ComponentError."""
+        """Hold the force that gives the body the owed impulse over the next step, `size` s, or raise ComponentError."""
         self._size = size
         self._input.parts[PART] = 0.0
         self._input.parts[PART] = self._force(time, size)
         self._input.write()
 
     def _force(self, time: float, size: float) -> float:
-        """Return the force after which the velocity is the one without it, and the impulse over the mass, N."""
-        force, wanted = self.owed / size, self.owed / self.mass
+        """Return the force, N, that changes the velocity by the impulse over the mass."""
+        force, needed = self.owed / size, self.owed / self.mass
         with self._trials.untraced(time):
             free, least, best = self._trials.velocity(size), math.inf, force
             for _ in range(CORRECTIONS):
-                missed = wanted - (self._trials.velocity(size, force) - free)
-                if abs(missed) <= MISFIT * (abs(free) + abs(wanted)):
+                missed = needed - (self._trials.velocity(size, force) - free)
+                if abs(missed) <= MISFIT * (abs(free) + abs(needed)):
                     return force
                 if abs(missed) < least:
                     least, best = abs(missed), force
                 force += missed * self.mass / size
-        if least <= ROUNDED * MISFIT * abs(wanted):
+        if least <= ROUNDED * MISFIT * abs(needed):
             return best
         raise ComponentError(
-            f"{self._name}: expected a change of the velocity by {wanted:.6g} m/s, which is an impulse of "
-            f"{self.owed:.6g} N s, got one by {wanted - missed:.6g} m/s after {CORRECTIONS} tries at time {time:.12g}. "
+            f"{self._name}: expected a change of the velocity by {needed:.6g} m/s, which is an impulse of "
+            f"{self.owed:.6g} N s, got one by {needed - missed:.6g} m/s after {CORRECTIONS} tries at time {time:.12g}. "
             "Use a law that yields: kelvin_voigt, hertz or hunt_crossley.",
             instance=self._trials.body.name,
             time=time,
         )
 
     def finish(self, size: float) -> None:
-        """The step under way counts, of `size` s: shorter than it was to be, it leaves a part of the impulse."""
+        """Accept the step under way, of `size` s; a step shorter than planned leaves a part of the impulse."""
         self.owed = self.owed * (1.0 - size / self._size) if size < WHOLE * self._size else 0.0
         del self._input.parts[PART]
         self._input.write()
 
     def free(self) -> None:
-        """Give back what it has saved."""
+        """Free its saved state."""
         self._trials.free()
 
 
 class Pulses:
-    """The impulses of all points of bodies that take forces only.
+    """The impulses of all points of bodies that take only forces.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class Pulses:
         self.under_way = False
 
     def of(self, point: BodyPoint, force: ForceInput) -> Pulse:
-        """Return the impulses of a point; one that several pairs hit has one sum of them."""
+        """Return the impulses of a point; pairs that hit the same point share them."""
         pulse = Pulse(self._components[point.component], point, force)
         return self._pulses.setdefault((point.component, point.force), pulse)
 
@@ -179,7 +179,7 @@ class Pulses:
                 pulse.measure(time)
 
     def begin_step(self, time: float, target: float) -> float:
-        """Hold the forces of the impulses that are owed; returns where the step should end, s."""
+        """Hold the forces of the owed impulses; returns where the step should end, s."""
         self._held = [pulse for pulse in self._pulses.values() if pulse.owed]
         self.under_way = bool(self._held)
         if not self.under_way:
@@ -190,17 +190,17 @@ class Pulses:
         return time + size
 
     def end_step(self, size: float) -> None:
-        """The step under way counts, of `size` s."""
+        """Accept the step under way, of `size` s."""
         for pulse in self._held:
             pulse.finish(size)
         self._held, self.under_way = [], False
 
     def free(self) -> None:
-        """Give back what they have saved, before the bodies are freed."""
+        """Free their saved states, before the bodies are freed."""
         for pulse in self._pulses.values():
             pulse.free()
 
 
 def _is_impulse(one: float, two: float) -> bool:
-    """Are these two masses one?"""
+    """Do the two masses agree?"""
     return math.isfinite(one) and one > 0.0 and abs(two - one) <= BEND * one

@@ -1,4 +1,4 @@
-"""The way of a contact point over a step: a cubic through displacement and velocity at both ends, and points on it."""
+"""The path of a contact point over a step: a cubic through displacement and velocity at both ends; points on it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 
 def points_of_a_way() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of a way, as fractions of it, and their weights: Gauss's in s, at u = s^2 (3 - 2 s).
+    """Return points of a path, as fractions of it, and their weights: Gauss's in s, at u = s^2 (3 - 2 s).
 
-    Where a contact begins or ends at an end of the way, a force like penetration^1.5 is smooth in s, not in u.
+    Where a contact begins or ends at an end of the path, a force like penetration^1.5 is smooth in s, not in u.
     """
     points, weights = np.polynomial.legendre.leggauss(8)
     s = 0.5 * (points + 1.0)
@@ -21,9 +21,9 @@ def points_of_a_way() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 POINTS, WEIGHTS = points_of_a_way()
-#: The same as pairs of numbers.
+#: The points and weights as pairs of numbers.
 NODES = tuple(zip(POINTS.tolist(), WEIGHTS.tolist(), strict=True))
-#: Halvings that find where something changes on a way: to the last bit of a fraction of it.
+#: Halvings that locate a change on a path to the last bit of a fraction.
 HALVINGS = 52
 
 
@@ -47,7 +47,7 @@ class StepPath:
 
     @property
     def turn(self) -> float | None:
-        """Fraction of the step at which a motion that goes up at first turns back; None where it does not."""
+        """Fraction of the step at which a motion that goes up at first turns back; None if it does not turn."""
         if not self.start_velocity > 0.0 > self.end_velocity:
             return None
         return last_true(lambda u: self.at(u)[1] > 0.0)
@@ -66,12 +66,12 @@ class StepPath:
 
     @property
     def lowest(self) -> float:
-        """Lowest displacement on the way, m."""
+        """Lowest displacement on the path, m."""
         return min(self.start, self.end, *(self.at(u)[0] for u in self.turns))
 
 
 def last_true(holds: Callable[[float], bool], begin: float = 0.0, finish: float = 1.0) -> float:
-    """Return the last fraction at which something holds that does at `begin` and not at `finish`.
+    """Return the last fraction of a condition that is true at `begin` and false at `finish`.
 
     >>> round(last_true(lambda u: u < 0.3), 12)
     0.3

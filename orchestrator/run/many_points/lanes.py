@@ -1,4 +1,4 @@
-"""What C is told of points that run in lanes (`fmus.core.run_lanes`)."""
+"""The data of points in lanes, in the form for C (`fmus.core.run_lanes`)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ DIRECTIONS = {"upper": 1.0, "lower": -1.0}
 
 @dataclass(frozen=True, slots=True)
 class LanePoints:
-    """Points as C takes them."""
+    """Points in the form for C."""
 
     plan: core.LanesPlan
     modal: ModalPoints
     given: dict[str, Floats]
-    """The arrays of `LanesPoints.GIVEN` by name, without `first`."""
+    """Arrays of `LanesPoints.GIVEN` by name, without `first`."""
 
 
 def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
-    """Return prepared points as C takes them; those that are no bodies of free modes have numbers that it leaves."""
+    """Return prepared points in the form for C; points without free modes have numbers that C leaves out."""
     columns, count = points.columns, len(points.begin)
     modal = body_points(scene, columns).in_state_coordinates()
     stops, record = scene.stops, scene.record
@@ -53,7 +53,7 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         "begin": points.begin,
         "end": points.end,
     }
-    if not points.forced:  # a force without periods is held
+    if not points.forced:  # a force without periods is constant
         given["held"] = modal.held + modal.force * np.cos(given["phase"])
         given["force"] = np.zeros_like(modal.force)
     plan = core.LanesPlan(

@@ -1,4 +1,4 @@
-"""Runs points in lanes, those that the lanes leave by the scalar engine, and makes columns of what they recorded."""
+"""Runs points in lanes, the points that lanes leave out by the scalar engine, and makes columns of their records."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ from vibroimpact.orchestrator.run.runner import CARRYING, next_start
 from vibroimpact.orchestrator.run.window import limit_message
 
 ROWS_ROOM = 65_536
-"""Rows of impacts and periods that the lanes write before Python takes them."""
+"""Number of rows of impacts and periods that the lanes can write before Python takes them."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Alone = Callable[[int, State | None], RunRecord]
-"""Runs one point, by its place, from the state it is given."""
+"""Runs one point, by its place, from a start state."""
 
 
 @dataclass(frozen=True, slots=True)
 class LaneValues:
-    """Points as arrays, and where their branches begin."""
+    """Points as arrays, with the starts of their branches."""
 
     values: Mapping[str, Floats]
-    """Of each swept key, shape (point,)."""
+    """Values of each swept key, shape (point,)."""
     first: NDArray[np.bool_]
-    """Where a branch begins, shape (point,). The first point of all begins one too: what there is of its own."""
+    """Whether each point begins a branch, shape (point,). The first of all points always does, also within a branch."""
     starts: Mapping[int, State]
-    """States of the points that begin a branch, but not as the scene says, by their place."""
+    """Start states of branches that do not begin at the scene's start, by the place of their first point."""
 
     def __len__(self) -> int:
         return len(self.first)
 
     def piece(self, begin: int, stop: int, start: State | None) -> LaneValues:
-        """Return the points `begin` to `stop - 1`, of which the first continues from a state."""
+        """Return the points `begin` to `stop - 1`; the first of them continues from `start` within a branch."""
         starts = {place - begin: state for place, state in self.starts.items() if begin <= place < stop}
         if not self.first[begin] and start is not None:
             starts[0] = start
@@ -62,7 +62,7 @@ class LaneValues:
 
     @property
     def begins_as_scene(self) -> NDArray[np.bool_]:
-        """Which points start as the scene says."""
+        """Whether each point begins at the scene's start, shape (point,)."""
         own = self.first.copy()
         own[list(self.starts)] = False
         return own
@@ -71,11 +71,12 @@ class LaneValues:
 def run_in_lanes(
     loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points in lanes, and return the first of them that were run, with where the next point of the branch starts.
+    """Run points in lanes; return the records of the first points that ran, and the next start state of the branch.
 
-    Along a branch each starts where the one before ended. What a point returns does not depend on the points beside it.
-    After the deadline, s of `time.perf_counter`, no point begins except the first, and none in a new branch. `loop`
-    runs what the lanes leave, and `alone` what the loop leaves out too.
+    Along a branch each point starts where the point before ended. Results do not depend on the points in other lanes.
+    After the deadline, s of `time.perf_counter`, no branch begins except the first; begun branches run to their end.
+    An independent point is a branch of its own. `loop` runs points that the lanes leave out, and `alone` runs
+    points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
     if prepared is not None:
@@ -90,7 +91,7 @@ def run_in_lanes(
 def run_prepared_in_lanes(
     loop: PointLoop, points: PreparedPoints, deadline: float, alone: Alone
 ) -> RunColumns:
-    """Run points that are independent and have their parameters, see `run_in_lanes`."""
+    """Run prepared independent points, see `run_in_lanes`."""
     values = LaneValues({}, np.ones(len(points.begin), dtype=np.bool_), {})
     return _LaneRun(loop, values, points, alone).run(deadline)[0]
 
@@ -98,7 +99,7 @@ def run_prepared_in_lanes(
 def _run_halves(
     loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points of which some are of another kind than others, or have no parameters."""
+    """Run points of mixed kinds, or with invalid parameters, by splitting them in halves."""
     half = len(points) // 2
     columns, carried = run_in_lanes(loop, points.piece(0, half, points.starts.get(0)), deadline, alone)
     if len(columns) < half or time.perf_counter() > deadline:
@@ -109,15 +110,15 @@ def _run_halves(
 
 
 class _LaneRun:
-    """The arrays that C fills, and what the scalar engine has run of the points that C leaves."""
+    """The arrays that C fills, and the points that C leaves out with their results by the scalar engine."""
 
     def __init__(self, loop: PointLoop, values: LaneValues, points: PreparedPoints, alone: Alone) -> None:
         self._loop, self._values, self._points, self._alone = loop, values, points, alone
         self._is_structure = loop.scene.body.IS_STRUCTURE
-        count, told = len(values), lane_points(loop.scene, points)
-        self._plan, self._modal = told.plan, told.modal
+        count, lanes = len(values), lane_points(loop.scene, points)
+        self._plan, self._modal = lanes.plan, lanes.modal
         self._first = values.first if loop.chained else np.ones(count, dtype=np.bool_)
-        self._given = told.given
+        self._given = lanes.given
         for place, state in values.starts.items():
             q, p = np.array(self._free_start(place, state)).reshape(2, -1)
             self._given["start_q"][:, place], self._given["start_p"][:, place] = q, p
@@ -134,7 +135,7 @@ class _LaneRun:
             "first": self._first.astype(np.uint8), "rows_of": np.zeros(count, dtype=np.int64),
             "rows": self._rows, "owner": self._owner,
         }  # fmt: skip
-        self._kept = {**self._given, **results}  # what C reads and writes while it runs
+        self._kept = {**self._given, **results}  # keeps the arrays alive while C uses them
         self._c = core.LanesPoints(count=count, rows_room=ROWS_ROOM, most_seconds=LISTEN_SECONDS)
         for name, array in self._kept.items():
             setattr(self._c, name, address(array))
@@ -151,7 +152,7 @@ class _LaneRun:
         while ends is not core.LanesEnd.done:
             self._run_left(deadline)
             if ends is core.LanesEnd.left and self._left().size:
-                break  # it is too late to begin those
+                break  # the deadline is over for the points left out
             if time.perf_counter() > deadline:
                 self._begin_no_more()
             ends = self._call()
@@ -160,7 +161,7 @@ class _LaneRun:
         return self._columns(done), self._start_after(done - 1) if self._loop.chained else None
 
     def _call(self) -> core.LanesEnd:
-        """Let C go on; signals are heard between two calls."""
+        """Let C go on; Python hears signals between two calls."""
         refuse_abandoned()
         began = time.perf_counter()
         end = core.run_lanes(self._plan, self._c, self._memory)
@@ -175,24 +176,24 @@ class _LaneRun:
         self._c.rows_used = 0
 
     def _begin_no_more(self) -> None:
-        """Let what has begun come to its end: points, or branches."""
+        """Restrict the run to the points, or the branches, that have begun."""
         last = int(np.flatnonzero(self._state).max(initial=0))
         later = np.flatnonzero(self._first[last + 1 : self._c.count])
         if later.size:
             self._c.count = last + 1 + int(later[0])
 
     def _done(self) -> int:
-        """Return how many points, from the first on, have run."""
+        """Return the number of points that have run without a gap, from the first on."""
         has_run = np.isin(self._state, (core.PointState.has_run, core.PointState.is_answered))
         return len(has_run) if has_run.all() else int(has_run.argmin())
 
-    # ---- what the lanes leave ----
+    # ---- points that the lanes leave out ----
 
     def _left(self) -> Ints:
         return np.flatnonzero(self._state == core.PointState.is_left)
 
     def _run_left(self, deadline: float) -> None:
-        """Run the points that are left by the scalar engine; along branches none waits for a clock."""
+        """Run the points that the lanes left out by the scalar engine; along branches the deadline does not count."""
         left = self._left()
         if not left.size:
             return
@@ -226,7 +227,7 @@ class _LaneRun:
         return alone
 
     def _scalar_points(self, places: Ints, given: Mapping[int, State | None]) -> PreparedPoints:
-        """Return some points, each the beginning of a branch."""
+        """Return the points at some places, each as the start of a branch."""
         points, names = self._points, self._loop.driver.float_names
         table = points.table[places]
         for row, place in enumerate(places):
@@ -242,7 +243,7 @@ class _LaneRun:
         return PreparedPoints(first, table, begin, end, columns, points.forced, points.periods)
 
     def _answer(self, places: Ints, columns: RunColumns) -> None:
-        """Tell the lanes what the scalar engine has found."""
+        """Give the results of the scalar engine to the lanes."""
         self._scalar.append((places, columns))
         ended = np.isin(columns.outcome, CARRYING)
         self._outcome[places] = np.where(ended, Outcome.ok, columns.outcome)
@@ -259,11 +260,11 @@ class _LaneRun:
     # ---- states along a branch ----
 
     def _given_state(self, place: int) -> State | None:
-        """Return the state that a point starts from; None as the scene says."""
+        """Return the start state of a point; None: the scene's start."""
         return self._values.starts.get(int(place)) if self._first[place] else self._start_after(place - 1)
 
     def _start_after(self, place: int) -> State | None:
-        """Return where the point after one starts: where the last that came to its end has ended."""
+        """Return the start state of the point after `place`: the final state of the last run that came to its end."""
         while self._outcome[place] != Outcome.ok:
             if self._first[place]:
                 return self._values.starts.get(int(place))
@@ -271,14 +272,14 @@ class _LaneRun:
         return (*self._final_q[:, place].tolist(), *self._final_p[:, place].tolist())
 
     def _free_start(self, place: int, state: State) -> State:
-        """Return a carried state with what lies beyond a stop, which has moved, put on it."""
+        """Return a carried state, put back where it is beyond a stop that has moved."""
         values = {key: float(each[place]) for key, each in self._values.values.items()}
         return free_state(self._loop.scene.at(values), state)
 
-    # ---- what was recorded ----
+    # ---- records ----
 
     def _columns(self, done: int) -> RunColumns:
-        """Return what the first points recorded, in their order."""
+        """Return the records of the first points, in their order."""
         run = np.flatnonzero(self._state[:done] == core.PointState.has_run)
         pieces = [(run, self._lane_columns(run)), *self._scalar]
         pieces = [piece for piece in pieces if piece[0].size] or pieces[:1]
@@ -289,7 +290,7 @@ class _LaneRun:
         return joined([piece[1] for piece in pieces]).chosen(order[:done])
 
     def _lane_columns(self, run: Ints) -> RunColumns:
-        """Return what the points of these places recorded in their lanes."""
+        """Return the records of the points at these places, from their lanes."""
         record, points = self._loop.scene.record, self._points
         outcome, reached = self._outcome[run], self._reached[run]
         rows, owner = self._rows_of(run)
@@ -319,11 +320,11 @@ class _LaneRun:
         )
 
     def _rows_of(self, run: Ints) -> tuple[Floats, Ints]:
-        """Return the rows of some points, those of each together, and the number of each one's owner among them."""
+        """Return the rows of some points, point by point, and the number of the point of each row."""
         number = np.full(len(self._state), -1, dtype=np.int64)
         number[run] = np.arange(len(run))
         owner = number[np.concatenate([owners for _, owners in self._blocks])]
         order = np.argsort(owner.astype(np.int16) if len(run) < 2**15 else owner, kind="stable")
-        order = order[int((owner < 0).sum()) :]  # rows of what was left, or is not among the first
+        order = order[int((owner < 0).sum()) :]  # without rows of points left out, or not done
         rows = np.concatenate([block for block, _ in self._blocks])
         return rows[order], owner[order]

@@ -1,8 +1,8 @@
-"""Many points of a scene by one call: the loop over them runs in C (`fmus.core.run_points`), with no Python for each.
+"""Many points of a scene by one call: the loop over the points runs in C (`fmus.core.run_points`), without Python.
 
-The calls that each point's FMU gets, and so its row, are those of `point`. What a point says beside its numbers (an
-error, a warning of its body) comes from there too: such a point is run again alone. Scenes whose points need Python
-in between, for a time series or an importer, have no such loop: `loop_of` returns None.
+The FMU gets the same calls for each point as in `point`, so the rows are the same. A point with an error or a warning
+of its body runs again alone, for its message. Scenes whose points need Python in between, for a time series or an
+importer, have no such loop: `loop_of` returns None.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import Stop
 
 SHORTEST_DEADLINE = 0.5
-"""Deadline of a point below which the loop, which looks every few hundredths of a second, would be too coarse, s."""
+"""Least deadline of a point in the loop, s; the loop checks the time only every few hundredths of a second."""
 
 NOT_IN_THE_LOOP = (MODES, "execution.macro_step")
-"""Keys for whose values the components are made anew."""
+"""Keys whose values need new components."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class PointValues:
-    """Points as arrays: the values of each swept key, shape (point,), and where a branch begins."""
+    """Points as arrays, shape (point,): the values of each swept key, and whether the point begins a branch."""
 
     values: Mapping[str, Floats]
     first: NDArray[np.bool_]
@@ -46,21 +46,22 @@ class PointValues:
 
 @dataclass(frozen=True, slots=True)
 class PreparedPoints:
-    """Points as C takes them: parameters and window of recording of each, which begin at phase 0 within a branch.
+    """Points in the form for C: parameters and recording window of each; within a branch points begin at phase 0.
 
     Attributes
     ----------
     first : ndarray of bool, shape (point,)
-        Where a branch begins.
+        Whether the point begins a branch.
     table : ndarray, shape (point, parameter)
+        Parameters in the order of the driver.
     begin, end : ndarray, shape (point,)
-        Of the recording, s.
+        Start and end of the recording, s.
     columns : dict of str to ndarray, shape (point,)
         The parameters by name.
     forced : bool
-        Whether a force has periods.
+        Whether a periodic force acts.
     periods : bool
-        Whether each period is recorded.
+        Whether periods are recorded.
     """
 
     first: NDArray[np.bool_]
@@ -73,7 +74,7 @@ class PreparedPoints:
 
 
 def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop | None:
-    """Return the loop in C over points of a scene; None where they need Python in between."""
+    """Return the loop in C over points of a scene; None where the points need Python in between."""
     deadline, chained = scene.execution.deadline, any(axis.continuation for axis in scene.sweep)
     if (
         not isinstance(driver, BodyDriver)
@@ -88,7 +89,7 @@ def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop 
 
 
 class PointLoop:
-    """Runs points of a scene on the instance of a runner, see `loop_of`; `by_lanes`: those that lanes leave."""
+    """Runs points of a scene on the instance of a runner, see `loop_of`; `by_lanes`: only points left out by lanes."""
 
     def __init__(self, scene: Scene, driver: BodyDriver, *, by_lanes: bool = False) -> None:
         self.scene, self.driver, self.by_lanes = scene, driver, by_lanes
@@ -98,13 +99,13 @@ class PointLoop:
         others = [f"{port}.{name}" for name in ("stick_start", "force") for port in ports]
         finals = (*OBSERVED, *state_variables(scene), *others, *touch_downs)
         self.finals = (*finals, "natural_angular_frequency[1]") if scene.body.IS_STRUCTURE else finals
-        self._kept: list[NDArray[Any]] = []  # what C reads while it runs
+        self._kept: list[NDArray[Any]] = []  # keeps arrays alive while C reads them
         instance = driver.instance
         functions = [instance.address_of(name) for name in core.RunsFmu.FUNCTIONS]
         self.fmu = core.RunsFmu(instance.pointer, *functions, instance.log.environment)
         self._plans = {forced: self._planned(ports, forced=forced) for forced in (False, True)}
 
-    # ---- what C is told ----
+    # ---- input of C ----
 
     def _address(self, values: Any, dtype: Any) -> int:
         self._kept.append(np.ascontiguousarray(values, dtype=dtype))
@@ -115,7 +116,7 @@ class PointLoop:
         return core.RunsVariables(self._address(references, np.uint32), len(names))
 
     def _integers(self, kind: str, dtype: Any) -> tuple[core.RunsVariables, int]:
-        """Return the integer parameters of a type with their values, as the driver sets them."""
+        """Return the integer parameters of a type, and the address of their values, in the order of the driver."""
         groups = [group for group in self.driver.integers if group.name == kind]
         references = [reference for group in groups for reference in group.references]
         values = np.concatenate([group.values for group in groups]) if groups else ()
@@ -151,12 +152,12 @@ class PointLoop:
         )
 
     def plan(self, *, forced: bool) -> core.RunsPlan:
-        """Return what all points have in common."""
+        """Return the plan that all points share."""
         return self._plans[forced]
 
     @property
     def chained(self) -> bool:
-        """Whether a point starts from the state where the one before ended."""
+        """Whether a point starts from the final state of the point before."""
         return any(axis.continuation for axis in self.scene.sweep)
 
     def _periods(self, forced: bool) -> bool:
@@ -165,12 +166,12 @@ class PointLoop:
     # ---- the points ----
 
     def prepared(self, points: PointValues) -> PreparedPoints | None:
-        """Return points with their parameters; None where one of them has none, or is of another kind than others."""
+        """Return points with their parameters; None where a point has invalid ones, or only some points are forced."""
         names = self.driver.float_names
         try:
             table = self._parameters(points)
         except (ArithmeticError, ValueError):
-            return None  # alone each point says what is wrong with it
+            return None  # each point runs alone, for its own message
         columns = {name: table[:, place].copy() for place, name in enumerate(names)}
         angular_frequency = columns.get("forcing.angular_frequency", np.zeros(len(points)))
         forced = bool(angular_frequency.all())
@@ -183,9 +184,7 @@ class PointLoop:
             return PreparedPoints(points.first, table, begin, end, columns, forced, periods=False)
         if self.chained:
             columns["forcing.phase"][~points.first] = 0.0
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # a period beyond all numbers is the body's to refuse
+        with np.errstate(over="ignore", invalid="ignore"):  # the body refuses an infinite period
             begin, end = forced_window(self.scene.record, columns["forcing.phase"], angular_frequency)
         return PreparedPoints(points.first, table, begin, end, columns, forced, self._periods(forced))
 
@@ -200,9 +199,9 @@ class PointLoop:
         return table
 
     def _alike(self, points: PointValues) -> Iterator[tuple[NDArray[np.intp] | slice, Mapping[str, Any]]]:
-        """Yield points whose parameters are found together, and their values.
+        """Yield groups of points whose parameters are found together, each with its values.
 
-        Of a beam those of one body: see `TAKES_ARRAYS` of bodies.
+        The points of a beam are grouped by body: see `TAKES_ARRAYS` of bodies.
         """
         own = [key for key in points.values if key.startswith("body.")]
         if not own or self.scene.body.TAKES_ARRAYS:
@@ -220,7 +219,7 @@ def _place(name: str, names: Sequence[str]) -> int:
 
 
 def _direction(stop: Stop) -> float:
-    """Return where a rigid stop pushes a body back from; 0 for one that yields."""
+    """Return the side of a rigid stop, 1 for upper and -1 for lower; 0 for a compliant stop."""
     if not LAWS[stop.law].is_rigid:
         return 0.0
     return 1.0 if stop.side == "upper" else -1.0

@@ -1,4 +1,4 @@
-"""Runs the points of a `PointLoop` and makes columns of what they recorded."""
+"""Runs the points of a `PointLoop` and makes columns of their records."""
 
 from __future__ import annotations
 
@@ -32,39 +32,39 @@ from vibroimpact.orchestrator.run.record import (
 from vibroimpact.orchestrator.run.window import TWO_PI, late_message, limit_message, no_load_message
 
 LISTEN_SECONDS = 0.05
-"""Time after which the loop lets Python hear signals, s; one step in it may take some hundredths of a second more."""
+"""Time after which the loop lets Python hear signals, s; a step in it may add some hundredths of a second."""
 
 ROWS_ROOM = 64 * ROW_CAPACITY
-"""Rows of impacts, sticks and periods that the loop writes before Python takes them."""
+"""Number of rows of impacts, sticks and periods that the loop can write before Python takes them."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Alone = Callable[[int, State | None], tuple[RunRecord, State | None]]
-"""Runs one point, by its place, from the state it is given; returns its record and the state that it hands on."""
+"""Runs one point, by its place, from a start state; returns its record and the state that it hands on."""
 
 
 def run_loop(
     loop: PointLoop, points: PreparedPoints, start: State | None, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points in their order; along a branch each starts where the one before ended.
+    """Run points in their order; along a branch each starts where the point before ended.
 
     Parameters
     ----------
     loop : PointLoop
     points : PreparedPoints
     start : tuple of float or None
-        State that the first one goes on from, where it does not begin a branch.
+        Start state of the first point, where it does not begin a branch.
     deadline : float
-        No point begins after it, except the first; s of `time.perf_counter`.
+        Time after which no point begins, except the first; s of `time.perf_counter`.
     alone : callable
-        Runs those that the loop leaves out.
+        Runs a point that the loop leaves out.
 
     Returns
     -------
     columns : RunColumns
-        Of the points that were run: the first of them.
+        Records of the points that ran, from the first point on.
     carried : tuple of float or None
-        Where the next point of the branch starts.
+        Start state of the next point of the branch.
     """
     work = LoopArrays(loop, points, start)
     records: dict[int, RunRecord] = {}
@@ -88,7 +88,7 @@ def run_loop(
 
 
 class LoopArrays:
-    """The arrays that C fills, and how far it is."""
+    """The arrays that C fills, and its progress."""
 
     def __init__(self, loop: PointLoop, points: PreparedPoints, start: State | None) -> None:
         count, contacts = len(points.begin), len(loop.scene.stops)
@@ -112,7 +112,7 @@ class LoopArrays:
         for name, array in self._arrays.items():
             setattr(self.state, name, core.address(array))
         self._blocks: list[Floats] = []
-        self._give_up_at = (0, math.inf)  # a point under way, and when its time is over
+        self._give_up_at = (0, math.inf)  # a point under way, and the end of its time
         self._carry(start)
 
     def begin_again(self) -> None:
@@ -122,9 +122,9 @@ class LoopArrays:
         self._blocks = []
 
     def only_rows(self) -> Floats | None:
-        """Return the rows of a single point that came to its end on no stop; None where there is more to say of it.
+        """Return the rows of a single point that came to a plain end, without contact; None for any other end.
 
-        They are those of the arrays: the next point is written over them.
+        The rows are a view of the arrays, which the next point overwrites.
         """
         arrays = self._arrays
         if self._blocks or arrays["outcome"][0] or arrays["flags"].any():
@@ -134,7 +134,7 @@ class LoopArrays:
 
     @property
     def finals(self) -> Floats:
-        """What was read of each point at its end, shape (point, variable): `PointLoop.finals`."""
+        """Final values of `PointLoop.finals` of each point, shape (point, variable)."""
         return self._arrays["finals"]
 
     def _carry(self, state: State | None) -> None:
@@ -144,13 +144,13 @@ class LoopArrays:
 
     @property
     def carried(self) -> State | None:
-        """State that the next point of the branch starts from."""
+        """Start state of the next point of the branch."""
         if not (self._loop.chained and self.state.has_carried):
             return None
         return (self.state.carried[0], self.state.carried[1])
 
     def call(self) -> core.RunsEnd:
-        """Let C go on; signals are heard between two calls."""
+        """Let C go on; Python hears signals between two calls."""
         refuse_abandoned()
         self._watch_deadline()
         end = core.run_points(self._loop.fmu, self._plan, self.state)
@@ -172,7 +172,7 @@ class LoopArrays:
         self.state.rows_used = 0
 
     def leave_out(self, carried: State | None) -> None:
-        """Go on after a point that was run alone, which handed on a state."""
+        """Go on after a point that ran alone and handed on a state."""
         self._take_rows()
         written = int(self._arrays["rows_of"][self.state.at])
         self._blocks = [np.concatenate(self._blocks)]
@@ -182,10 +182,10 @@ class LoopArrays:
         self.state.at += 1
         self.state.stage = 0
 
-    # ---- what they recorded ----
+    # ---- records ----
 
     def columns(self) -> RunColumns:
-        """Return what the points that were run recorded."""
+        """Return the records of the points that ran."""
         self._take_rows()
         done, record, scene = self.state.at, self._loop.scene.record, self._loop.scene
         arrays = {name: array[:done] for name, array in self._arrays.items() if name != "rows"}
@@ -209,14 +209,14 @@ class LoopArrays:
         )
 
     def _of_contacts(self, arrays: dict[str, NDArray[Any]], block: int, width: int = 1) -> Floats:
-        """Return a block of what was read of the contacts at the end, shape (run, contact * width)."""
+        """Return a block of final values of the contacts, shape (run, contact * width)."""
         contacts = arrays["stuck"].shape[1]
         begin = len(OBSERVED) + len(state_variables(self._loop.scene)) + block * contacts
         found: Floats = arrays["finals"][:, begin : begin + width * contacts]
         return found
 
     def _stick_starts(self, arrays: dict[str, NDArray[Any]]) -> Floats:
-        """Return when the rest on each contact began, s; NaN where the body is not pressed on it at rest."""
+        """Return the start of the rest on each contact, s; NaN where no load presses the resting body on it."""
         return np.where(self._pressed(arrays), self._of_contacts(arrays, 0), np.nan)
 
     def _pressed(self, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
@@ -225,7 +225,7 @@ class LoopArrays:
         return pressed
 
     def _ended(self, arrays: dict[str, NDArray[Any]]) -> tuple[NDArray[np.int8], NDArray[np.object_]]:
-        """Return how each point ended, and its message."""
+        """Return the outcome and the message of each point."""
         outcome: NDArray[np.int8] = arrays["outcome"].copy()
         message = np.full(len(outcome), "", dtype=object)
         execution = self._loop.scene.execution
@@ -242,7 +242,7 @@ class LoopArrays:
         return outcome, message
 
     def _rests_for_ever(self, rests: NDArray[np.bool_], arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
-        """As `point` says it: pressed for good (an oscillator), or at rest for long enough."""
+        """Return whether each body rests for good, by the rule of `point`: pressed for good, or at rest long enough."""
         scene, columns, points = self._loop.scene, self._points.columns, self._points
         resting, count = rests.any(axis=1), len(rests)
         if scene.body.IS_STRUCTURE:
@@ -276,7 +276,7 @@ class LoopArrays:
         return final_phases(outcome, reached, frequency, phase)
 
     def _impacts(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
-        """Return the impacts of each point, contacts that have not ended among them."""
+        """Return the impacts of each point, including open contacts."""
         run, contact = np.nonzero(arrays["open"] & ~arrays["stuck"])
         width = len(TOUCH_DOWN)
         touch_downs = self._of_contacts(arrays, 2, width).reshape(len(arrays["stuck"]), -1, width)
@@ -285,7 +285,7 @@ class LoopArrays:
         return _with_open(impact_rows(rows), own, still, run, len(arrays["stuck"]))
 
     def _sticks(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
-        """Return the sticks of each point, those that have not ended among them."""
+        """Return the sticks of each point, including sticks that have not ended."""
         run, contact = np.nonzero(arrays["stuck"] & arrays["open"])
         starts = self._of_contacts(arrays, 0)[run, contact]
         still = np.column_stack([starts, np.full(len(run), np.nan), contact + 1.0])
@@ -295,7 +295,7 @@ class LoopArrays:
 
 
 def _with_open(found: Floats, owner: Ints, still: Floats, run: Ints, done: int) -> Ragged:
-    """Return rows by their run, with those of what has not ended in it."""
+    """Return rows by their run, including the rows of open contacts or sticks."""
     owners = np.concatenate([owner, run])
     order = np.argsort(owners, kind="stable")
     return ragged_of(np.concatenate([found, still])[order], owners[order], done)
@@ -304,13 +304,13 @@ def _with_open(found: Floats, owner: Ints, still: Floats, run: Ints, done: int) 
 def final_phases(
     outcome: NDArray[np.int8], reached: Floats, angular_frequency: Floats, phase: Floats
 ) -> Floats:
-    """Return the phase of the force where each run ended, rad: at 0 but where a limit ended it."""
+    """Return the phase of the force at the end of each run, rad: 0 unless a limit ended the run."""
     came_to_end = (outcome == Outcome.ok) | (outcome == Outcome.stuck)
     return np.where(came_to_end, 0.0, (angular_frequency * reached + phase) % TWO_PI)
 
 
 def period_table(rows: Floats, owner: Ints, done: int) -> Floats:
-    """Return the table of periods, shape (run, period, 5); runs with fewer than others end in NaN."""
+    """Return the table of periods, shape (run, period, 5); missing periods of a run are NaN."""
     chosen = rows[:, 0] == ROW_PERIOD
     owner = owner[chosen]
     count = np.bincount(owner, minlength=done)
@@ -321,7 +321,7 @@ def period_table(rows: Floats, owner: Ints, done: int) -> Floats:
 
 
 def ragged_of(found: Floats, owner: Ints, done: int) -> Ragged:
-    """Return rows of runs, those of each run in the order of their time; the rows of a run follow each other."""
+    """Return the rows of runs, sorted by time within each run; the given rows of a run are contiguous."""
     back = (np.diff(found[:, 0]) < 0.0) & (np.diff(owner) == 0)
     for run in np.unique(owner[1:][back]):
         own = slice(*np.searchsorted(owner, (run, run + 1)))

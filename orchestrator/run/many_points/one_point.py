@@ -1,7 +1,7 @@
-"""The loop over points with one point, again and again: whoever calls it a million times pays for the motion alone.
+"""The loop over points with one point, again and again: a million calls cost little more than the motion.
 
-Arrays, plan and the calls of C are those of `loop_rows`, made once. Where each key is the value of one parameter of the
-FMU and nothing else, its values are put there; else the parameters of the scene are made anew for each point.
+Arrays, plan and calls of C come from `loop_rows` and are made once. A key that is the value of a single parameter of
+the FMU sets that parameter directly. Other keys need all parameters of the scene anew for each point.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.laws import LAWS
 
 PROBES = (2.0**-20, 0.0812537291, -0.0316227766, 1.4142135e-9)
-"""Relative changes of a value, of all bits, that show what becomes of it."""
+"""Relative changes of a value, with many different bits, that test whether a parameter copies the value."""
 
 
 NOT_OF_THE_MOTION = ("run_index", "direction", "point_seconds")
-"""Variables of a dataset that say nothing of the motion of a point."""
+"""Variables of a dataset that do not describe the motion of a point."""
 
 Floats = NDArray[np.float64]
 _OK = np.int8(Outcome.ok)
@@ -53,12 +53,13 @@ class OnePoint:
     Parameters
     ----------
     loop : PointLoop
-        Of a scene without a sweep.
+        Loop of a scene without a sweep.
     points : PreparedPoints
-        The scene itself, one point.
+        The scene itself, as one point.
     keys : sequence of str
+        Keys whose values differ from point to point.
     form : DatasetForm
-        What the scene says of its dataset.
+        Form of the scene's dataset.
     """
 
     def __init__(
@@ -81,17 +82,17 @@ class OnePoint:
         self._frequency, self._phase = map(names.index, forcing) if points.forced else (-1, -1)
 
     def run(self, values: Sequence[float]) -> dict[str, Any] | None:
-        """Run a point; None where it has to be run alone: its body refuses it, or it is of another kind.
+        """Return the results of a point; None where it must run alone: its body refuses it, or its force has no period.
 
         Parameters
         ----------
         values : sequence of float
-            In the order of the keys.
+            Values in the order of the keys.
 
         Returns
         -------
         dict of str to ndarray
-            As `columns.arrays_of` names them, without the dimension of runs.
+            Arrays with the names of `columns.arrays_of`, without the dimension of runs.
         """
         self._set(values)
         if self._frequency >= 0 and not self._set_window():
@@ -106,7 +107,7 @@ class OnePoint:
         return of_the_only_run(self._form.arrays(arrays.columns())) if plain is None else plain
 
     def _plain(self, rows: Floats) -> dict[str, Any] | None:
-        """Return what was recorded where there are periods and impacts on rigid stops alone; None of any other rows."""
+        """Return the results from rows of periods and of impacts on rigid stops; None if there are other rows."""
         kinds, final = rows[:, 0], self._arrays.finals[0]
         impacts = rows.compress(kinds == ROW_IMPACT, axis=0).T.copy()
         periods = rows.compress(kinds == ROW_PERIOD, axis=0).T.copy()
@@ -126,7 +127,7 @@ class OnePoint:
         if self._has_impacts:
             impacts[0] = (
                 np.nan
-            )  # in the place of what tells rows apart: largest forces are those of stops that yield
+            )  # the column of the row's kind becomes the largest force, which rigid stops do not have
             for column, name in _IMPACTS:
                 found[name] = impacts[column]
             found["impact_contact"] = impacts[_CONTACT].astype(np.int8)
@@ -135,7 +136,7 @@ class OnePoint:
         return found
 
     def _set(self, values: Sequence[float]) -> None:
-        """Give the point its parameters."""
+        """Set the parameters of the point."""
         row, columns = self._row, self._columns
         if self._own is not None:
             for place, value in zip(self._own, values, strict=True):
@@ -146,7 +147,7 @@ class OnePoint:
             row[place] = columns[place][0] = found[name]
 
     def _set_window(self) -> bool:
-        """Put begin and end of the recording; False where the force has no period."""
+        """Set start and end of the recording; return False where the force has no period."""
         frequency = float(self._row[self._frequency])
         if frequency == 0.0:
             return False
@@ -156,14 +157,14 @@ class OnePoint:
 
 
 def one_point_of(loop: PointLoop, keys: Sequence[str], form: DatasetForm) -> OnePoint | None:
-    """Return the loop over one point that varies some keys; None where points are run alone.
+    """Return the loop over one point that varies some keys; None where points must run alone.
 
     Parameters
     ----------
     loop : PointLoop
-        Of a scene without a sweep.
+        Loop of a scene without a sweep.
     keys : sequence of str
-        Each with a value in the scene.
+        Keys that have a value in the scene.
     form : DatasetForm
     """
     points = loop.prepared(PointValues({}, np.ones(1, dtype=np.bool_)))
@@ -173,7 +174,7 @@ def one_point_of(loop: PointLoop, keys: Sequence[str], form: DatasetForm) -> One
 
 
 def of_the_only_run(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arrays of one run without the dimension of runs, and without what says nothing of its motion."""
+    """Return the arrays of one run without the dimension of runs, and without `NOT_OF_THE_MOTION`."""
     return {
         name: array[0] if RULES[name].dims[0] == "run" else array
         for name, array in found.items()
@@ -182,7 +183,7 @@ def of_the_only_run(found: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def own_columns(scene: Scene, keys: Sequence[str], names: Sequence[str]) -> list[int] | None:
-    """Return the place of the parameter that each key is; None where a key is none, or others depend on it."""
+    """Return the place of the parameter that each key sets; None where a key does not set exactly one parameter."""
     given = float_parameters(scene, None)
     places = []
     for key in keys:
@@ -194,7 +195,7 @@ def own_columns(scene: Scene, keys: Sequence[str], names: Sequence[str]) -> list
 
 
 def _alone(scene: Scene, key: str, probe: float, given: Mapping[str, float]) -> str:
-    """Return the parameter that has another value of a key, bit for bit, and is the only one that changes; else ""."""
+    """Return the only parameter that changes with a key and equals its value bit for bit; empty if there is none."""
     value = scene.value(key)
     other = value * (1.0 + probe) if value else probe
     found = float_parameters(scene.at({key: other}), None)

@@ -1,4 +1,4 @@
-"""Rows of many points by one call: by the loop, or by the lanes of a scene that goes so."""
+"""Rows of many points by one call: by the loop, or by lanes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from vibroimpact.orchestrator.run.points import PointColumns, State
 from vibroimpact.orchestrator.run.runner import next_start
 
 Alone = Callable[[Mapping[str, float], State | None], RunRecord]
-"""Runs one point, by its swept values, from the state it is given."""
+"""Runs one point, by its swept values, from a start state."""
 
 
 def rows_of(
     loop: PointLoop, points: PointColumns, start: State | None, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None] | None:
-    """Run points by the loop in C or in lanes; None where they need Python in between, see `Runner.rows`."""
+    """Return the results of points by the loop in C or by lanes; None where points need Python in between."""
     if loop.by_lanes:
         return _lane_rows(loop, points, start, deadline, alone)
     prepared = None if points.starts else loop.prepared(PointValues(points.values, points.first))
@@ -37,7 +37,7 @@ def rows_of(
 def _lane_rows(
     loop: PointLoop, points: PointColumns, start: State | None, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    # what finds points their lanes takes time to load, and only these scenes need it
+    # the import takes time, and only scenes in lanes need it
     from vibroimpact.orchestrator.run.many_points.lanes_rows import LaneValues, run_in_lanes
 
     begins = np.isin(points.index, list(points.starts)) & points.first

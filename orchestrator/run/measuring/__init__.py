@@ -1,5 +1,5 @@
 """Scenes with a measuring chain: voltages in, voltages out.
 
-`chain` is what sensors and load cell make of a motion, `session` a scene as the plant of a rig, `run` a whole run that
-samples its channels, `steps` cuts steps as finely as a load cell rings, `conversion` makes samples of voltages.
+`chain` turns a motion into voltages of sensor and load cell, `session` is a scene as the plant of a rig. `run` is a
+whole run with sampled channels. `steps` cuts steps finely for a ringing load cell, `conversion` digitises voltages.
 """

@@ -1,4 +1,4 @@
-"""What sensor and load cell make of a motion, going on from block to block, and what makes a force of a voltage."""
+"""The voltages of sensor and load cell under a motion, block by block, and the force of an exciter's voltage."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from vibroimpact.orchestrator.scene.measuring_models import LoadCell as CellTabl
 
 Floats = NDArray[np.float64]
 IMPACT_TIME, IMPACT_IMPULSE, IMPACT_CONTACT = 0, 3, 4
-"""Columns of impacts."""
+"""Columns of the impacts that the chain uses."""
 NO_IMPACTS: Floats = np.empty((0, 7))
 
 
 class MeasuringChain:
-    """What a scene's sensor and load cell make of the motion of its body.
+    """The sensor and the load cell of a scene, which turn the motion of its body into voltages.
 
-    The scene is at a point of its sweep. The channels are of `CHANNELS`; `drive` is a voltage that the caller knows.
-    `variables` are those of the body's FMU that it takes, each once. `needs_impacts` says that the load cell is behind
-    a rigid stop, so that the body has to record its impacts.
+    The scene is at a point of its sweep. The channels come from `CHANNELS`; the caller knows the voltage `drive`.
+    `variables` are the variables of the body's FMU that the chain reads, each once. `needs_impacts`: whether the load
+    cell is behind a rigid stop, so that the body has to record its impacts.
     """
 
     def __init__(self, scene: Scene, channels: Sequence[str]) -> None:
@@ -41,7 +41,7 @@ class MeasuringChain:
 
     @property
     def finest(self) -> float:
-        """Longest step that follows the ring of the load cell, s; 0: none, or impacts make it, exact at any step."""
+        """Longest step that follows the ring of the load cell, s; 0: no ring, or a rigid stop (exact at any step)."""
         cell = self._scene.load_cell
         rings = cell is not None and self._cell is not None and not self.needs_impacts
         ring = cell.natural_frequency if cell is not None and rings else 0.0
@@ -49,7 +49,7 @@ class MeasuringChain:
 
     @property
     def lead(self) -> float:
-        """Time after which the load cell has forgotten how it began, s; infinite where its ring does not decay."""
+        """Time after which the start state of the load cell has decayed, s; infinite where its ring does not decay."""
         cell = self._scene.load_cell
         if cell is None or self._cell is None:
             return 0.0
@@ -57,23 +57,23 @@ class MeasuringChain:
         if cell.natural_frequency == 0.0:
             return after
         ring, ratio = 2.0 * math.pi * cell.natural_frequency, cell.damping_ratio
-        # of an overdamped cell the slower of two rates
+        # an overdamped cell has two rates: the slower one counts
         rate = ring * (ratio if ratio <= 1.0 else 1.0 / (ratio + math.sqrt(ratio * ratio - 1.0)))
-        return after + (_FORGOTTEN / rate if rate > 0.0 else math.inf)
+        return after + (_DECAYED / rate if rate > 0.0 else math.inf)
 
     def begin(self, time: float, values: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Begin at a time (s), the load cell settled under the force then; values and volts have the shape (1,)."""
+        """Return the volts at a start time (s), with the load cell settled; values and volts have the shape (1,)."""
         return self.volts(np.array([time]), values, NO_IMPACTS)
 
     def volts(self, times: Floats, values: Mapping[str, Floats], impacts: Floats) -> dict[str, Floats]:
-        """Return what the chain gives at instants, going on from those before, by channel; `drive` is not among it.
+        """Return the voltages of the chain at further instants, by channel without `drive`, shape (instant,).
 
-        The times ascend, s. Values are those of each of the variables, SI, shape (instant,); `acceleration` is
-        absolute. Impacts are those since the last of the instants before, shape (impact, 7), columns `IMPACT_COLUMNS`.
+        The times ascend, s. `values` has each of the variables, SI, shape (instant,); `acceleration` is absolute.
+        `impacts` are the impacts since the last instant of the call before, shape (impact, 7), `IMPACT_COLUMNS`.
         """
         sensor, found = self._scene.sensor, {}
         for name, variable in self._readings.items():
-            assert sensor is not None  # the scene's rules see to it
+            assert sensor is not None  # the rules of scenes require [sensor]
             found[name] = sensor_reading(values[variable], sensor.gain, sensor.offset, sensor.range or 0.0)
         if self._cell is not None:
             hits, impulses = self.hits(impacts)
@@ -81,7 +81,7 @@ class MeasuringChain:
         return found
 
     def hits(self, impacts: Floats) -> tuple[Floats, Floats]:
-        """Return instants and impulses of what hits the load cell as half sines."""
+        """Return instants and impulses of the impacts that hit the load cell as half sines."""
         cell = self._scene.load_cell
         if cell is None or not self.needs_impacts:
             return np.empty(0), np.empty(0)
@@ -94,19 +94,19 @@ def _opened(cell: CellTable) -> LoadCell:
     return LoadCell(*numbers, cell.contact_duration or 0.0)
 
 
-_FORGOTTEN = 37.0
-"""Time constants after which a ring is below the rounding of doubles: exp(-37) = 1e-16."""
+_DECAYED = 37.0
+"""Number of time constants after which a ring is below the rounding of doubles: exp(-37) = 1e-16."""
 
 
 _OVERLAPPING = 1000
-"""Half sines that may be under way at once before neighbours are joined; the cell has room for twice as many."""
+"""Number of half sines under way at once, above which neighbours are joined; the cell has room for twice as many."""
 
 
 def thinned(times: Floats, impulses: Floats, duration: float) -> tuple[Floats, Floats]:
-    """Return impacts of which no more than `_OVERLAPPING` are within a duration, as the end of a chatter has them.
+    """Return impacts with at most about `_OVERLAPPING` of them within a duration, joining neighbours in a chatter.
 
-    Where there are more, those within a `_OVERLAPPING`th of the duration become one, with their impulse at their
-    centre.
+    With more impacts, all impacts within a `_OVERLAPPING`th of the duration become one impact, with their impulse at
+    their centre.
 
     Examples
     --------
@@ -125,11 +125,11 @@ def thinned(times: Floats, impulses: Floats, duration: float) -> tuple[Floats, F
 
 
 def held_exciter(scene: Scene) -> HeldExciter | None:
-    """Return what makes forces of voltages within the loop over samples; None without an exciter."""
+    """Return the exciter that turns voltages into forces in the loop over samples; None without an exciter."""
     exciter = scene.exciter
     if exciter is None:
         return None
     magnet = Magnet(exciter.gain, exciter.offset, exciter.distance, EXCITER_SIDES[exciter.side])
-    # a beam has a sensor of its own where the force acts, see `parameters`
+    # a beam has a sensor where the force acts, see `parameters`
     place = "sensor[1].displacement" if scene.body.PLACE == "location" else "displacement"
     return HeldExciter(magnet, place)

@@ -1,7 +1,7 @@
 """From analog voltages to the samples of a dataset: noise is added, a converter rounds and clips.
 
-Noise is a function of the seed, the run, the channel and the number of the sample alone, so that no worker and no cut
-of a campaign into chunks changes it.
+Noise depends only on the seed, the run, the channel and the number of the sample. Workers and the cut of a campaign
+into chunks do not change it.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 def run_seed(seed: int, values: Mapping[str, float], direction: Direction) -> int:
     """Return the seed of the noise of a run, 0 to 2^64 - 1: `noise.seed` where the scene sweeps nothing.
 
-    It is made of the point and not of its number, which another sweep of the same campaign changes. A point is the
-    values of the swept keys and the direction of its branch.
+    The seed depends on the point (the values of the swept keys and the direction of its branch). It does not depend on
+    the number of the point, which other sweeps of the same campaign change.
 
     Examples
     --------
@@ -43,11 +43,11 @@ def run_seed(seed: int, values: Mapping[str, float], direction: Direction) -> in
 
 
 def converted(scene: Scene, analog: Floats, names: Sequence[str], seed: int) -> Floats:
-    """Return samples with the noise of their channels, as the converter gives them: the time, then each of the names.
+    """Return samples with noise and conversion of their channels: the time, then each of the names.
 
-    The scene is at its point, the samples have the shape (sample, 1 + variable), and the seed is that of `run_seed`.
+    The scene is at its point, the samples have the shape (sample, 1 + variable), and the seed comes from `run_seed`.
     """
-    # only a scene with such tables needs the core here
+    # only scenes with a measuring chain need the core here
     from vibroimpact.fmus.core.measuring import digitised, gaussian
 
     samples = analog.copy()
@@ -81,31 +81,31 @@ def converted_records(
 
 
 def channel_attributes(scene: Scene) -> dict[str, dict[str, Any]]:
-    """Return what a dataset says of each channel: what it went through. A swept number is named by its coordinate."""
+    """Return the attributes of each channel, with the numbers of its chain, or their coordinates if swept."""
     swept = [axis.key for axis in scene.sweep]
 
-    def told(key: str) -> float | str:
+    def number_of(key: str) -> float | str:
         return coordinate_name(key, swept) if key in swept else scene.value(key)
 
     found: dict[str, dict[str, Any]] = {}
     for place, name in enumerate(scene.channels):
         own: dict[str, Any] = {"channel": name}
         if name.startswith("sensor.") and scene.sensor is not None and scene.sensor.range:
-            own["sensor_range"] = told("sensor.range")
+            own["sensor_range"] = number_of("sensor.range")
         if name == LOAD_CELL:
-            own["sensitivity"] = told("load_cell.sensitivity")
+            own["sensitivity"] = number_of("load_cell.sensitivity")
         if scene.noise is not None:
             own |= {
-                "noise_rms": told(f"noise.{name.partition('.')[0]}"),
+                "noise_rms": number_of(f"noise.{name.partition('.')[0]}"),
                 "noise_seed": scene.noise.seed,
             }
         if scene.daq is not None:
             own |= {
-                "range": told("daq.range"),
+                "range": number_of("daq.range"),
                 "bits": scene.daq.bits,
-                "clock_error_ppm": told("daq.clock_error"),
+                "clock_error_ppm": number_of("daq.clock_error"),
             }
-            own["skew"] = told("daq.skew") if "daq.skew" in swept else place * scene.daq.skew
+            own["skew"] = number_of("daq.skew") if "daq.skew" in swept else place * scene.daq.skew
             own["place"] = place
         found[name] = own
     return found

@@ -1,8 +1,8 @@
-"""A run that samples the channels of a measuring chain, or whose force is held from sample to sample: by blocks, in C.
+"""A run with sampled channels of a measuring chain, or with a force held from sample to sample: by blocks, in C.
 
-Sample k of the clock is taken at begin + k / rate, that of the channel at place c of the scene c skews later. The same
-clock holds a force that falls with the distance, from the start of the run on. Before the recording begins, the load
-cell is followed for as long as it remembers.
+Sample k of the clock is taken at begin + k / rate; the channel at place c of the scene is sampled c skews later. The
+same clock holds a force that falls with the distance, from the start of the run on. Before the recording, the load
+cell is followed until its start state has decayed.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
 Floats = NDArray[np.float64]
 INSTANTS_OF_A_BLOCK = 2048
 MOST_INSTANTS_BEFORE = 10**6
-"""Instants before the recording at which a load cell is followed, at most: one without damping never forgets."""
+"""Largest number of instants before the recording that a load cell is followed: without damping it never settles."""
 _ROUNDING = 1e-12
-"""Relative rounding by which a last sample may lie beyond the end of the recording."""
+"""Relative distance by which a last sample may lie beyond the end of the recording, by rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """What is known at the instants of a block, the first of which is where the block before ended."""
+    """The values at the instants of a block; the first instant is the end of the block before."""
 
     times: Floats
-    """s."""
+    """Instants, s, shape (instant,)."""
     rows: Floats
-    """Shape (instant, variable)."""
+    """Variables of the FMU, SI, shape (instant, variable)."""
     volts: Mapping[str, Floats]
-    """By channel, shape (instant,)."""
+    """Voltages by channel, V, shape (instant,)."""
 
     def last(self) -> _Seen:
-        """Return what is known at the last instant."""
+        """Return the values at the last instant."""
         volts = {name: values[-1:] for name, values in self.volts.items()}
         return _Seen(self.times[-1:], self.rows[-1:], volts)
 
 
 class MeasuredRun:
-    """The way of one run through its samples.
+    """One run through its samples.
 
-    The scene is at its point, and the driver has begun at time 0. Parameters are those of the body; the window is begin
+    The scene is at its point, and the driver has begun at time 0. `parameters` belong to the body; `window` is start
     and end of the recording, s.
     """
 
@@ -75,7 +75,7 @@ class MeasuredRun:
         self._sampled: list[Floats] = []
 
     def _whole(self, span: float) -> int:
-        """Return how many whole samples are in a span of time, s."""
+        """Return the number of whole samples in a span of time, s."""
         return math.floor(span * self._rate * (1.0 + _ROUNDING))
 
     @property
@@ -84,14 +84,14 @@ class MeasuredRun:
         return self._chain.needs_impacts
 
     def samples(self) -> Floats:
-        """Return what was sampled, shape (sample, 1 + variable): nominal time, then the variables of the scene."""
+        """Return the samples, shape (sample, 1 + variable): nominal time, then the variables of the scene."""
         width = 1 + len(self._plan.all_names)
         return np.concatenate(self._sampled) if self._sampled else np.empty((0, width))
 
     # ---- the clock ----
 
     def _edge(self, number: int) -> float:
-        """Return when sample `number` is taken, s; the end of the recording for those after it."""
+        """Return the time of sample `number`, s; the end of the recording for samples after it."""
         time = self._begin + number / self._rate
         return min(time, self._end) if number <= self._last else self._end
 
@@ -100,7 +100,7 @@ class MeasuredRun:
         return np.where(numbers <= self._last, np.minimum(times, self._end), self._end)
 
     def _instants(self, first: int, stop: int) -> Floats:
-        """Return all instants of some samples, from the first of them to the one that is no longer among them."""
+        """Return all instants of the samples `first` to `stop - 1`, up to the time of sample `stop`, s."""
         numbers = np.arange(first, stop)
         edges, end = self._edges(numbers)[:, np.newaxis], self._edge(stop)
         ring = edges + np.arange(self._pieces) / (self._pieces * self._rate)
@@ -109,7 +109,7 @@ class MeasuredRun:
         return found[found <= end]
 
     def _own(self, first: int, stop: int) -> Floats:
-        """Return the instants of a time series that keeps its own rate, since it names no channel."""
+        """Return the instants of a time series without channels, which has a rate of its own, s."""
         rate = self._scene.sampling_rate
         if self._chain.channels or not rate or stop <= 0:
             return np.empty(0)
@@ -122,19 +122,19 @@ class MeasuredRun:
         return np.unique(times[inside & (times <= end)])
 
     def _volts_at(self, times: Floats) -> Floats:
-        """Return the voltage that the scene puts out at instants; 0 without a forcing."""
+        """Return the drive voltage of the scene at instants, V; 0 without a forcing."""
         forcing = self._scene.forcing
         if forcing is None:
             return np.zeros(len(times))
         angle = forcing.angular_frequency * times + self._parameters["forcing.phase"]
         return np.asarray(forcing.scalar_amplitude * np.cos(angle), dtype=np.float64)
 
-    # ---- the way ----
+    # ---- blocks ----
 
     def go(self, begin_recording: Callable[[], None]) -> None:
-        """Go to the end of the recording; `begin_recording` is called where it begins.
+        """Run to the end of the recording; call `begin_recording` at its start.
 
-        ImpactLimitReached, DeadlineReached: the run ends before, and what was sampled is there.
+        ImpactLimitReached, DeadlineReached: the run ends early; `samples` has the samples until then.
         """
         seen = self._start()
         if self._first == 0:
@@ -147,7 +147,7 @@ class MeasuredRun:
 
     @property
     def _first(self) -> int:
-        """The sample with which the blocks begin: 0, or one before the recording."""
+        """Number of the first sample of the blocks: 0, or below 0 before the recording."""
         before = self._whole(self._begin)
         if self._exciter is None:
             lead = min(self._chain.lead * self._rate, float(before), MOST_INSTANTS_BEFORE / self._pieces)
@@ -155,14 +155,14 @@ class MeasuredRun:
         return next(number for number in itertools.count(-before) if self._edge(number) >= 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, int]]:
-        """Yield the samples of each block, [first, stop); one begins where the recording does."""
+        """Yield the samples of each block, [first, stop); a block begins at the start of the recording."""
         size = max(1, INSTANTS_OF_A_BLOCK // (self._pieces + len(self._chain.channels)))
         for begin, end in ((self._first, 0), (0, self._last + 1)):
             for first in range(begin, end, size):
                 yield first, min(first + size, end)
 
     def _start(self) -> _Seen:
-        """Go to where the blocks begin."""
+        """Run to the start of the blocks; return the values there."""
         driver, time = self._driver, self._edge(self._first)
         volts = self._volts_at(np.zeros(1))
         if self._exciter is not None and time > 0.0:
@@ -178,7 +178,7 @@ class MeasuredRun:
         return _Seen(now, row[np.newaxis], found)
 
     def _block(self, first: int, stop: int, before: _Seen) -> _Seen:
-        """Go through a block and take its samples."""
+        """Run through a block, take its samples, and return its values."""
         times = self._instants(first, stop)
         ends, steps = times[1:], len(times) - 1
         edges = self._edges(np.arange(first, stop))
@@ -187,7 +187,7 @@ class MeasuredRun:
             renewed = np.isin(times[:-1], edges).astype(np.uint8)
         else:
             held = np.full(steps, self._parameters.get("force", 0.0))
-            renewed = np.zeros(steps, dtype=np.uint8)  # it is a parameter of the run
+            renewed = np.zeros(steps, dtype=np.uint8)  # the force is a parameter of the run
         known = len(self._driver.rows.blocks)
         limit: RunEnded | None = None
         try:
@@ -214,7 +214,7 @@ class MeasuredRun:
         return _Seen(np.append(before.times, ends), np.concatenate([before.rows, rows]), volts)
 
     def _absolute(self, values: Mapping[str, Floats], times: Floats) -> dict[str, Floats]:
-        """Return values of variables with that of the base added to accelerations that are relative to it."""
+        """Return values of variables with absolute accelerations: the base is added to relative ones."""
         found = dict(values)
         if "acceleration" in found:
             found["acceleration"] = found["acceleration"] + self._plan.base(
@@ -222,7 +222,7 @@ class MeasuredRun:
             )
         return found
 
-    # ---- what is sampled ----
+    # ---- samples ----
 
     def _take_samples(self, first: int, stop: int, seen: _Seen) -> None:
         if stop <= 0:
@@ -240,12 +240,12 @@ class MeasuredRun:
         self._sampled.append(self._row_table(nominal, edges, seen))
 
     def _channel_samples(self) -> int:
-        """Return how many samples are taken of all channels before the recording ends."""
+        """Return the number of samples with all channels before the end of the recording."""
         behind = self._skew * (len(self._chain.channels) - 1)
         return max(0, self._whole(self._end - self._begin - behind) + 1)
 
     def _row_table(self, nominal: Floats, edges: Floats, seen: _Seen) -> Floats:
-        """Return the samples that are taken at edges of the clock, each channel with its skew."""
+        """Return the samples at edges of the clock, each channel with its skew, shape (sample, 1 + variable)."""
         at = np.searchsorted(seen.times, edges)
         plain = self._plan.rows(seen.rows[at], self._variables, self._scene.forcing, self._parameters, edges)
         columns, place = [nominal], 0

@@ -1,6 +1,6 @@
 """A scene with a measuring chain as the plant of a rig: voltages in, voltages out, block by block.
 
-What comes out is analog: noise and conversion, which each input of a rig has for itself, are in `conversion`.
+Output voltages are analog; `conversion` has the noise and the conversion of each input of a rig.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE, LOAD_CELL, MEASURED_SENSOR
 
 INSTANTS_AT_ONCE = 2**16
-"""Instants of a block that are in memory at once."""
+"""Maximum number of instants of a block held in memory at once."""
 
 
 class MeasuredSession:
@@ -33,34 +33,34 @@ class MeasuredSession:
     Parameters
     ----------
     scene : Scene
-        An oscillator or a beam, without a sweep; its `[forcing]` says only where the force acts.
+        An oscillator or a beam, without a sweep; only the place of the force is taken from its `[forcing]`.
     channels : sequence of str
-        What each block gives: channels that the scene has tables for.
+        Channels of each block; the scene has a table for each of them.
 
     Attributes
     ----------
     truth : dict of str to float
-        Displacement (m) and velocity (m/s) of the observed point, contact force of all stops (N), and where the load
-        cell is among the channels the force on it (N), half sines of impacts included, at the time reached.
+        Displacement (m) and velocity (m/s) of the observed point and contact force of all stops (N), at the time
+        reached. With the load cell among the channels also the force on it (N), including half sines of impacts.
     impacts_of_block : ndarray, shape (impact, 7)
-        Impacts that the last block recorded, columns `IMPACT_COLUMNS`; a contact with a stop that yields is in the
-        block in which it ends.
+        Impacts of the last block, columns `IMPACT_COLUMNS`; a contact with a compliant stop is in the block of its
+        end.
 
     Raises
     ------
     UsageError
-        A scene without `[body]`, of a chain, with a recording or a base that moves, or a channel that it has no table
-        for.
+        The scene has no `[body]`, a chain, a recording or a moving base, or it has no table for a channel.
 
     Notes
     -----
-    Steps are cut so that `RING_INSTANTS` are in a period of the load cell's ring: between them the force on the cell is
-    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. Behind a rigid
-    stop nothing is cut: half sines are exact at any step, and the force of a body at rest there is linear over it.
-    How samples are cut into blocks makes no difference, unless more than 1000 impacts are within a contact_duration.
+    Steps are cut into `RING_INSTANTS` pieces in a period of the load cell's ring, with a linear force on the cell
+    between them. A long step is cut only at its end, until the cell's start state has decayed, into 5000 pieces at
+    most. Steps of a cell behind a rigid stop are not cut. Half sines are exact at any step, and a resting body presses
+    linearly over a step. The cut of samples into blocks makes no difference, unless more than 1000 impacts are within
+    a contact_duration.
 
-    The last bounces of a chatter, which the body sums, are not in the voltage of the load cell: they are slower than
-    1e-4 of its first.
+    The body sums the last bounces of a chatter, slower than 1e-4 of its first impact. The voltage of the load cell does
+    not show them.
 
     Examples
     --------
@@ -80,12 +80,12 @@ class MeasuredSession:
         self._scene, self._channels = scene.at(values), tuple(channels)
         self._chain = MeasuringChain(self._scene, channels)
         exciter = held_exciter(self._scene)
-        assert exciter is not None  # a scene without one is refused
+        assert exciter is not None  # scenes without an exciter are refused
         self._exciter = exciter
         self._place = 0.0
         stops = [f"contact[{k}].force" for k in range(1, len(scene.stops) + 1)]
-        told = ("displacement", "velocity", exciter.displacement, *stops)
-        self._variables = tuple(dict.fromkeys((*told, *self._chain.variables)))
+        observed = ("displacement", "velocity", exciter.displacement, *stops)
+        self._variables = tuple(dict.fromkeys((*observed, *self._chain.variables)))
         driver = driver_of(self._scene, "fused")
         assert isinstance(driver, BodyDriver)
         self._driver = driver
@@ -122,28 +122,28 @@ class MeasuredSession:
         cell = self._scene.load_cell
         self._on_cell = LoadCell(1.0, contact_duration=cell.contact_duration or 0.0) if cell else None
         now = {name: np.array([value]) for name, value in zip(self._variables, row, strict=True)}
-        self._tell(np.zeros(1), now, NO_IMPACTS)
+        self._update_truth(np.zeros(1), now, NO_IMPACTS)
         self.impacts_of_block = NO_IMPACTS
 
     def advance(self, times: Floats, volts: Floats) -> dict[str, Floats]:
-        """Go through all instants, a voltage held between them; return the channels at the end of each step.
+        """Advance through all instants with a voltage held between them; return the channels at the end of each step.
 
         Parameters
         ----------
         times : ndarray, shape (sample + 1,)
-            s from the session's time 0, ascending; the first is now.
+            Instants in s from the session's time 0, ascending; the first is the present time.
         volts : ndarray, shape (sample,)
-            V, each from one of the instants to the next.
+            Voltages, V, each held from one instant to the next.
 
         Returns
         -------
         dict of str to ndarray, shape (sample,)
-            V by channel, before noise and conversion; `drive` is the voltage that was held until the instant.
+            Voltages by channel, V, before noise and conversion; `drive` is the voltage held until the instant.
 
         Raises
         ------
         UsageError
-            Instants that do not ascend from now, another number of voltages, or one that is no number.
+            The instants do not ascend from the present time, or the voltages have another number or are not finite.
         ImpactLimitReached
             The run has met `execution.impact_limit`.
         ComponentError
@@ -174,20 +174,20 @@ class MeasuredSession:
         impacts = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
         self._driver.rows.blocks = []
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
-        self._tell(ends, values, impacts)
+        self._update_truth(ends, values, impacts)
         return self._chain.volts(ends, values, impacts), impacts
 
     def instants_in(self, times: Floats) -> Counts:
-        """Return into how many steps each of those between instants is cut; shape (sample,)."""
+        """Return the number of pieces of each step between instants, shape (sample,)."""
         return pieces_of(np.diff(times), self._chain.finest, self._chain.lead)
 
     @property
     def fineness(self) -> float:
-        """Steps in a second, at least, where a load cell rings; 0: it does not."""
+        """Least number of steps in a second for a ringing load cell; 0 without a ring."""
         return 1.0 / self._chain.finest if self._chain.finest else 0.0
 
     def exciter_force(self, volts: float) -> float:
-        """Return the force of the exciter at a voltage, where the body is now, N."""
+        """Return the force of the exciter at a voltage and the present place of the body, N."""
         exciter = self._scene.exciter
         assert exciter is not None
         force = exciter_force(
@@ -195,7 +195,7 @@ class MeasuredSession:
         )
         return float(force[0])
 
-    def _tell(self, ends: Floats, values: Mapping[str, Floats], impacts: Floats) -> None:
+    def _update_truth(self, ends: Floats, values: Mapping[str, Floats], impacts: Floats) -> None:
         contacts = [float(column[-1]) for name, column in values.items() if name.startswith("contact[")]
         self.truth = {
             "displacement": float(values["displacement"][-1]),

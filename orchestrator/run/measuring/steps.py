@@ -1,4 +1,4 @@
-"""Steps between samples, cut so finely that the ring of a load cell is followed where it is still heard."""
+"""Steps between samples, cut finely enough to follow the ring of a load cell until it has decayed."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 MOST_PIECES = 5000
-"""Of one step; of a longer one only its end is cut finely."""
+"""Largest number of pieces of `finest` length in a step; a longer step is cut finely only at its end."""
 
 
 def pieces_of(durations: Floats, finest: float, lead: float) -> Counts:
-    """Return into how many pieces steps of durations > 0, s, are cut, each no longer than `finest`, s; 0 cuts none.
+    """Return the numbers of pieces of steps of durations > 0, s, each piece up to `finest`, s; 0: no step is cut.
 
-    After the time `lead`, s, nothing is left of what was before: a longer step has one piece more, up to there.
+    A start state decays within `lead`, s: a longer step has one more piece, the long one before its fine end.
 
     Examples
     --------
@@ -32,11 +32,11 @@ def pieces_of(durations: Floats, finest: float, lead: float) -> Counts:
 def cut(
     times: Floats, volts: Floats, finest: float, lead: float
 ) -> tuple[Floats, Floats, NDArray[np.uint8], Counts]:
-    """Cut steps into pieces, see `pieces_of`; return their ends and voltages, which begin a step, and each step's last.
+    """Return ends, voltages and `renewed` of the pieces of steps, see `pieces_of`, and the last piece of each step.
 
-    Times are the ends of steps, s, ascending, shape (step + 1,), and volts are held over each. Of the results, ends,
-    volts and `renewed` (1 where a piece begins a step) have the shape (piece,); the last piece of a step ends exactly
-    with it.
+    `times` bound the steps, s, ascending, shape (step + 1,); each of `volts` is held over a step. The ends, voltages
+    and `renewed` (1 where a piece begins a step) have the shape (piece,). The last piece of a step ends exactly with
+    the step.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def cut(
     durations = np.diff(times)
     counts = pieces_of(durations, finest, lead)
     last = np.cumsum(counts) - 1
-    left = np.repeat(last, counts) - np.arange(last[-1] + 1)  # pieces after each one, of its step
+    left = np.repeat(last, counts) - np.arange(last[-1] + 1)  # later pieces of the same step
     coarse = durations > (_followed(finest, lead) if finest else np.inf)
     followed = np.where(coarse, np.minimum(durations, _followed(finest, lead)), durations)
     piece = followed / (counts - coarse)

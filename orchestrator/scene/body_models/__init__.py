@@ -1,4 +1,4 @@
-"""The tables `[body]` of a scene file as frozen pydantic models, one module a kind; `base` has what each answers."""
+"""The tables `[body]` of a scene file as frozen pydantic models, one module for each kind; `base` has the protocol."""
 
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody

@@ -38,21 +38,21 @@ if TYPE_CHECKING:
     pass
 
 TIP, MIDDLE = 1.0, 0.5
-"""Fractions of the length."""
+"""Places on a beam, as fractions of its length."""
 BOUNDARY_NUMBERS = {"clamped-free": 1, "clamped-clamped": 2, "clamped-pinned": 3, "pinned-pinned": 4}
 FORCING_NUMBERS = {"force": 1, "uniform": 2, "mode": 3, "base_acceleration": 4}
 PROJECTION_NUMBERS = {"variational": 1, "collocation": 2}
 
 
 class Rayleigh(SceneTable):
-    """`body.rayleigh`: damping ratios mass / (2 w) + stiffness w / 2 in addition to those given."""
+    """`body.rayleigh`: damping ratios mass / (2 w) + stiffness w / 2, added to the given damping ratios."""
 
     mass: Annotated[NotNegative, Rule(unit="1/s", fmu="rayleigh.mass")] = 0.0
     stiffness: Annotated[NotNegative, Rule(unit="s", fmu="rayleigh.stiffness")] = 0.0
 
 
 class BeamBody(BodyTable):
-    """`[body]`: an Euler-Bernoulli beam of so many modes."""
+    """`[body]`: an Euler-Bernoulli beam with a number of modes."""
 
     NAME: ClassVar[str] = "a beam"
     FMU: ClassVar[str] = "Beam"
@@ -170,22 +170,22 @@ class BeamBody(BodyTable):
 
     @property
     def size(self) -> int:
-        """Number of modes; where it is to be found, the most that it may be."""
+        """Number of modes; the largest possible number for `modes = "auto"`."""
         return MOST_MODES if self.modes == "auto" else self.modes
 
     @property
     def finds_modes(self) -> bool:
-        """Whether the number of modes is to be found."""
+        """Whether the number of modes must still be found (`modes = "auto"`)."""
         return self.modes == "auto"
 
     @property
     def has_residual_vectors(self) -> bool:
-        """Whether its last modes are what the modes beyond give way at its stops."""
+        """Whether the last modes are residual vectors: the static flexibility of left-out modes at the stops."""
         return bool(self.residual)
 
     @property
     def projection(self) -> str:
-        """How an impact changes its modes."""
+        """Projection by which an impact changes the modes."""
         return self.impact_projection
 
     # ---- places ----
@@ -196,13 +196,13 @@ class BeamBody(BodyTable):
         return self.boundary == "clamped-free"
 
     def place_of(self, stop: Stop) -> float:
-        """Return the point that a stop limits: as given, or the tip."""
+        """Return the place of a stop on the beam: as given, or the tip."""
         return TIP if stop.location is None else stop.location
 
     def observed_place(self, stops: Stops, sensor: Sensor | None) -> float:
-        """Return the point whose displacement is recorded.
+        """Return the place of the recorded displacement.
 
-        That of `[sensor]`; else the tip of a clamped-free beam; else the point of stop[1], or the middle.
+        It is the location of `[sensor]`; else the tip of a clamped-free beam; else the place of stop[1], or the middle.
         """
         if sensor is not None and sensor.location is not None:
             return sensor.location
@@ -211,18 +211,18 @@ class BeamBody(BodyTable):
         return self.place_of(stops[0]) if stops else MIDDLE
 
     def forced_place(self, forcing: Forcing | None) -> float:
-        """Return the point that a force acts on: as given, the free tip, or the middle."""
+        """Return the place of the force: as given, the free tip, or the middle."""
         if forcing is not None and forcing.location is not None:
             return forcing.location
         return TIP if self.far_end_moves else MIDDLE
 
     @property
     def fixed_end(self) -> str:
-        """Why a stop has to say where it is; empty at a free tip."""
+        """Reason why a stop must have a location; empty for a beam with a free tip."""
         return "" if self.far_end_moves else f"the far end of a {self.boundary} beam does not move"
 
     def fixed_point(self, location: float) -> tuple[str, str] | None:
-        """Return which point is expected, and which one a location is, where it does not move."""
+        """Return the expected kind of point, and the name of the point at a fixed location; None if it moves."""
         if 0.0 < location < 1.0 or (location == TIP and self.far_end_moves):
             return None
         end = "clamped end" if location == 0.0 else "supported far end"
@@ -237,11 +237,11 @@ class BeamBody(BodyTable):
     # ---- parameters of the FMU ----
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
-        """Return rigidity, Rayleigh damping, places and amplitude as the FMU takes them, SI."""
+        """Return rigidity, Rayleigh damping, places and amplitude as parameters of the FMU, SI."""
         found: dict[str, float] = {}
         if self.frequency is not None:
             from vibroimpact.fmus.bodies.beam import (
-                rigidity_of_frequency,  # loads the core, which few scenes need
+                rigidity_of_frequency,  # imports the core, which few scenes need
             )
 
             assert self.mass_per_length is not None
@@ -258,7 +258,7 @@ class BeamBody(BodyTable):
         return found
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return modes, residual vectors, boundary, projection and kind of load as the FMU counts them."""
+        """Return modes, residual vectors, boundary, projection and kind of load as numbers of the FMU."""
         found = {
             "modes": self.size,
             "residual": self.has_residual_vectors,

@@ -1,4 +1,4 @@
-"""`[body]` of masses in a row."""
+"""`[body]` of a chain of masses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FREE_END = "Use 0 for a free far end."
 
 
 class ChainBody(BodyTable):
-    """`[body]`: masses in a row, each joined to the one before by a spring and a dashpot."""
+    """`[body]`: a chain of masses, each joined to the mass before by a spring and a dashpot."""
 
     NAME: ClassVar[str] = "a chain"
     FMU: ClassVar[str] = "Chain"
@@ -123,20 +123,20 @@ class ChainBody(BodyTable):
 
     @property
     def finds_modes(self) -> bool:
-        """Whether the number of modes is to be found."""
+        """Whether the number of modes must still be found (`modes = "auto"`)."""
         return self.modes == "auto"
 
     @property
     def kept_modes(self) -> int:
-        """Number of modes that are simulated: as given, or all."""
+        """Number of simulated modes: as given, or all modes."""
         return self.size if self.modes is None or self.modes == "auto" else self.modes
 
     def place_of(self, stop: Stop) -> int:
-        """Return the mass (1-based) that a stop limits: as given, or the last."""
+        """Return the mass (1-based) of a stop: as given, or the last."""
         return stop.mass or self.size
 
     def observed_place(self, stops: Stops, sensor: Sensor | None) -> int:
-        """Return the mass (1-based) whose displacement is recorded: as given, that of stop[1], or the last."""
+        """Return the mass (1-based) of the recorded displacement: as given, the mass of stop[1], or the last."""
         return self.observed_mass or (self.place_of(stops[0]) if stops else self.size)
 
     @property
@@ -151,7 +151,7 @@ class ChainBody(BodyTable):
             return {}
         given = forcing.amplitude
         if forcing.kind == "base_acceleration":
-            # a base that accelerates is an inertial force on each relative coordinate
+            # the acceleration of the base is an inertial force on each relative coordinate
             forces = tuple(-mass * forcing.scalar_amplitude for mass in self.masses)
         elif isinstance(given, tuple):
             forces = given + (0.0,) * (self.size - len(given))
@@ -160,8 +160,8 @@ class ChainBody(BodyTable):
         return dict(zip(each_of("forcing.amplitude", self.size), forces, strict=False))
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return the numbers of masses and modes, 0 for all, the observed mass, and those of stops."""
+        """Return the numbers of masses and modes (0 for all modes), the observed mass, and the masses of stops."""
         modes = 0 if self.modes is None else self.modes
-        assert modes != "auto"  # else refused
+        assert modes != "auto"  # refused before
         hit = {f"contact[{k}].mass_number": self.place_of(stop) for k, stop in enumerate(stops, start=1)}
         return {"masses": self.size, "modes": modes, "observed_mass": self.observed_place(stops, None), **hit}

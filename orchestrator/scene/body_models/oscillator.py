@@ -79,7 +79,7 @@ class OscillatorBody(BodyTable):
         if self.damping_ratio is None:
             return self.damping_given
         square = self.stiffness * self.mass
-        # the points of a sweep come as arrays, too
+        # the values of a sweep may be arrays
         root = np.sqrt(square) if isinstance(square, np.ndarray) else math.sqrt(square)
         return 2.0 * self.damping_ratio * root
 
@@ -87,10 +87,10 @@ class OscillatorBody(BodyTable):
         """Return the amplitude of the force, N."""
         if forcing is None:
             return {}
-        # a base that accelerates is an inertial force on the relative coordinate
+        # the acceleration of the base is an inertial force on the relative coordinate
         scale = 1.0 if forcing.kind == "force" else -self.mass
         return {"forcing.amplitude": scale * forcing.scalar_amplitude}
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return none."""
+        """Return no parameters."""
         return {}

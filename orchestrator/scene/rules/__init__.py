@@ -1,1 +1,1 @@
-"""Rules between the fields of a scene; each yields the problems that it finds."""
+"""Rules between the fields of a scene; each rule yields its problems."""

@@ -1,4 +1,4 @@
-"""Rules of a body and of what acts on it: arrays of one size, points that are there, names that it knows."""
+"""Rules of a body and its forcing: arrays of one size, points on the body, known variable names."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FREQUENCY_KEYS = ("frequency", "mass_per_length")
 
 
 def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
-    """Elements and start states of a chain count as its masses do, those of a beam as its modes."""
+    """Arrays of a chain have one element for each mass, arrays of a beam one for each mode."""
     body = draft.body
     if body is None or not body.IS_STRUCTURE:
         return
@@ -53,7 +53,7 @@ def _size_problem(key: str, value: object, size: int, of: str) -> Iterator[Probl
 
 
 def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
-    """Rigidity and mass follow from the section and the material, or are given themselves."""
+    """Rigidity and mass of a beam follow from section and material, or are given themselves, but not both."""
     written = draft.written("body")
     if not hasattr(draft.body, "flexural_rigidity"):
         return
@@ -76,7 +76,7 @@ def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
 
 
 def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
-    """The mass or the point whose displacement is recorded is one of the body."""
+    """The mass or the point of the recorded displacement is on the body."""
     body = draft.body
     if body is None:
         return
@@ -101,7 +101,7 @@ def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
 
 
 def fixed_point_problems(key: str, body: Body, span: tuple[float, float] | None) -> Iterator[Problem]:
-    """Yield the problem of a point that does not move, of a location or the ends of its sweep."""
+    """Yield the problem of a location, or of the ends of its sweep, at a point that does not move."""
     for location in dict.fromkeys(span or ()):
         fixed = body.fixed_point(location)
         if fixed is not None:
@@ -110,7 +110,7 @@ def fixed_point_problems(key: str, body: Body, span: tuple[float, float] | None)
 
 
 def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
-    """A body can be forced in this way, with one amplitude or one for each mass."""
+    """The kind of forcing, and its number of amplitudes, are possible for the body."""
     body, forcing = draft.body, draft.forcing
     if body is None or forcing is None:
         return
@@ -140,10 +140,10 @@ def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
 
 
 def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Problem]:
-    """Yield what is wrong with `location` and `mode`, each for one kind of load of a beam."""
+    """Yield the problems of `location` and `mode`, each of which belongs to one kind of load of a beam."""
     for key, kind in (("location", "force"), ("mode", "mode")):
-        wanted = body.FORCING_KEYS.get(key) == forcing.kind
-        if key in draft.written("forcing") and not wanted:
+        belongs = body.FORCING_KEYS.get(key) == forcing.kind
+        if key in draft.written("forcing") and not belongs:
             got = f"it beside {body.NAME} under {forcing.kind}"
             yield Problem(f"forcing.{key}", f'{key} for a beam with kind = "{kind}"', got, f"Remove {key}.")
     if not body.FORCING_KEYS:
@@ -158,7 +158,7 @@ def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Prob
 
 
 def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
-    """A time series names variables that this body has, each once."""
+    """A time series names variables of this body, each once."""
     series = draft.record.time_series if draft.record else None
     if series is None or draft.body is None:
         return

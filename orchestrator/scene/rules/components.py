@@ -1,7 +1,7 @@
 """Rules of a general scene against the model descriptions of its FMUs.
 
-Each rule yields the problems that it finds, and looks only at parts that are valid by themselves: nothing is
-said of the variables of an FMU that cannot be read.
+Each rule yields its problems and checks only parts that are valid by themselves. The variables of an unreadable FMU
+are therefore not checked.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, 
 from vibroimpact.orchestrator.scene.rules.scene import sample_problems
 
 MOST_STEPS_PER_RUN = 10**10
-#: Inputs of a body's contact port by which another component answers its contact.
+#: Inputs of a body's contact port through which another component answers its contact.
 ANSWERS = ("applied_restitution", "applied_force")
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
 
 
 def general_problems(draft: GeneralDraft) -> list[Problem]:
-    """Return everything that is wrong between the tables of a general scene and its FMUs."""
+    """Return all problems between the tables of a general scene and its FMUs."""
     rules = (
         _connections_join_what_there_is,
         _inputs_have_one_source,
@@ -52,10 +52,10 @@ def general_problems(draft: GeneralDraft) -> list[Problem]:
 
 
 def reference_problem(draft: GeneralDraft, where: str, reference: str) -> Problem | None:
-    """Return why `COMPONENT.VARIABLE` names nothing of this scene; None when it may."""
+    """Return the problem of `COMPONENT.VARIABLE` if it names nothing in this scene; else None."""
     component, variable = component_variable(reference)
     if not draft.components:
-        return None  # a scene without components is told only that
+        return None  # a scene without components has only that problem
     if not variable:
         hint = 'For example "ball.h"; the component ends at the first dot.'
         return Problem(where, "a variable COMPONENT.VARIABLE", quoted(reference), hint)
@@ -86,7 +86,7 @@ def _connections_join_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
 
 
 def _is_without_units(draft: GeneralDraft, source: VariableFacts, target: VariableFacts) -> bool:
-    """Return whether both ends are plain numbers: in a nondimensional scene, unless one kind has two scales (m, mm)."""
+    """Return whether both ends are plain numbers: in a nondimensional scene, except two scales of a unit (m, mm)."""
     if not draft.is_nondimensional:
         return False
     return source.unit is None or target.unit is None or source.unit.exponents != target.unit.exponents
@@ -160,7 +160,7 @@ def _inputs_have_one_source(draft: GeneralDraft) -> Iterator[Problem]:
         variable = draft.variable(connection.target) if connection else None
         if connection is None or variable is None or not variable.fed:
             continue
-        # aliases are one input, whatever its name
+        # aliases of one variable are one input
         other = first.setdefault((component_variable(connection.target)[0], variable.reference), place)
         if other != place:
             where = key_path(("connection", place, "to"))
@@ -195,7 +195,7 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
 
 
 def _contact_answer(draft: GeneralDraft, component: str) -> str | None:
-    """Return the output that answers a contact of this component; None where none does."""
+    """Return the output that answers a contact of this component; None without one."""
     for connection in draft.connections:
         if connection is None or component_variable(connection.target)[0] != component:
             continue

@@ -13,14 +13,14 @@ from vibroimpact.orchestrator.scene.component_numbers import component_variable,
 from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
-#: Variables of a stop that say which law it follows, on which side it is.
+#: Variables of a stop for its law and its side.
 LAW, SIDE = "law", "side"
 VELOCITY = "velocity"
 SIDES = {"upper": 1, "lower": 2}
 
 
 def contact_problems(draft: GeneralDraft) -> list[Problem]:
-    """Return everything that is wrong with the contacts of a general scene."""
+    """Return all problems of the contacts of a general scene."""
     rules = (_variables_are_there, _stops_answer_with_a_force, _bodies_say_their_mass, _inputs_are_free)
     return [
         problem
@@ -32,7 +32,7 @@ def contact_problems(draft: GeneralDraft) -> list[Problem]:
 
 
 def velocity_input(draft: GeneralDraft, table: StopContactTable) -> str | None:
-    """Return the stop's input for the velocity; None where it takes none."""
+    """Return the stop's input for the velocity; None where it has no such input."""
     if table.stop_velocity is not None:
         return table.stop_velocity
     facts = _facts(draft, table.stop)
@@ -81,7 +81,7 @@ def _component_problems(draft: GeneralDraft, place: int, key: str, name: str) ->
 def variable_problems(
     where: str, component: str, facts: ComponentFacts, name: str, causality: str, unit: Unit | None
 ) -> Iterator[Problem]:
-    """Yield why a variable of a component is no such input or output, or has another unit."""
+    """Yield the problem of a variable that is missing, has another causality, or has another unit."""
     variable = facts.variables.get(name)
     article = f"{'an' if causality[0] in 'io' else 'a'} {causality}"
     if variable is None:
@@ -133,7 +133,7 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
 
 
 def _says_its_side(facts: ComponentFacts) -> bool:
-    """Is there a parameter `side` as an ImpactStop has it: upper 1, lower 2, also in a lean export?"""
+    """Return whether a stop has a parameter `side` like an ImpactStop (upper 1, lower 2), also in a lean export."""
     side = facts.variables.get(SIDE)
     if side is None or side.causality != "parameter":
         return False
@@ -141,13 +141,13 @@ def _says_its_side(facts: ComponentFacts) -> bool:
 
 
 def _is_rigid(draft: GeneralDraft, table: StopContactTable, facts: ComponentFacts) -> bool:
-    """Does a stop of ours answer with a coefficient of restitution? Its law is that unless another is given."""
+    """Return whether a stop of the package answers with a coefficient of restitution, its default law."""
     law = facts.variables.get(LAW)
     if law is None or "applied_restitution" not in facts.variables:
         return False
     swept = draft.document.get("sweep")
     if isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept:
-        return False  # each point says it for itself
+        return False  # each point has its own law
     default = contact_law("restitution").number
     return (draft.components[table.stop].parameters or {}).get(LAW, default) in rigid_law_numbers()
 
@@ -166,7 +166,7 @@ def _sweeps_mass(draft: GeneralDraft, place: int) -> bool:
 
 
 def _inputs_are_free(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
-    """An input of a stop has one source; the forces of contacts on one input add up, and nothing else feeds it."""
+    """Contacts alone feed the inputs of their bodies and stops, and a stop belongs to one contact."""
     for number, connection in enumerate(draft.connections, start=1):
         if connection is None:
             continue

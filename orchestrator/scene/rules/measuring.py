@@ -1,4 +1,4 @@
-"""Rules of the measuring chain: which scenes have one, what its tables need of each other and of the stops."""
+"""Rules of the measuring chain: scenes that can have one, and dependencies between its tables and the stops."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from vibroimpact.orchestrator.scene.measuring_models import MOST_INSTANTS, RING_
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 
 NOISY = {"sensor": "sensor", "load_cell": "load_cell", "drive": "exciter"}
-"""Keys of `[noise]`, and the table that each needs."""
+"""Keys of `[noise]`, each with the table that it needs."""
 
 
 def _written(draft: Draft) -> tuple[str, ...]:
-    """Return the tables of a chain that a scene has; a sensor counts by its range, or where it is sampled."""
+    """Return the tables of a chain in a scene; a sensor counts as one of them if it has a range."""
     tables = tuple(name for name in CHAIN_TABLES if name in draft.document)
     return (*tables, "sensor.range") if "range" in draft.written("sensor") else tables
 
 
 def chain_suits_the_scene(draft: Draft) -> Iterator[Problem]:
-    """Oscillators and beams in SI units have a chain, in fused runs."""
+    """Only oscillators and beams in SI units can have a measuring chain, and only in fused runs."""
     tables = _written(draft)
     first = next((name for name in draft.channels if name.startswith("sensor.")), "")
     for where in tables or ((f"record.time_series: {first}",) if first else ()):
@@ -37,7 +37,7 @@ def chain_suits_the_scene(draft: Draft) -> Iterator[Problem]:
 
 
 def replays_measure_nothing(draft: Draft) -> Iterator[Problem]:
-    """What a replay compares is a recording, which has been through its own chain."""
+    """A replay has no measuring chain, since its recording has been through a chain of its own."""
     if draft.replay is None:
         return
     for name in _written(draft):
@@ -54,7 +54,7 @@ def replays_measure_nothing(draft: Draft) -> Iterator[Problem]:
 
 
 def load_cell_has_a_stop(draft: Draft) -> Iterator[Problem]:
-    """A load cell is behind a stop; what it sees of an impact on a rigid one has a duration."""
+    """A load cell is behind a stop; behind a rigid stop, it needs a duration of its impacts."""
     cell = draft.load_cell
     if cell is None:
         return
@@ -75,10 +75,10 @@ def load_cell_has_a_stop(draft: Draft) -> Iterator[Problem]:
 
 
 def cell_has_numbers_of_a_cell(draft: Draft) -> Iterator[Problem]:
-    """The numbers of a load cell are within what its component takes, at every point."""
+    """The numbers of a load cell are within the limits of its component at every point."""
     if draft.load_cell is None:
         return
-    # a scene without a chain loads none of it
+    # only scenes with a chain need this import
     from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS
 
     for name, largest in CELL_LIMITS.items():
@@ -91,7 +91,7 @@ def cell_has_numbers_of_a_cell(draft: Draft) -> Iterator[Problem]:
 
 
 def cell_rings_within_reach(draft: Draft) -> Iterator[Problem]:
-    """The force that makes a cell ring is followed within a sample, but not without end."""
+    """The ring of a load cell is slow enough to be followed at `MOST_INSTANTS` in a sample."""
     ring, rate = draft.load_cell and draft.span("load_cell.natural_frequency"), draft.sampling_span()
     if "load_cell" in draft.channels and ring and rate and ring[1] * RING_INSTANTS > rate[0] * MOST_INSTANTS:
         most = rate[0] * MOST_INSTANTS / RING_INSTANTS
@@ -104,7 +104,7 @@ def cell_rings_within_reach(draft: Draft) -> Iterator[Problem]:
 
 
 def exciter_drives_a_force(draft: Draft) -> Iterator[Problem]:
-    """An exciter pushes at a point; where its force falls, it is held by the clock of `[daq]`."""
+    """An exciter needs a force at a point, and the clock of `[daq]` if the force falls with the distance."""
     if "exciter" not in draft.document:
         return
     if draft.forcing is not None and draft.forcing.kind != "force":
@@ -122,7 +122,7 @@ def exciter_drives_a_force(draft: Draft) -> Iterator[Problem]:
 
 
 def noise_has_its_channel(draft: Draft) -> Iterator[Problem]:
-    """Noise is added to channels that are there."""
+    """Noise belongs to channels whose tables are in the scene."""
     for key, table in NOISY.items():
         if key in draft.written("noise") and table not in draft.document:
             hint = f"Add [{table}], or remove {key}."
@@ -130,7 +130,7 @@ def noise_has_its_channel(draft: Draft) -> Iterator[Problem]:
 
 
 def one_clock_samples_the_channels(draft: Draft) -> Iterator[Problem]:
-    """Channels are sampled by `[daq]` where there is one, one after the other within a sample."""
+    """`[daq]`, if given, samples the channels at its rate, one after the other within a sample."""
     series = draft.record.time_series if draft.record else None
     if series is None or not draft.samples_channels:
         return

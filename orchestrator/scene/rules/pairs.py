@@ -17,20 +17,21 @@ from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDra
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.contacts import variable_problems
 
-#: The law of a port that watches no stop of its own.
+#: The law of a port without a stop of its own, for contacts with other bodies.
 PAIR_LAW = "pair"
 _PORT = re.compile(r"contact\[([1-9][0-9]?)\]")
 _MASS = re.compile(r"mass\[([1-9][0-9]?)\]")
-#: Variables that say where a port is: of a chain, of a beam. The last mass, the tip.
+#: Variables for the place of a port on a chain and on a beam; then the values for the last mass and the tip.
 _MASS_NUMBER, _LOCATION = "mass_number", "location"
 _LAST, _TIP = 0, 1.0
 
 
 @dataclass
 class PortPlan:
-    """Which contact port, or point, each end of each pair takes, and what its component must be given for that.
+    """The contact port, or point, of each end of each pair, and the start values of components for these ports.
 
-    Ends go by the 0-based place of the `[[contact]]` and of the point in its `between`, start values by component.
+    Keys of `ends` are the 0-based places of the `[[contact]]` and of the point in its `between`. `parameters` has start
+    values by component.
     """
 
     ends: dict[tuple[int, int], tuple[str, str] | BodyPoint] = field(default_factory=dict)
@@ -44,7 +45,7 @@ class PortPlan:
 
 
 def plan_ports(draft: GeneralDraft) -> PortPlan:
-    """Find a contact port for each point that another body may hit."""
+    """Return a plan with a contact port for each point of a pair."""
     plan = PortPlan()
     taken: dict[tuple[str, str], str] = {}
     for place, table in enumerate(draft.contacts):
@@ -81,7 +82,7 @@ def _unused_points(
 def _foreign_point_problems(
     draft: GeneralDraft, place: int, name: str, point: BodyPointTable
 ) -> Iterator[Problem]:
-    """Yield what is wrong with the point of a body of another tool."""
+    """Yield the problems of a point on a body of another tool."""
     component = draft.components.get(name)
     if component is None:
         if draft.components:
@@ -114,7 +115,7 @@ def _foreign_point_problems(
 def _port_of(
     draft: GeneralDraft, point: str, where: str, taken: dict[tuple[str, str], str], plan: PortPlan
 ) -> tuple[str, str] | None:
-    """Return component and port of a point; None where there is none, which is a problem then."""
+    """Return the component and the port of a point; None without a port, with a problem added to the plan."""
     name, rest = component_variable(point)
     component = draft.components.get(name)
     if component is None:
@@ -192,7 +193,7 @@ def _given_port_problem(component: DraftComponent, port: str, where: str, point:
     if law is None:
         return Problem(where, f"a contact port of {component.facts.file}", quoted(point))
     given = (component.parameters or {}).get(f"{port}.law", 0)
-    # lean descriptions have numbers alone
+    # lean descriptions have only numbers
     if given in (contact_law("none").number, contact_law(PAIR_LAW).number):
         return None
     names = {number: name for name, number in law.items.items()}
@@ -203,13 +204,13 @@ def _given_port_problem(component: DraftComponent, port: str, where: str, point:
 
 
 def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: PortPlan) -> str | None:
-    """Return the first port that is given this place already, or that neither the scene nor another pair uses."""
+    """Return the first port that already has this place, or else the first port that is not in use."""
     assert component.facts is not None
     parameters = component.parameters or {}
     ports = [name.removesuffix(".law") for name in component.facts.variables if name.endswith("].law")]
     for port in ports:
-        wanted = _start_values(component.facts, port, rest)
-        if all(parameters.get(name) == value for name, value in wanted.items()):
+        needed = _start_values(component.facts, port, rest)
+        if all(parameters.get(name) == value for name, value in needed.items()):
             return port
     swept = draft.written("sweep")
     named = [point for table in draft.contacts if isinstance(table, PairTable) for point in table.between]
@@ -234,7 +235,7 @@ def _no_port(facts: ComponentFacts, name: str, where: str) -> Problem:
 
 
 def _start_values(facts: ComponentFacts, port: str, rest: str) -> Mapping[str, StartValue]:
-    """What a component must be given so that a port is at this point."""
+    """Return the start values of a component that put a port at this point."""
     values: dict[str, StartValue] = {f"{port}.law": contact_law(PAIR_LAW).number}
     if _PORT.fullmatch(rest):
         return values

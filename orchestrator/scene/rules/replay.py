@@ -1,4 +1,4 @@
-"""Rules of `[replay]`: channels that are named, variables that the body has."""
+"""Rules of `[replay]`: named channels, and known variables of the body."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _OWNERS = ("body.", "oscillator.", "chain.", "beam.")
 
 
 def plain_variable(simulated: str) -> tuple[str, bool]:
-    """Return the variable that a compared name means, and whether it is a reading of `[sensor]`.
+    """Return the variable of a compared name, and whether it is a reading of `[sensor]`.
 
     Examples
     --------
@@ -27,9 +27,9 @@ def plain_variable(simulated: str) -> tuple[str, bool]:
 
 
 def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
-    """A replay drives, compares, or both; what drives has a channel."""
+    """A replay drives or compares, or both, and a drive has a channel."""
     replay = draft.replay
-    assert replay is not None  # these rules are asked of replays alone
+    assert replay is not None  # these rules are only for replays
     if replay.drive is None and not replay.compare:
         hint = 'Add drive = "base_acceleration" and from = "CHANNEL", or compare = [...].'
         yield Problem("replay", "something to drive or to compare", "neither", hint)
@@ -53,7 +53,7 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
 
 
 def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
-    """Each simulated name is one that a time series of this scene could have; each pair is there once."""
+    """Each simulated name is a possible variable of a time series of this scene, and each pair occurs once."""
     if draft.body is None:
         return
     assert draft.replay is not None
@@ -74,7 +74,7 @@ def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
 
 
 def no_record_beside_replay(draft: Draft) -> Iterator[Problem]:
-    """The recording says how long a replay lasts."""
+    """A replay has no keys of `[record]` for duration and rate, which come from the recording."""
     for key in ("transient_periods", "recorded_periods", "transient_time", "recorded_time", "time_series"):
         if key in draft.written("record"):
             hint = "The recording says how long it lasts and at which rate; replay.start and stop cut it."

@@ -1,8 +1,8 @@
-"""Rules between the fields and tables of a scene; each rule yields the problems that it finds.
+"""Rules between the fields and tables of a scene; each rule yields its problems.
 
-A rule looks only at parts that are valid by themselves, so that one mistake is reported once. Swept keys
-count with their lowest and highest value: the axes of a sweep span all combinations, so a rule that holds at
-the worst corner holds everywhere.
+A rule checks only parts that are valid by themselves, so that one mistake is reported once. Swept keys count with
+their lowest and highest value. The axes of a sweep span all combinations, so a rule that holds at the worst corner
+holds everywhere.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DraftRule = Callable[[Draft], Iterator[Problem]]
 
 
 def rule_problems(draft: Draft) -> list[Problem]:
-    """Return everything that is wrong between the tables of a scene."""
+    """Return all problems between the tables of a scene."""
     rules = (
         _damping_is_given_once,
         _damping_ratio_has_a_spring,
@@ -45,7 +45,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
 
 
 def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
-    """Yield the rules of a measuring chain, of a time series and of a replay; scenes without them load none."""
+    """Yield the rules of a measuring chain, of a time series and of a replay, imported only for scenes with them."""
     if draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
         from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
 
@@ -124,7 +124,7 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
         yield Problem("sweep", "frequencies that are all > 0, or all 0", "0 among others", hint)
         return
     if "replay" in draft.document:
-        return  # its recording says how long it lasts: see rules.replay
+        return  # the recording gives the duration: see rules.replay
     forced = span[0] > 0.0
     right, wrong = (PERIOD_KEYS, TIME_KEYS) if forced else (TIME_KEYS, PERIOD_KEYS)
     yield from _wrong_durations(draft, right, wrong, forced)
@@ -134,7 +134,7 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
 def _missing_duration(draft: Draft, right: str, wrong: str) -> Iterator[Problem]:
     raw = draft.document.get("record")
     if raw is None and "body" not in draft.document:
-        return  # a file without the main table is told only that
+        return  # a file without the main table has only that problem
     if raw is None or (isinstance(raw, dict) and right not in raw and wrong not in raw):
         unit = "a whole number of forcing periods" if right in PERIOD_KEYS else "a number > 0 (time)"
         yield Problem(f"record.{right}", unit, "nothing", f"Add {right} = ... to [record].")
@@ -185,14 +185,14 @@ def _adaptive_axes_can_tell_motions(draft: Draft) -> Iterator[Problem]:
 
 
 def sample_problems(key: str, samples: float, recorded: str) -> Iterator[Problem]:
-    """Yield the problem of a run with too many samples, of any form of scene."""
+    """Yield the problem of a run with too many samples, in any form of scene."""
     if samples > MOST_SAMPLES_PER_RUN:
         expected = f"at most {MOST_SAMPLES_PER_RUN} samples per run"
         yield Problem(key, expected, f"{samples:.3g}", f"Lower the rate or the recorded {recorded}.")
 
 
 def sweep_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
-    """Yield what is wrong between the axes of a sweep, of any form of scene."""
+    """Yield the problems between the axes of a sweep, in any form of scene."""
     count = run_count(axes)
     if count > MOST_POINTS:
         yield Problem("sweep", f"at most {MOST_POINTS} points in all", str(count), "Lower points of an axis.")
@@ -201,7 +201,7 @@ def sweep_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
         hint = 'Make the others "independent": they span the branches.'
         yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)
     for key in carried:
-        if key.partition("[")[0] in START_STATE:  # an element of it too
+        if key.partition("[")[0] in START_STATE:  # or an element of it
             where = key_path(("sweep", key, "path"))
             hint = "Along a continuation each point starts from the state of the one before."
             yield Problem(where, '"independent" for a start state', "a continuation", hint)

@@ -1,7 +1,7 @@
-"""Rules of components whose communication steps may not be cut anywhere: of one step size, or on a grid of their own.
+"""Rules of components with restricted communication steps: a single step size, or a grid of their own.
 
-What is known before a run is refused with the scene, by the name of the attribute; a step that an event of another
-component cuts is refused where it happens (`orchestrator/fmi/instance.py`).
+Conflicts that are known before a run are refused with the scene, by the name of the FMI attribute. A step cut by an
+event of another component is refused during the run (`orchestrator/fmi/instance.py`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from vibroimpact.orchestrator.scene.component_numbers import STEP_KEY, component
 from vibroimpact.orchestrator.scene.components import GeneralDraft
 from vibroimpact.orchestrator.scene.problems import Problem, key_path
 
-#: Largest distance of a ratio from a whole number, relative, that rounding explains: instants agree to 1e-13.
+#: Relative distance of a ratio from a whole number, up to which it is whole by rounding: instants agree to 1e-13.
 WHOLE = 1e-14
 
 
 class _Grid(NamedTuple):
-    """The times, s, of whose multiples the steps of a component may end, and the attribute that says so."""
+    """The step, s, at whose multiples communication steps of a component may end, and the attribute that demands it."""
 
     name: str
     facts: ComponentFacts
@@ -31,12 +31,12 @@ class _Grid(NamedTuple):
 
     @property
     def owner(self) -> str:
-        """The file and the attribute, as a problem names them."""
+        """The file and the attribute, in words for a problem."""
         return f"{self.facts.file} ({self.attribute})"
 
 
 def step_problems(draft: GeneralDraft) -> list[Problem]:
-    """Return everything that would cut a step of a component that takes no cut ones."""
+    """Return the problems of all settings that would cut a step of a component with restricted steps."""
     if draft.record is None or draft.execution is None:
         return []
     limited = {
@@ -71,7 +71,7 @@ def _grids(limited: dict[str, ComponentFacts], macro_step: float) -> Iterator[_G
 
 
 def _is_multiple(time: float, step: float) -> bool:
-    """Is a time, s, a whole multiple of a step but for rounding?"""
+    """Return whether a time, s, is a whole multiple of a step up to rounding."""
     ratio = time / step
     if not math.isfinite(ratio):
         return False
@@ -79,7 +79,7 @@ def _is_multiple(time: float, step: float) -> bool:
 
 
 def _in_digits(value: float) -> str:
-    """Return a number in six digits, or in all that it has, so that one off by a rounding shows it."""
+    """Return a number in six digits if they are exact, else in all digits, which show a rounding error."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)
 
@@ -99,14 +99,14 @@ def _macro_step_problems(draft: GeneralDraft, grid: _Grid, macro_step: float) ->
 
 
 def _step_hint(draft: GeneralDraft) -> str:
-    """Return the advice for a scene whose only step is the whole run."""
+    """Return the hint for a scene without a macro step, whose only step is the whole run."""
     assert draft.execution is not None
     has_step = draft.execution.macro_step is not None or draft.swept_steps()
     return "" if has_step else "Add macro_step = ... to [execution]: the size of the steps."
 
 
 def _rate_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
-    """A sample inside a step is read in a shorter one, of a component with states; of others it is interpolated."""
+    """Samples of a restorable component are on its grid: they need steps of their own; others are interpolated."""
     record = draft.record
     assert record is not None
     read = any(component_variable(variable)[0] == grid.name for variable in record.variables)
@@ -120,7 +120,7 @@ def _rate_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
 
 
 def _clock_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
-    """The steps of all end where a clock ticks."""
+    """A clock ends the steps of all components, so it ticks at multiples of the only step of a component."""
     if grid.facts.capabilities.variable_steps:
         return
     for name, component in draft.components.items():
@@ -134,11 +134,11 @@ def _clock_problems(draft: GeneralDraft, grid: _Grid) -> Iterator[Problem]:
 
 
 def _contact_problems(draft: GeneralDraft, limited: dict[str, ComponentFacts]) -> Iterator[Problem]:
-    """Steps end where bodies touch, and the mass of a body is measured in short ones."""
+    """Contacts need components with free steps: steps end where bodies touch, and short trial steps find masses."""
     for place, table in enumerate(draft.contacts):
         for name, facts in limited.items() if table is not None else ():
             if facts.capabilities.variable_steps and name not in _members(table):
-                continue  # on its own grid, beside a contact of others
+                continue  # the component keeps its own grid, and other components touch
             got = f"{facts.file} ({facts.capabilities.grid})"
             hint = "A contact ends steps where bodies touch, and tries short ones."
             expected = "components whose communication steps may have any size"
@@ -153,7 +153,7 @@ def _members(table: StopContactTable | BodyPair | None) -> set[str]:
 
 
 def _event_problems(draft: GeneralDraft, limited: dict[str, ComponentFacts]) -> Iterator[Problem]:
-    """The steps of all end where a watched variable crosses its level."""
+    """A watched event ends the steps of all components, so none of them may have a single step size."""
     for place, event in enumerate(draft.events):
         for facts in limited.values() if event is not None else ():
             if not facts.capabilities.variable_steps:

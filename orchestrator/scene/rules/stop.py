@@ -1,4 +1,4 @@
-"""Rules of stops: where they are on the body, that they leave room, and that motion starts on their free side."""
+"""Rules of stops: their places on the body, room for motion, and a start on their free side."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems
 
 
 def stops_are_few(draft: Draft) -> Iterator[Problem]:
-    """A body has so many contact ports."""
+    """The number of stops is at most the number of contact ports of the body."""
     most = _most_stops(draft)
     if len(draft.stops) > most:
         yield Problem("stop", f"at most {most} stops", str(len(draft.stops)), "Remove [[stop]] tables.")
@@ -26,7 +26,7 @@ def _most_stops(draft: Draft) -> int:
 
 
 def stops_are_on_the_body(draft: Draft) -> Iterator[Problem]:
-    """A stop of a chain limits a mass, one of a beam a point that moves."""
+    """A stop limits a mass of a chain, or a moving point of a beam."""
     if draft.body is None:
         return
     for number, stop in enumerate(draft.stops, start=1):
@@ -51,7 +51,7 @@ def _place_problems(draft: Draft, body: Body, stop: Stop, where: str) -> Iterato
 
 
 def stops_leave_room(draft: Draft) -> Iterator[Problem]:
-    """Of two stops at one place, one is above and one below the motion, or the nearer one yields."""
+    """Two stops at one place are above and below the motion with room between them, or the nearer one is compliant."""
     if draft.body is None or len(draft.stops) > _most_stops(draft):
         return
     for first, second in combinations(range(len(draft.stops)), 2):
@@ -79,7 +79,7 @@ def _same_side_problems(draft: Draft, first: int, second: int, side: str) -> Ite
 
 
 def _hides(draft: Draft, first: int, second: int) -> bool:
-    """Whether one of two stops on one side is rigid and, at the worst, the nearer one."""
+    """Return whether one of two stops on one side is rigid and, in the worst case, the nearer one."""
     for near, far in ((first, second), (second, first)):
         stop = draft.stops[near]
         if stop is None or not LAWS[stop.law].is_rigid:
@@ -107,9 +107,9 @@ def _position(draft: Draft, index: int) -> tuple[float, float]:
 
 
 def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
-    """No rigid stop is passed at the start; one that yields may be pressed in.
+    """The start is not beyond a rigid stop; a compliant stop may be pressed in.
 
-    Of a beam that starts bent the displacement at a stop is known to its FMU alone, which refuses it then.
+    Only the FMU of a bent beam has the start displacement at a stop, so the FMU refuses a wrong start itself.
     """
     for index, stop in enumerate(draft.stops):
         if stop is None or not LAWS[stop.law].is_rigid:
@@ -144,7 +144,7 @@ def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
 
 
 def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
-    """Where a stop's surface is after separation only the body knows: an ImpactStop FMU has no state."""
+    """A stop with a relaxation time runs fused: its surface is a state of the body; an ImpactStop FMU has no state."""
     if draft.written("execution").get("how") != "coupled":
         return
     for number, stop in enumerate(draft.stops, start=1):
@@ -155,7 +155,10 @@ def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
 
 
 def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
-    """A rigid stop meets the mass of all modes, which falls to none as they grow in number: equations.md 6.6."""
+    """Residual vectors need compliant stops, and more modes than places of stops.
+
+    A rigid stop meets the contact mass of all modes, which falls to 0 with their number: equations.md 6.6.
+    """
     body = draft.body
     if body is None or not body.has_residual_vectors:
         return
@@ -179,7 +182,10 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
 
 
 def modes_that_are_found_converge(draft: Draft) -> Iterator[Problem]:
-    """On a beam with a rigid stop nothing converges: the mass that it meets falls as 1 / modes, equations.md 6.6."""
+    """`modes = "auto"` needs a tolerance, and on a beam compliant stops: nothing converges at a rigid stop.
+
+    The contact mass at a rigid stop falls as 1 / modes: equations.md 6.6.
+    """
     body = draft.body
     if body is None or not body.finds_modes:
         return

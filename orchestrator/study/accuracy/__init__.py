@@ -1,6 +1,6 @@
-"""The study of accuracy: a scene is simulated in all its ways, and each way's error is measured beside its cost.
+"""The study of accuracy: it simulates a scene in all its ways and measures the error and the cost of each way.
 
-`study` runs it, `choice` says which way to take, `results` makes a dataset of it.
+`study` runs the ways, `choice` recommends one, `results` makes the dataset.
 """
 
 from __future__ import annotations

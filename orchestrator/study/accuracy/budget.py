@@ -1,4 +1,4 @@
-"""The budget of a study: processor time of all its processes, and how long its runs waited for a processor."""
+"""The budget of a study: processor time of all its processes, and the time that its runs waited for a processor."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.orchestrator.study.ways.way import Trial
 
 LEAST_BUDGET = 10.0
-"""Processor time, s, below which the reference and one run of each way leave nothing to time them by."""
-OUTSIDE = 2.0
-"""Processor time that a command takes beside its study, s: it loads the package, prints a table and draws a figure."""
-BUSY = 0.2
-"""Share of the time of runs spent waiting for a processor, above which other programs disturb what is measured."""
+"""Least budget, processor time in s; below, the reference and one run of each way leave no time for timing."""
+OVERHEAD_SECONDS = 2.0
+"""Processor time of a command outside its study, s: it loads the package, prints a table and draws a figure."""
+BUSY_SHARE = 0.2
+"""Share of the time of runs spent waiting for a processor, above which the machine counts as busy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What a study took of the machine."""
+    """The time that a study took on the machine."""
 
-    asked: float = math.nan
-    """Its budget: processor time, s."""
+    budget: float = math.nan
+    """Budget of the study: processor time, s."""
     processor: float = math.nan
-    """Processor time of all its processes, s."""
+    """Processor time of all processes of the study, s."""
     wall: float = math.nan
-    """Wall time, s."""
+    """Wall time of the study, s."""
     waited: float = 0.0
-    """Share of the wall time of the timed runs in which they waited for a processor."""
+    """Share of the wall time of the timed runs that was spent waiting for a processor."""
 
     @property
     def is_busy(self) -> bool:
         """Whether other programs kept the runs from the processor."""
-        return self.waited > BUSY
+        return self.waited > BUSY_SHARE
 
     def in_words(self) -> str:
-        """Return it in a sentence or two.
+        """Return the effort in one or two sentences.
 
         Examples
         --------
@@ -44,8 +44,8 @@ class Effort:
         >>> Effort(10.0, 9.2, 9.6, 0.01).in_words()
         'Processor time: 9.2 s of the 10 s asked for, in 9.6 s of wall time.'
         """
-        asked = f"{self.processor:.2g} s of the {self.asked:g} s asked for"
-        said = f"Processor time: {asked}, in {self.wall:.2g} s of wall time."
+        spent = f"{self.processor:.2g} s of the {self.budget:g} s asked for"
+        said = f"Processor time: {spent}, in {self.wall:.2g} s of wall time."
         if not self.is_busy:
             return said
         return (
@@ -55,7 +55,7 @@ class Effort:
 
 
 class Budget:
-    """What a study may spend, and has spent, from the moment it is made: processor time of all processes, s."""
+    """Budget of a study since this object was made: processor time of all processes, allowed and spent, s."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
@@ -69,8 +69,8 @@ class Budget:
 
     @property
     def left(self) -> float:
-        """Processor time left for the study, s; below 0 where more was spent than there was."""
-        return self.seconds - OUTSIDE - self.spent
+        """Processor time left for the study, s; negative where the study has overspent."""
+        return self.seconds - OVERHEAD_SECONDS - self.spent
 
     def time(self, trial: Trial) -> float:
         """Run a trial once; return its processor time, s."""
@@ -79,11 +79,11 @@ class Budget:
         return processor
 
     def note(self, processor: float, wall: float) -> None:
-        """Note how long a run took, s: how much longer than its processor time says how busy the machine is."""
+        """Add the times of a run, s: wall time beyond processor time shows how busy the machine is."""
         self._processor += processor
         self._elapsed += wall
 
     def effort(self) -> Effort:
-        """Return what the study has taken so far."""
+        """Return the effort of the study so far."""
         waited = 1.0 - self._processor / self._elapsed if self._elapsed > 0.0 else 0.0
         return Effort(self.seconds, self.spent, clock.CLOCK.wall() - self._wall, max(waited, 0.0))

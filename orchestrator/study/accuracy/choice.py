@@ -1,4 +1,4 @@
-"""What to choose: the ways that no other one beats, and the cheapest that reaches a tolerance."""
+"""The choice of a way: the Pareto front, and the cheapest way that reaches a tolerance."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measure
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.references import Reference
 
-VAGUE = 1e-2
-"""Relative error of a reference above which it tells ways apart no more."""
+MOST_REFERENCE_ERROR = 1e-2
+"""Relative error of a reference, above which no way is recommended without a tolerance."""
 SAME_SCORE = 1.0
-"""Difference of scores, percent, below which a recording does not tell two ways apart."""
+"""Difference of scores in percent, up to which two ways explain a recording equally well."""
 DEFAULT_TOLERANCE = 1e-6
-"""Relative error of what is recommended where nobody asks for one."""
+"""Relative error that the recommended way meets by default, where any way does."""
 
 
 def pareto_front(measured: Sequence[Measured], quantity: str) -> list[Measured]:
-    """Return the ways of which no other is both cheaper and at least as exact; other models are no ways."""
+    """Return the ways that no other way beats, being cheaper and at least as exact; other models are left out."""
     able = _comparable(measured, quantity)
     front: list[Measured] = []
     for one in sorted(able, key=lambda one: (one.cost, one.error(quantity))):
@@ -32,13 +32,13 @@ def pareto_front(measured: Sequence[Measured], quantity: str) -> list[Measured]:
 def cheapest(
     measured: Sequence[Measured], tolerance: float | None, quantity: str, reference: Reference
 ) -> Measured | None:
-    """Return the cheapest way whose error, with that of the reference added, is within a tolerance; or None.
+    """Return the cheapest way whose error plus the reference's error is within a tolerance, or None.
 
-    Without a tolerance it is `DEFAULT_TOLERANCE`, or the least error that there is.
+    The default tolerance is `DEFAULT_TOLERANCE`, or the least error of all ways if that is larger.
     """
     own = error_of_reference(reference, quantity)
     able = _comparable(measured, quantity)
-    if tolerance is None and own > VAGUE:
+    if tolerance is None and own > MOST_REFERENCE_ERROR:
         return None
     if tolerance is None:
         least = min((one.error(quantity) for one in able), default=math.nan)
@@ -48,7 +48,7 @@ def cheapest(
 
 
 def _comparable(measured: Sequence[Measured], quantity: str) -> list[Measured]:
-    """Return the ways with an error over all of the time: neither other models, nor ways that simulated a part."""
+    """Return the ways with an error over all of the time, without other models and ways that simulated a part."""
     return [
         one
         for one in measured
@@ -57,18 +57,13 @@ def _comparable(measured: Sequence[Measured], quantity: str) -> list[Measured]:
 
 
 def error_of_reference(reference: Reference, quantity: str) -> float:
-    """Return how far the reference may be off itself, of a quantity or at most."""
+    """Return the relative error of the reference itself, of a quantity or the largest of all."""
     known = [error for error in reference.error.values() if error == error]
     return reference.error[quantity] if quantity != "all" else max(known, default=math.nan)
 
 
 def refuse_unreached(study: Comparison) -> None:
-    """Refuse a tolerance that no way has reached, with what was.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Raise UsageError unless a way has reached the tolerance; the message has the least error that was reached."""
     if study.chosen is not None or math.isnan(study.tolerance):
         return
     able = _comparable(study.measured, study.quantity)
@@ -88,19 +83,19 @@ def refuse_unreached(study: Comparison) -> None:
 
 
 def advice(study: Comparison) -> str:
-    """Return what to choose, in a sentence."""
+    """Return the advice on the way to choose, in a sentence."""
     chosen, quantity = study.chosen, study.quantity
     if chosen is None:
         return _why_none(study)
     known = error_of_reference(study.reference, quantity)
     what = "" if quantity == "all" else f" of {quantity.replace('_', ' ')}"
-    told, cost = chosen.told(quantity, known), _seconds(chosen.cost)
-    words = f"Take {chosen.way.label}: a relative error{what} of {told} in {cost} a run"
+    error, cost = chosen.error_in_words(quantity, known), _seconds(chosen.cost)
+    words = f"Take {chosen.way.label}: a relative error{what} of {error} in {cost} a run"
     others = [one for one in _comparable(study.measured, quantity) if one.way.name != chosen.way.name]
     if others:
         other = min(others, key=lambda one: one.cost)
         ratio = other.cost / chosen.cost
-        words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.told(quantity, known)}"
+        words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.error_in_words(quantity, known)}"
     words += _for_the_score(study)
     if study.reference.chaotic:
         begin, end = study.reference.scales.window
@@ -114,7 +109,7 @@ def advice(study: Comparison) -> str:
 
 
 def _for_the_score(study: Comparison) -> str:
-    """Return the cheapest way that a recording does not tell from the chosen one; empty where none is cheaper."""
+    """Return the score of the chosen way and the cheapest way with the same score, in words; empty without scores."""
     chosen = study.chosen
     if chosen is None or not math.isfinite(chosen.variance):
         return ""
@@ -135,13 +130,13 @@ def _for_the_score(study: Comparison) -> str:
 
 
 def _why_none(study: Comparison) -> str:
-    """Return why there is nothing to choose."""
+    """Return the reason why no way is chosen."""
     known = error_of_reference(study.reference, study.quantity)
     if not any(one.error(study.quantity) == one.error(study.quantity) for one in study.measured):
         if any(one.errors.failure for one in study.measured):
             return "No way has an error that can be told: give a longer --budget where they did not finish."
         return "Nothing that is recorded moves: there is nothing to compare."
-    if known > VAGUE:
+    if known > MOST_REFERENCE_ERROR:
         return (
             f"No way stands out, since the reference is known to {known:.0e} only: motion that "
             "jumps at its samples is not compared in scenes of components."

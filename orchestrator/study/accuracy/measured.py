@@ -1,4 +1,4 @@
-"""What was measured: a way with its errors and its times, and all of them with their reference."""
+"""The measurements: a way with its errors and its times, and all ways with their reference."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
 from vibroimpact.orchestrator.study.ways.way import Way
 
-SHORT = 0.125
-"""Part of a part that is simulated once more, for the cost that a run has however short it is."""
+SHORT_SHARE = 0.125
+"""Share of a part that runs once more: the difference separates the fixed cost of a run from the cost per time."""
 
 
 @dataclass(slots=True)
 class Measured:
-    """A way with what came of it.
+    """A way with its measurements.
 
     Attributes
     ----------
     way : Way
     errors : Errors
     part : float
-        Part of the studied time that it has simulated: 1, 1/2, 1/4, ...
+        Simulated part of the studied time: 1, 1/2, 1/4, ...
     length : float
-        The studied time over the time that the way simulates, at part 1: below 1 where it passes its own transient.
+        Studied time over the time that the way simulates at part 1: below 1 where the way passes its own transient.
     seconds : list of float
-        Processor time of each run over its part, s.
+        Processor time of each run over the part, s.
     first : float
-        Processor time of the first run, s: with what is loaded for it.
+        Processor time of the first run, s, including the loading of libraries.
     first_wall : float
         Wall time of the first run, s.
     short : float
-        Processor time of a run over an eighth of its part, s; NaN where it simulates all.
+        Processor time of a run over an eighth of the part, s; NaN where the way simulates all of the time.
     calls : int
-        Calls of the functions of FMUs in one run; -1 where nobody counts them.
+        Calls of FMU functions in one run; -1 where they are not counted.
     memory : int
-        Largest resident memory that opening it and one run added to a process, bytes; -1 where nobody measures it.
+        Largest resident memory that opening the way and one run added to a process, bytes; -1 where not measured.
     impacts : int
-        How many it showed.
+        Number of impacts of the run.
     energy_residual : float
-        J; NaN where nothing is exchanged.
+        Energy that the exchange of forces added, J; NaN where nothing is exchanged.
     variance : float
         Variance of a recording that a replay accounts for, percent; else NaN.
     statistics : Statistics or None
-        In chaos.
+        Comparison of chaotic motion; None without chaos.
     """
 
     way: Way
@@ -71,37 +71,37 @@ class Measured:
 
     @property
     def each(self) -> float:
-        """Median processor time of a run over its part, s; of the first one where no other was timed."""
+        """Median processor time of a run over its part, s; the time of the first run where no other was timed."""
         return float(np.median(self.seconds)) if self.seconds else self.first
 
     @property
     def is_extrapolated(self) -> bool:
-        """Whether it has simulated only a part, and its cost over all is a line through those of two parts."""
+        """Whether the way simulated only a part, so that its whole cost lies on a line through two shorter costs."""
         return self.part < 1.0
 
     @property
     def cost(self) -> float:
-        """Median processor time of a run over the studied time, s; a least one where it did not finish any part."""
+        """Median processor time of a run over the studied time, s; a lower bound where the way finished no part."""
         return self.length * (self.each + self._rate * (1.0 - self.part))
 
     def cost_of(self, choose: Callable[[Sequence[float]], float]) -> float:
-        """Return the cost by another run than the median one, such as `min`, s; NaN where none was timed."""
+        """Return the cost by another statistic than the median, such as `min`, s; NaN where no run was timed."""
         return self.cost * choose(self.seconds) / self.each if self.seconds and self.each > 0.0 else math.nan
 
     @property
     def _rate(self) -> float:
-        """Processor time of the simulated time that is left, s: without what a run costs however short it is."""
-        shorter = SHORT * self.part
+        """Processor time per whole studied time, s, without the fixed cost of a run."""
+        shorter = SHORT_SHARE * self.part
         rate = (self.each - self.short) / (self.part - shorter) if self.short < self.each else math.nan
         return rate if rate == rate else self.each / self.part
 
     def cost_of_one(self, count: float) -> float:
-        """Return the processor time of a run over what it simulates, s; NaN for nothing, or an early end."""
+        """Return the processor time of a run over a count, s; NaN for a count of 0 or an unfinished run."""
         return self.cost / count if count > 0.0 and self.errors.failure != LATE else math.nan
 
     @property
     def cost_of_impact(self) -> float:
-        """Processor time of a run over the impacts that it showed, s; NaN without one, or after an early end."""
+        """Processor time of a run over its number of impacts, s; NaN without impacts or for an unfinished run."""
         is_known = self.impacts > 0 and self.errors.failure != LATE
         return self.length * self.each / self.impacts if is_known else math.nan
 
@@ -109,8 +109,8 @@ class Measured:
         """Relative error of a quantity, or the largest of all; NaN where the way failed."""
         return math.nan if self.errors.failure else self.errors.worst(quantity)
 
-    def told(self, quantity: str, known: float) -> str:
-        """Return the error in words; below what the reference is known to, that."""
+    def error_in_words(self, quantity: str, known: float) -> str:
+        """Return the error in words, or the reference's error `known` as a bound where the error is smaller."""
         error = self.error(quantity)
         if error != error:
             return "-"
@@ -124,24 +124,24 @@ class Comparison:
     Attributes
     ----------
     scene : Scene
-        As it was studied: without its sweep, and without a time series.
+        The studied scene, without its sweep and without a time series.
     reference : Reference
     measured : list of Measured
-        In the order of the ways.
+        Measurements in the order of the ways.
     quantity : str
-        What the errors are of.
+        Quantity of the errors, or `all`.
     tolerance : float
-        What was asked for; NaN where nothing was.
+        Requested relative error; NaN without a request.
     chosen : Measured or None
-        The cheapest way that reaches it.
+        The cheapest way that reaches the tolerance.
     orbit : str
-        `P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it.
+        Class of the motion: `P(p,q)`, `chaotic`, `no impacts`, ...; empty without forcing.
     remarks : tuple of str
-        What was left out, and why.
+        Parts that were left out, each with the reason.
     modes_reference : str
-        What other numbers of modes are compared with; empty where there are none.
+        Reference of the other numbers of modes, in words; empty where there are none.
     effort : Effort
-        What the study took of the machine.
+        Time that the study took on the machine.
     """
 
     scene: Scene
@@ -157,7 +157,7 @@ class Comparison:
 
     @property
     def periods(self) -> float:
-        """Forcing periods of the studied time; NaN where nothing forces it."""
+        """Forcing periods of the studied time; NaN without forcing."""
         if not self.scene.is_lone_body or self.scene.period is None:
             return math.nan
         return self.reference.scales.window[1] / self.scene.period

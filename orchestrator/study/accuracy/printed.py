@@ -1,4 +1,4 @@
-"""What is printed of the ways of simulating a scene, and the scene that is written with the one that was chosen."""
+"""The printed table of a study of accuracy, and the scene file written with the chosen way."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from vibroimpact.orchestrator.study.accuracy.tuned import tuned_text
 
 MEGABYTE = 1e6
 WIDE = 120
-"""Letters in a line of a terminal from which on the table has all columns; the dataset has them in any case."""
+"""Letters in a line of a terminal, from which on the table has all columns; the dataset always has them."""
 
 
 @contextmanager
 def shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
-    """Show each way as soon as it has run once: in a terminal a table that grows, else a line."""
+    """Show each way as soon as it has run once: as a growing table in a terminal, else as a line."""
     if not sys.stdout.isatty():
         yield _say_tried
         return
@@ -35,11 +35,11 @@ def shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
     console = wide_terminal()
     with Live(console=console, transient=True) as live:
 
-        def told(one: Measured) -> None:
+        def take(one: Measured) -> None:
             found.append(one)
             live.update(table_of(title, found, quantity, 0.0, console.width))
 
-        yield told
+        yield take
 
 
 def _say_tried(one: Measured) -> None:
@@ -55,10 +55,10 @@ def table_of(
     width: int,
     periods: float = math.nan,
 ) -> Table:
-    """Return what was measured as a table.
+    """Return the measurements as a table.
 
-    `known` is the error of the reference. `width` is that of the terminal: a narrow one gets fewer columns, lest it
-    cuts the names of the ways. `periods` are the forcing periods of a run; NaN where nothing forces it.
+    `known` is the error of the reference. `width` is the width of the terminal: a narrow terminal gets fewer columns,
+    so that the names of the ways stay whole. `periods` is the number of forcing periods of a run; NaN without forcing.
     """
     scored = any(one.variance == one.variance for one in measured)
     wide, of_periods = width >= WIDE, periods == periods
@@ -85,7 +85,7 @@ def table_of(
             f"{one.way.name}{' (another model)' if one.way.model else ''}",
             one.way.knob or "-",
             f"{one.way.setting:.3g}" if one.way.knob else "-",
-            one.told(quantity, known),
+            one.error_in_words(quantity, known),
             *((about + _known_duration(one.cost),) if of_runs else ()),
             *((about + _known_duration(one.cost_of_one(periods)),) if of_periods else ()),
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
@@ -97,7 +97,7 @@ def table_of(
 
 
 def _part_in_words(part: float) -> str:
-    """Return which part of the time was simulated, a power of two, after a comma; empty for all of it."""
+    """Return the simulated part of the time, a power of two, in words after a comma; empty for all of it."""
     return "" if part == 1.0 else f", first 1/{1.0 / part:.0f} only"
 
 
@@ -106,7 +106,7 @@ def _known_duration(seconds: float) -> str:
 
 
 def print_comparison(compared: Comparison) -> None:
-    """Print the ways, what was left out, and what to choose."""
+    """Print the ways, the parts left out, and the advice."""
     known = error_of_reference(compared.reference, compared.quantity)
     console, title = wide_terminal(), compared.scene.title or compared.scene.source
     console.print(
@@ -125,9 +125,9 @@ def print_comparison(compared: Comparison) -> None:
 
 
 def write_tuned(text: str, compared: Comparison, target: Path) -> None:
-    """Write a scene with the settings of the way that was chosen; UsageError where a scene cannot ask for it."""
+    """Write a scene with the settings of the chosen way; UsageError where a scene cannot ask for that way."""
     chosen = compared.chosen
-    assert chosen is not None  # else refused
+    assert chosen is not None  # `refuse_unreached` comes first
     known = error_of_reference(compared.reference, compared.quantity)
     settings = {key.partition(".")[2]: value for key, value in chosen.way.changes.items()}
     if not settings:
@@ -135,8 +135,9 @@ def write_tuned(text: str, compared: Comparison, target: Path) -> None:
             f"--write: expected a way that a scene can ask for, got {chosen.way.label}. "
             "It is the cheapest all the same."
         )
+    error = chosen.error_in_words(compared.quantity, known)
     reason = (
-        f"{chosen.way.label}: {compared.quantity.replace('_', ' ')} to {chosen.told(compared.quantity, known)} "
+        f"{chosen.way.label}: {compared.quantity.replace('_', ' ')} to {error} "
         f"(asked: {compared.tolerance:g}), {duration(chosen.cost)} a run; vibroimpact accuracy"
     )
     write_atomically(target, tuned_text(text, settings, reason).encode("utf-8"))

@@ -1,4 +1,4 @@
-"""The time of a scene that a budget lets all ways simulate: the transient passed once, the recording halved."""
+"""The time of a scene that all ways can simulate within a budget: the transient passed once, the recording halved."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from vibroimpact.orchestrator.study.ways.way import Trial, opened_trial
 TRANSIENT_SHARE = 0.25
 """Largest share of the budget for passing the transient."""
 RECORDING_SHARE, PERIOD_SHARE = 1.0 / 80.0, 1.0 / 12.0
-"""Largest share of the budget for a fused run of the recording; and for one of a period, which is not halved."""
+"""Largest share of the budget for a fused run of the recording; and of a single period, which is not halved."""
 GENERAL_SHARE = 1.0 / 250.0
 """Largest share of the budget for a run of a general scene: the reference and its parts cost 60 to 100."""
 GUARDED_SHARE, LEAST_GUARDED = 0.04, 0.25
 """Largest share of the budget, in wall time, for a run in another process; and the least wall time of such a run, s."""
 SAME_START = 1e-6
-"""Relative distance between the motion after a transient and that from its last state, below which both are one."""
+"""Relative distance between the motion after a transient and the motion started from its last state, up to which
+both are the same motion."""
 MOST_HALVINGS = 40
 
 
@@ -38,13 +39,13 @@ class Passed:
     """A scene whose transient was passed once."""
 
     scene: Scene
-    """Starts with the state at the end of the transient; the scene itself where there is none to be passed so."""
+    """Scene that starts with the state at the end of the transient; the given scene where none was passed."""
     whole: Scene
-    """Starts where the scene does."""
+    """The given scene, with its transient."""
     observation: Observation | None = None
-    """What a fused run of `whole` has shown; None where none was needed."""
+    """Observation of a fused run of `whole`; None where no transient was passed."""
     remark: str = ""
-    """Why each way passes the transient itself; empty where none does."""
+    """Reason why each way passes the transient itself; empty where none does."""
 
     @property
     def is_kept(self) -> bool:
@@ -53,9 +54,9 @@ class Passed:
 
 
 def within_reach(scene: Scene, budget: Budget) -> Scene:
-    """Return a scene that records as long as a run of it takes a small part of a budget: all, a half, a quarter, ...
+    """Return a scene that records all of the time, a half, a quarter, ..., so that a run fits a share of a budget.
 
-    The scene has no sweep. UsageError: one forcing period takes too much; it says the least budget.
+    The scene has no sweep. UsageError: one forcing period takes too much; the message has the least budget.
     """
     share = RECORDING_SHARE if scene.is_one_body else GENERAL_SHARE
     for _ in range(MOST_HALVINGS):
@@ -73,9 +74,9 @@ def within_reach(scene: Scene, budget: Budget) -> Scene:
 
 
 def transient_passed(scene: Scene, budget: Budget) -> Passed:
-    """Pass the transient of a scene of the short form by the fused way, and keep the state at its end as a start.
+    """Return a scene of the short form with its transient passed by the fused way, and the state at its end as start.
 
-    The scene has no sweep. UsageError: the transient takes too much of the budget; it says the least budget.
+    The scene has no sweep. UsageError: the transient takes too much of the budget; the message has the least budget.
     """
     if not scene.is_lone_body or not _has_transient(scene):
         return Passed(scene, scene)
@@ -99,7 +100,7 @@ def transient_passed(scene: Scene, budget: Budget) -> Passed:
 
 
 def observed_within(scene: Scene, seconds: float) -> Observation:
-    """Return the observation of a run that is given up after so much processor time, s: fused where that can be."""
+    """Return the observation of a run, fused if possible, that is given up after `seconds` of processor time."""
     trial: Trial = (
         DrivenTrial(best_of(scene)) if scene.is_lone_body else opened_trial(limited_elsewhere(scene, seconds))
     )
@@ -111,7 +112,7 @@ def observed_within(scene: Scene, seconds: float) -> Observation:
 
 
 def limited_elsewhere(scene: Scene, seconds: float) -> Scene:
-    """Return a scene whose runs in another process, where it asks for one, are given up after some wall time, s."""
+    """Return a scene whose guarded runs are given up after `seconds` of wall time, at least `LEAST_GUARDED`."""
     is_guarded = scene.execution.guard
     if not is_guarded:
         return scene
@@ -134,7 +135,7 @@ def _no_transient(scene: Scene) -> Mapping[str, Any]:
 
 
 def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
-    """Return a scene that starts with a state, at forcing phase 0; None where no scene says it."""
+    """Return a scene that starts with a state at forcing phase 0; None where such a scene is invalid."""
     changes: dict[str, Any] = dict(_no_transient(scene))
     free = free_state(scene, state)
     half = len(free) // 2
@@ -151,7 +152,7 @@ def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
 
 
 def _is_continued(kept: Scene, whole: Scene, found: Observation) -> bool:
-    """Return whether a scene that starts with a state shows what came after that state in the whole motion."""
+    """Return whether the scene `kept`, started from a state, continues the whole motion after that state."""
     best, before = DrivenTrial(best_of(kept)), scales_of(whole).window[0]
     try:
         expected = best.run()
@@ -184,6 +185,6 @@ def _refuse(budget: Budget, share: float, found: Observation, what: str) -> None
 
 
 def _rounded_up(seconds: float) -> float:
-    """Return a time with two digits, not less, s."""
+    """Return a time rounded up to two digits, s."""
     unit = 10.0 ** (math.floor(math.log10(seconds)) - 1)
     return math.ceil(seconds / unit) * unit

@@ -16,16 +16,16 @@ from vibroimpact.orchestrator.study.references import ROUNDING, SAFETY, Referenc
 from vibroimpact.orchestrator.study.ways.way import Way
 
 LEAST_TOLERANCE = SAFETY * ROUNDING
-"""Relative error, 1.4e-14, below which no reference of double precision is known: each counts so much for rounding."""
+"""Least relative error, 1.4e-14, that can be requested: every reference adds this much for rounding."""
 
 
 def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None:
-    """Raise UsageError unless the arguments alone can be met.
+    """Raise UsageError unless the arguments are valid, whatever the scene.
 
     Parameters
     ----------
     tolerance : float or None
-        Relative error that is asked for.
+        Requested relative error.
     quantity : str
         One of `errors.QUANTITIES`, or `all`.
     budget : float
@@ -60,7 +60,7 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
 
 
 def refuse_one_way(ways: Sequence[Way], scene: Scene) -> None:
-    """Raise UsageError unless a scene has two ways at least that are no other models."""
+    """Raise UsageError unless a scene has at least two ways, not counting other models."""
     if len([way for way in ways if not way.model]) < 2:
         raise UsageError(
             f"{scene.source}: expected a scene with something to vary (stops, or components that exchange values), "
@@ -69,7 +69,7 @@ def refuse_one_way(ways: Sequence[Way], scene: Scene) -> None:
 
 
 def refuse_vague_reference(tolerance: float | None, quantity: str, reference: Reference) -> None:
-    """Raise UsageError where a tolerance is below the error of the reference, which no way can get under."""
+    """Raise UsageError unless the tolerance is at least the error of the reference, which bounds all ways."""
     known = error_of_reference(reference, quantity)
     if tolerance is not None and tolerance < known:
         _refuse_tolerance(tolerance, known, "to which the reference is known")

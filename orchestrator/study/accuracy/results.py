@@ -62,7 +62,7 @@ TABLE = ResultTable(
     ("failure", "way", "1", "what is wrong with it", "text"),
     ("setting", "way", "1", "its value, in the unit of the key"),
 )
-"""Variables of a study; of a replay, of chaos, and errors of what was recorded where there are such."""
+"""Variables of a study. Variables of replays and chaos, and errors of unknown quantities, may be left out."""
 
 
 def dataset_of(study: Comparison) -> xr.Dataset:
@@ -81,7 +81,7 @@ def dataset_of(study: Comparison) -> xr.Dataset:
         "verdict": advice(study),
         "remarks": "; ".join(study.remarks),
         "modes_reference": study.modes_reference,
-        "budget": study.effort.asked,
+        "budget": study.effort.budget,
         "processor_time": study.effort.processor,
         "wall_time": study.effort.wall,
         "waited": study.effort.waited,

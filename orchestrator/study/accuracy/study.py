@@ -1,4 +1,4 @@
-"""The study `accuracy`: a scene, simulated in all ways that it can be, each against the best reference."""
+"""The study `accuracy`: a scene simulated in all possible ways, each against the best reference."""
 
 from __future__ import annotations
 
@@ -58,33 +58,33 @@ from vibroimpact.orchestrator.study.references import (
 )
 from vibroimpact.orchestrator.study.statistics import statistics_of
 from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
-from vibroimpact.orchestrator.study.ways.models import told_by
+from vibroimpact.orchestrator.study.ways.models import modes_reference
 from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 BUDGET = 40.0
 """Default budget: processor time of a study, s."""
 TRYING_SHARE = 0.45
-"""Largest share of the budget for the reference and one run of each way; a way that needs its least gets more."""
+"""Largest share of the budget for the reference and one run of each way; `LEAST_RUN` of a way may exceed it."""
 ATTEMPTS = 2
-"""Runs that the share of a way is to be enough for: all but the last are given up."""
+"""Number of runs in the share of each way: all runs but the last are given up."""
 LEAST_RUN = 0.05
-"""Processor time, s, before which no run is given up."""
+"""Least processor time of a run before it can be given up, s."""
 MEMORY_SHARE, LEAST_MEMORY = 0.3, 2.5
-"""Share of the budget kept for the memory of the ways; and processor time, s, below which none is measured."""
+"""Share of the budget kept for the memory of the ways; and processor time left, s, below which none is measured."""
 STATISTICS_SHARE = 0.25
 """Largest share of the budget for the statistics of chaotic motion."""
 MOST_ROUNDS = 15
-"""How often each way is timed at most, in turn with the others."""
+"""Largest number of timed runs of each way, in turn with the others."""
 EACH_SHARE = 0.1
-"""Share of the time left, above which a run of a way is too dear to be timed again."""
+"""Cost of a run over the time left, above which the run is too expensive to be timed again."""
 REPLICATES = 6
-"""Runs of chaotic motion, each from a slightly different number, that tell the sampling error of its statistics."""
+"""Runs of chaotic motion, each from a slightly different number, that give the sampling error of its statistics."""
 MOST_HALVINGS = 24
-"""Of the time that a chaotic general scene records, until its motion is comparable."""
+"""Largest number of halvings of the time of a chaotic general scene, until its motion is comparable."""
 COMPARABLE = 1e-6
-"""Relative change of the motion that a disturbance leads to, below which it is."""
+"""Relative change of the motion by a disturbance, below which the motion is comparable."""
 MOST_FIRST_PERIODS = 4096
-"""Periods within which the first impacts are looked for."""
+"""Largest number of periods in which the first impacts are searched."""
 
 
 @dataclass(eq=False)
@@ -109,7 +109,7 @@ class AccuracyOfScene(Study[Measured]):
         Raises
         ------
         UsageError
-            Before anything runs, where the arguments alone show it.
+            The arguments are invalid, which is found before anything runs.
         """
         refuse_misuse(options.tolerance, options.of, options.budget)
         if options.write is not None and options.tolerance is None:
@@ -121,14 +121,14 @@ class AccuracyOfScene(Study[Measured]):
         return cls(with_modes(opened), options.tolerance, options.of, options.budget)
 
     def rows(self) -> Generator[Measured, None, None]:
-        """Run all ways once, then in turn, and last in processes of their own.
+        """Run all ways once, then in turn, and last each in its own process.
 
         Raises
         ------
         UsageError
-            There is no such quantity, nothing to vary, a budget below 10 s or below what this scene needs, or a
-            tolerance that no way can reach: double precision or the reference of the scene does not tell it. No way has
-            run then.
+            The quantity is unknown, the scene has nothing to vary, or the budget is below 10 s or too small for the
+            scene. Or no way can reach the tolerance: it is below double precision or the error of the reference. No
+            way has run then.
         """
         refuse_misuse(self.tolerance, self.quantity, self.budget)
         self._spends = Budget(self.budget)
@@ -173,7 +173,7 @@ class AccuracyOfScene(Study[Measured]):
 
     @cached_property
     def comparison(self) -> Comparison:
-        """All ways that were tried, when no more come."""
+        """All ways of the finished study, with the chosen way."""
         remarks = (*remarks_on(self.scene), *_remarks(self._alone, self._within, self._passed))
         return Comparison(
             self._passed.scene,
@@ -184,25 +184,20 @@ class AccuracyOfScene(Study[Measured]):
             cheapest(self.found, self.tolerance, self.quantity, self._reference),
             self._orbit,
             remarks,
-            told_by(self._ways),
+            modes_reference(self._ways),
             self._spends.effort(),
         )
 
     def made(self) -> xr.Dataset:
-        """Return the ways with their errors and costs."""
+        """Return the dataset of the ways with their errors and costs."""
         return dataset_of(self.comparison)
 
     def print_results(self) -> None:
-        """Print the ways, and what to choose."""
+        """Print the ways and the advice."""
         print_comparison(self.comparison)
 
     def conclude(self, options: Accuracy) -> None:
-        """Refuse a tolerance that no way has reached, and write the scene with the way that does.
-
-        Raises
-        ------
-        UsageError
-        """
+        """Write the scene with the chosen way; raise UsageError unless a way has reached the tolerance."""
         if self.incomplete:
             return
         refuse_unreached(self.comparison)
@@ -218,7 +213,7 @@ def _measured(
     spends: Budget,
     statistical: Scene | None,
 ) -> Generator[Measured, None, None]:
-    """Yield each way when it has run once; then run all in turn, and last in processes of their own."""
+    """Yield each way when it has run once; then run all ways in turn, and last each in its own process."""
     found: list[Measured] = []
     with ExitStack() as stack:
         able: list[tuple[Measured, Trial]] = []
@@ -238,11 +233,11 @@ def _measured(
 
 
 def studied_scene(scene: Scene) -> Scene:
-    """Return a scene as it is studied: one point, impacts and extremes recorded.
+    """Return the studied form of a scene: one point, with recorded impacts and extremes.
 
-    A time series is left out where impacts tell more, since it costs more than the motion; a general scene and a free
-    motion have nothing else to be compared by. A measuring chain is left out: no other way has one. UsageError: the
-    scene has an exciter whose force is not its forcing alone.
+    A body is compared by its impacts and extremes, without a time series, which costs more than the motion. General
+    scenes and replays keep their samples, as they have little else to compare. A measuring chain is left out: no
+    other way has one. UsageError: the scene has an exciter whose force is not its forcing alone.
     """
     alone = scene.unswept()
     if not scene.is_lone_body:
@@ -258,7 +253,7 @@ def studied_scene(scene: Scene) -> Scene:
 def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
     """Return the class of the orbit, by the run that passed the transient; empty for components and replays.
 
-    A contact that lasts since before the recording is an impact of a motion that starts in it.
+    The run with the transient counts, since a motion that starts within a lasting contact has an extra impact.
     """
     if reference.chaotic:
         return "chaotic"
@@ -271,7 +266,7 @@ def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
 
 
 def _remarks(alone: Scene, studied: Scene, passed: Passed) -> list[str]:
-    """Return what of a scene's time is left out, and why."""
+    """Return remarks on the time of a scene that is left out, with the reasons."""
     remarks = [passed.remark] if passed.remark else []
     if studied is not alone:
         end, whole = (scales_of(one).window[1] - scales_of(one).window[0] for one in (studied, alone))
@@ -283,9 +278,9 @@ def _remarks(alone: Scene, studied: Scene, passed: Passed) -> list[str]:
 
 
 def first_impacts(scene: Scene, spends: Budget) -> Scene:
-    """Return a scene that ends after its first impacts, from its start: all that chaos leaves comparable.
+    """Return a scene from its start to its first impacts, the part that chaos leaves comparable.
 
-    It ends earlier where a run takes too much of the budget, as one of rare impacts does.
+    The scene ends earlier where a run takes too much of the budget, for example with rare impacts.
     """
     if not scene.is_one_body:
         return _comparable(scene)
@@ -306,7 +301,7 @@ def first_impacts(scene: Scene, spends: Budget) -> Scene:
 
 
 def _comparable(scene: Scene) -> Scene:
-    """Return a general scene from its start to where a small change of a number has not grown to that of a motion."""
+    """Return a general scene from its start until a small change of a number has grown to `COMPARABLE`."""
     part = scene.record.transient_time + scene.record.recorded_time
     for _ in range(MOST_HALVINGS):
         part /= 2.0
@@ -314,26 +309,26 @@ def _comparable(scene: Scene) -> Scene:
         try:
             if sensitivity_of(short, scales_of(short)) < COMPARABLE / DISTURBANCE:
                 return short
-        except ComponentError:  # it samples what has no value before a first impact
+        except ComponentError:  # a sampled variable has no value before the first impact
             return scene
     return scene
 
 
 def _typical_speed(reference: Reference) -> float:
-    """Return the median speed of the impacts of a motion, m/s; NaN without one."""
+    """Return the median speed of the impacts of a motion, m/s; NaN without impacts."""
     speeds = np.abs(reference.observation.impacts[:, 1])
     return float(np.median(speeds)) if len(speeds) else math.nan
 
 
 def _rate_of(scene: Scene) -> float:
-    """Return the rate of the time series that a scene asks for, samples per s; NaN without one."""
+    """Return the rate of the time series of a scene, samples per s; NaN without a time series."""
     return scene.sampling_rate or math.nan
 
 
 def _add_memory(
     scene: Scene, given: Mapping[str, Any], ways: Sequence[Way], measured: Sequence[Measured], spends: Budget
 ) -> None:
-    """Find what memory each way takes that did not fail, the cheapest first, as long as there is time."""
+    """Measure the memory of each way that did not fail, the cheapest first, as long as there is time."""
     if spends.left < LEAST_MEMORY:
         return
     places = {id(way): place for place, way in enumerate(ways)}
@@ -345,7 +340,7 @@ def _add_memory(
 
 
 def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], spends: Budget) -> None:
-    """Run all ways in turn, again and again, until the time is over; a way that failed is timed as well."""
+    """Run all ways with a trial in turn, again and again, until the time is over."""
     gc.collect()
     reserve = min(MEMORY_SHARE * spends.seconds, 0.5 * spends.left)
     for _ in range(MOST_ROUNDS):
@@ -355,7 +350,7 @@ def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], spends: Budget) ->
 
 
 def _add_statistics(scene: Scene, found: Sequence[Measured], reference: Reference, spends: Budget) -> None:
-    """Compare the statistics of whole runs where nothing else can be compared, of ways that take little enough."""
+    """Compare the statistics of whole runs of chaotic motion, for ways that are cheap enough."""
     replicates = [observed(one) for one in disturbed_scenes(scene, REPLICATES)]
     expected = observed(scene)
     longer = scales_of(scene).window[1] / reference.scales.window[1]

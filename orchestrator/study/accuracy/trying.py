@@ -9,7 +9,7 @@ from dataclasses import replace
 import vibroimpact.orchestrator.study.clock as clock
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.accuracy.measured import SHORT, Measured
+from vibroimpact.orchestrator.study.accuracy.measured import SHORT_SHARE, Measured
 from vibroimpact.orchestrator.study.accuracy.reach import Passed
 from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.errors import Errors, errors_of, no_errors
@@ -18,20 +18,20 @@ from vibroimpact.orchestrator.study.references import Reference, best_of, scales
 from vibroimpact.orchestrator.study.ways.trials import far_off
 from vibroimpact.orchestrator.study.ways.way import Trial, Way, opened_part
 
-COUNTED = 0.125
-"""Share of the limit of a run above which its calls are not counted: that takes several times as long."""
+COUNTING_SHARE = 0.125
+"""Share of the limit of a run, from which on its calls are not counted: counting takes several times as long."""
 PART_OF_REACHED = 0.5
-"""Largest next part of the time, over the part that the run had reached that was given up."""
+"""Largest next part of the time, over the part that the run reached before it was given up."""
 UNKNOWN_REACHED = 0.25
-"""Next part of the time, over the last one, after a run that does not tell how far it came."""
+"""Next part of the time over the last part, after a run that does not give the part it reached."""
 LEAST_PART = 2.0**-30
 """Part of the studied time below which a way is given up for good."""
 
 
 class References:
-    """What each way is compared with over each part of the time; each of these runs once.
+    """The reference of each way over each part of the time; each reference runs once.
 
-    `reference` is that of the studied scene over all of its time; `passed` says how its transient was passed.
+    `reference` belongs to the studied scene over all of its time; `passed` has its transient.
     """
 
     def __init__(self, reference: Reference, passed: Passed) -> None:
@@ -43,20 +43,20 @@ class References:
             self._keep(self._own, 1.0, passed.observation)
 
     def scene_for(self, way: Way) -> Scene:
-        """Return the scene whose run is the reference of a way: the finest of its kind, with its own transient."""
+        """Return the scene of the reference run of a way: the finest of its kind, with the transient of the way."""
         if way.against is not None:
             return way.against
         own_transient = way.model and way.scene is not None and self._passed.is_kept
         return self._own if own_transient else self.reference.best
 
     def length_of(self, way: Way) -> float:
-        """Return the studied time over that of a way."""
+        """Return the studied time over the time that a way simulates."""
         return self.reference.scales.window[1] / scales_of(self.scene_for(way)).window[1]
 
     def of(self, way: Way, part: float, most: float) -> Reference:
         """Return the reference of a way over the first part of its time.
 
-        Another model, or a finer one, is given up after `most` seconds of processor time: its observation says so.
+        A run of another model is given up after `most` seconds of processor time; its observation has the failure.
         """
         scene = self.scene_for(way)
         found = self._found.get((scene.text, part))
@@ -71,13 +71,13 @@ class References:
 
     def _keep(self, scene: Scene, part: float, observation: Observation) -> Reference:
         found = replace(self.reference, observation=observation, scales=scales_of(scene, part))
-        if observation.failure != LATE:  # a way that may take longer tries again
+        if observation.failure != LATE:  # a later way with a longer limit tries again
             self._found[scene.text, part] = found
         return found
 
 
 def tried(way: Way, references: References, most: float) -> tuple[Measured, Trial | None]:
-    """Run a way, and compare what it shows; over half of the time, a quarter, ... until it ends.
+    """Run a way over all of its time, a half, a quarter, ... until a run ends; return its measurements and trial.
 
     `most` is the processor time after which a run is given up, s. The trial is None where the way failed.
     """
@@ -90,7 +90,7 @@ def tried(way: Way, references: References, most: float) -> tuple[Measured, Tria
 
 
 def shorter_part(part: float, reached: float) -> float:
-    """Return the next part to try, a power of two, after a run of one was given up that reached so much of it.
+    """Return the next part to try, a power of two, after a run of `part` was given up at the share `reached` of it.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def shorter_part(part: float, reached: float) -> float:
 def _tried_over(
     way: Way, part: float, references: References, most: float
 ) -> tuple[Measured, Trial | None, float]:
-    """Run a way over a part; return how far it came, too."""
+    """Run a way over a part; return its measurements, its trial, and the share of the part that it reached."""
     try:
         trial = way.open(None, part)
     except (ComponentError, SceneError, DatasetError) as error:
@@ -129,7 +129,7 @@ def _tried_over(
 
 
 def _measured(way: Way, part: float, found: Observation, reference: Reference, length: float) -> Measured:
-    """Return what a run has shown, compared."""
+    """Return the measurements of a way from its observation and its reference."""
     if way.scene is not None and part == 1.0 and not (found.failure or reference.observation.failure):
         found = replace(found, energy_balance=balance_of(way.scene))
     return Measured(
@@ -152,17 +152,17 @@ def _compared(found: Observation, reference: Reference) -> Errors:
 
 
 def _measure_more(one: Measured, processor: float, most: float) -> None:
-    """Count the calls of a way that takes little; run a way over less that has not simulated all."""
+    """Count the calls of a cheap way; run a way that simulated only a part over an eighth of that part."""
     way = one.way
     if one.is_extrapolated:
-        trial = way.open(None, SHORT * one.part)
+        trial = way.open(None, SHORT_SHARE * one.part)
         try:
-            # an output may have no value yet where so little is simulated: that of the last impact before the first
+            # over so short a time an output may have no value yet, such as the last impact before the first one
             with suppress(ComponentError):
                 one.short = clock.CLOCK.timed(trial)[0]
         finally:
             trial.close()
-    elif processor < COUNTED * most:
+    elif processor < COUNTING_SHARE * most:
         one.calls = clock.CLOCK.calls(way)
 
 

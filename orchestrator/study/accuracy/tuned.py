@@ -1,4 +1,4 @@
-"""A scene file with the settings of a way, written beside what it was; its comments and its order stay."""
+"""A scene file with the settings of a way; its comments and the order of its tables stay."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _NEXT_HEADER = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
 def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
-    """Return a scene's TOML with other keys in `[execution]`, given without its name, and why as a comment above them.
+    """Return a scene's TOML with new settings in `[execution]`, and the reason as a comment above them.
 
-    Where the table is written in a way that lines cannot be put into, all of the text is written anew.
+    The whole text is written anew where lines cannot be inserted into the table. `settings` have keys without the
+    name of the table.
 
     Examples
     --------
@@ -31,8 +32,8 @@ def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
     how = "fused"
     """
     lines = [f"# {line}" for line in reason.splitlines()] + tomli_w.dumps(dict(settings)).splitlines()
-    wanted = parse_toml(text)
-    wanted[TABLE] = {**wanted.get(TABLE, {}), **settings}
+    expected = parse_toml(text)
+    expected[TABLE] = {**expected.get(TABLE, {}), **settings}
     header = _HEADER.search(text)
     if header is None:
         found = f"{text.rstrip()}\n\n[{TABLE}]\n" + "\n".join(lines) + "\n"
@@ -43,8 +44,8 @@ def tuned_text(text: str, settings: Mapping[str, Any], reason: str) -> str:
         kept = own.sub("", text[header.end() : end].lstrip("\n"))
         found = text[: header.end()] + "\n" + "\n".join(lines) + "\n" + kept + text[end:]
     try:
-        if parse_toml(found) == wanted:
+        if parse_toml(found) == expected:
             return found
     except ValueError:
-        pass  # a key of several lines, or of another form: written anew below
-    return "\n".join(f"# {line}" for line in reason.splitlines()) + "\n" + tomli_w.dumps(wanted)
+        pass  # the table has a key of several lines or another form: all of the text is written anew
+    return "\n".join(f"# {line}" for line in reason.splitlines()) + "\n" + tomli_w.dumps(expected)

@@ -1,4 +1,4 @@
-"""The ways in which a scene can be simulated, and of each way the settings that trade accuracy for time."""
+"""The ways to simulate a scene, each with the settings that trade accuracy for time."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ from vibroimpact.orchestrator.study.ways.way import Opener, Trial, Way, time_sca
 CONTACT_TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 INTEGRATOR_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 STEPS_A_PERIOD = (23, 61, 211, 1009, 5003)
-"""Of plain steps of equal size: how many in a period, or in the time scale of an unforced scene; primes, lest steps
-fall on the same phases in each period."""
+"""Numbers of plain steps of equal size in a period, or in the time scale of an unforced scene. They are primes, so
+that steps do not fall on the same phases in each period."""
 GENERAL_REFINEMENTS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
-"""Macro steps of a general scene, over its own."""
+"""Macro steps of a general scene, over its own macro step."""
 COUPLED_REFINEMENTS = (math.nan, 1e-2, 1e-3)
-"""Macro steps of coupled contacts that yield, over the period; NaN: none but those of the contact."""
+"""Macro steps of coupled compliant contacts, over the period; NaN: only the steps of the contact itself."""
 LEAST_SAMPLES, MOST_SAMPLES = 64, 10**6
-"""Samples of a run below which, and above which, a rate is not tried."""
+"""Least and largest number of samples of a run; rates with fewer or more samples are not tried."""
 EXCHANGES = ("jacobi", "gauss_seidel", "iterated")
 REVISED_STEPS = (0.2, 0.02)
-"""Longest steps up to a rigid stop that step revision finds, over the period."""
+"""Longest steps of step revision, over the period: both with rigid stops, the first with compliant stops."""
 REVISED_CONTACT_STEPS = (10.0, 40.0, 160.0, 640.0)
-"""Steps in a contact with a stop that yields, which step revision finds."""
+"""Numbers of steps of step revision in a contact with a compliant stop."""
 SAMPLING = (1.0 / 16.0, 0.25, 1.0, 4.0, 16.0)
-"""Sample rates of what a run records, over the scene's own."""
+"""Sample rates of a run's record, over the scene's own rate."""
 
 
 def ways_of(
     scene: Scene, *, speed: float = math.nan, rate: float = math.nan, whole: Scene | None = None
 ) -> list[Way]:
-    """Return the ways in which a scene without a sweep can be simulated, and their settings.
+    """Return the ways to simulate a scene without a sweep, with their settings.
 
-    Other laws that depend on the speed are made alike at that of its impacts, typically, m/s. The rate is that of the
-    time series that it asks for, samples per s; NaN for none. `whole` is the scene with its transient, where `scene`
-    begins after it: other models pass one of their own.
+    `speed` is the typical impact speed, m/s, at which other contact laws get the same restitution. `rate` is the rate
+    of the scene's time series, samples per s; NaN without one. `whole` is the scene with its transient, where `scene`
+    begins after the transient: other models pass a transient of their own.
     """
     if not scene.is_one_body:
         return _general_ways(scene)
@@ -66,7 +66,7 @@ def ways_of(
 
 
 def remarks_on(scene: Scene) -> list[str]:
-    """Return what the study of a scene leaves out, and why."""
+    """Return remarks on the ways that the study of a scene leaves out, with the reasons."""
     remarks = []
     if fixed := _not_repeated(scene):
         remarks.append(
@@ -90,7 +90,7 @@ def remarks_on(scene: Scene) -> list[str]:
 
 
 def _remarks_on_strangers(scene: Scene) -> list[str]:
-    """Return which ways with a body that knows nothing of its stops are left out, and why."""
+    """Return remarks on left-out ways whose body has no stops in its FMU, with the reasons."""
     pushed = why_not_pushed(scene)
     rigid = all_rigid(scene.stops)
     thrown_back = why_not_thrown_back(scene) if rigid else pushed
@@ -103,7 +103,7 @@ def _remarks_on_strangers(scene: Scene) -> list[str]:
 
 
 def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
-    """Return what opens a kind of trial with these arguments."""
+    """Return the opener of a kind of trial with these arguments."""
 
     def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
         return kind(*arguments, wrap=wrap, part=part)
@@ -150,7 +150,7 @@ def _coupled(scene: Scene) -> list[Way]:
 
 
 def _coupled_replay(scene: Scene) -> list[Way]:
-    """The body, its stops and the recording, each an FMU of its own."""
+    """Return the way in which the body, its stops and the recording are separate FMUs."""
     if _has_memory(scene):
         return []
     return [way_by_scene("coupled, FMI 3.0", "", math.nan, scene, {"execution.how": "coupled"})]
@@ -171,7 +171,7 @@ def _opens_replay(scene: Scene, every: int) -> Opener:
 
 
 def _revised(scene: Scene) -> list[Way]:
-    """The body as a stranger, whose arrivals the importer finds by making steps again."""
+    """Return the ways of step revision: the importer finds the impacts of a body without stops by repeating steps."""
     if not scene.stops or why_not_pushed(scene) or _has_memory(scene):
         return []
     scale, name = time_scale(scene), "step revision"
@@ -186,7 +186,7 @@ def _revised(scene: Scene) -> list[Way]:
 
 
 def _read_off_samples(scene: Scene, rate: float) -> list[Way]:
-    """What the samples of a run say of its impacts and extremes, which the motion itself knows exactly."""
+    """Return the ways that read impacts and extremes off the samples of a run."""
     rates = [part * rate for part in SAMPLING]
     begin, end = recorded_window(scene, float_parameters(scene, None))
     return [
@@ -197,7 +197,7 @@ def _read_off_samples(scene: Scene, rate: float) -> list[Way]:
 
 
 def _plain_steps(scene: Scene) -> list[Way]:
-    """Steps of equal size, as an importer makes them that knows no events."""
+    """Return the ways with steps of equal size, as in an importer without events."""
     scale = time_scale(scene)
     ways = []
     stops = scene.stops
@@ -260,7 +260,7 @@ def _general_ways(scene: Scene) -> list[Way]:
 
 
 def _not_repeated(scene: Scene) -> list[str]:
-    """Return the components that take values of others and do not restore their states."""
+    """Return the names of components that take values of other components and do not restore their states."""
     targets = {connection.target[0] for connection in scene.connections}
     return [
         one.name
@@ -270,5 +270,5 @@ def _not_repeated(scene: Scene) -> list[str]:
 
 
 def _has_memory(scene: Scene) -> bool:
-    """Whether a stop relaxes, which is a law of the body's own FMU alone."""
+    """Return whether a stop relaxes: only the FMU of the body itself has that law."""
     return any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops)

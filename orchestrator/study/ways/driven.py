@@ -20,10 +20,10 @@ from vibroimpact.orchestrator.study.ways.span import window_of
 
 
 class DrivenTrial:
-    """A body and its stops, fused or coupled as the scene says, over the first part of its time.
+    """A body and its stops, fused or coupled as in the scene, over the first part of its time.
 
-    `start` is the state where the recording of the last run began: displacements (m), then velocities (m/s), of the
-    oscillator, the masses or the modes. It is empty before a run has come to it.
+    `start` is the state at the start of the last recording: displacements (m), then velocities (m/s), of the
+    oscillator, the masses or the modes. It is empty until a run has reached the recording.
     """
 
     is_guarded = False

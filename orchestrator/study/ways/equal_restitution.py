@@ -1,4 +1,4 @@
-"""Contact laws that throw a rigid mass back with the same coefficient of restitution: equations.md 6.9 and 6.10."""
+"""Contact laws that give a rigid mass the same coefficient of restitution: equations.md 6.9 and 6.10."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, Stop
 
 OfLaw = Callable[[Any, float, float], float]
-"""What a stop of one law does to a mass (kg) that touches it with a speed (m/s)."""
+"""Property of a contact with a stop of one law, for a mass (kg) that touches it with a speed (m/s)."""
 LEAST_RESTITUTION = 0.01
-"""Coefficient of restitution below which no law that yields stands for another."""
+"""Coefficient of restitution, below which no compliant law stands for another law."""
 MOST_RATIO = 100.0
-"""Damping ratio of a mass on a Kelvin-Voigt stop up to which one of a given restitution is looked for."""
+"""Upper bound of the search for the damping ratio of a mass on a Kelvin-Voigt stop."""
 NEARLY_ELASTIC = 1e-4
-"""1 - restitution below which that of a Hunt-Crossley stop is 1 - 2 p / 3: rounding leaves nothing of the whole law."""
-LEAST = 1e-12
-"""Coefficient of restitution from which a Hunt-Crossley stop's is looked for."""
+"""1 - e, below which a Hunt-Crossley stop has e = 1 - 2 p / 3: rounding leaves no digits of the whole law."""
+LOWEST_SEARCHED = 1e-12
+"""Lower bound of the search for the coefficient of restitution e of a Hunt-Crossley stop."""
 CLOSEST = 1e-14
-"""How close p e comes to 1, relative: a strongly damped Hunt-Crossley stop has e = 1 / p to rounding."""
+"""Relative distance of p e from 1 at the upper bound: a strongly damped Hunt-Crossley stop has e = 1 / p."""
 POWER_LAW_TIME = 3.218065
 """Contact time of a Hertz stop over (mass^2 / (stiffness^2 speed))^(1/5)."""
 
 
 def restitution_at(stop: Stop, mass: float, speed: float) -> float:
-    """Return the coefficient of restitution that a stop gives a rigid mass; NaN for a law that none is known of.
+    """Return the coefficient of restitution of a rigid mass at a stop; NaN where the law has no known coefficient.
 
     The mass, kg, touches the stop with the speed, m/s.
     """
@@ -49,11 +49,11 @@ _RESTITUTIONS: dict[str, OfLaw] = {
 def laws_of_equal_restitution(
     restitution: float, mass: float, speed: float, duration: float
 ) -> dict[str, dict[str, Any]]:
-    """Return the laws that yield, by their names in words, with the numbers that a `[[stop]]` has for them.
+    """Return the compliant laws by their names in words, each with the keys of its `[[stop]]`.
 
-    The restitution is `LEAST_RESTITUTION` to 1, of a mass in kg. At the speed, m/s, a Hunt-Crossley stop has it, whose
-    restitution falls with that. The duration is that of a contact, s; of a power law that of the same stop without
-    damping.
+    The restitution of the mass, kg, is `LEAST_RESTITUTION` to 1. A Hunt-Crossley stop, whose restitution falls with the
+    speed, has it at the given speed, m/s. The duration is the contact time, s; for a power law, the contact time of
+    the same stop without damping.
     """
     ratio = damping_ratio_of(restitution)
     rate = _angle(ratio) / duration
@@ -74,7 +74,7 @@ def laws_of_equal_restitution(
 
 
 def contact_time(stop: Stop, mass: float, speed: float) -> float:
-    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one."""
+    """Return the contact time of a rigid mass at a stop, s: without damping for a power law, 0 for a rigid stop."""
     return _CONTACT_TIMES[stop.law](stop, mass, speed)
 
 
@@ -92,7 +92,7 @@ _CONTACT_TIMES: dict[str, OfLaw] = {
 
 
 def _power_law_time(exponent: float, stiffness: float, mass: float, speed: float) -> float:
-    """Return how long a rigid mass touches a stop whose force is a power of the penetration, s."""
+    """Return the contact time of a rigid mass at a stop whose force is a power of the penetration, s."""
     n = 1.0 + exponent
     depth: float = (n * mass * speed**2 / (2.0 * stiffness)) ** (1.0 / n)
     return 2.0 * depth / speed * math.sqrt(math.pi) * math.gamma(1.0 + 1.0 / n) / math.gamma(0.5 + 1.0 / n)
@@ -101,7 +101,7 @@ def _power_law_time(exponent: float, stiffness: float, mass: float, speed: float
 def restitution_of(ratio: float) -> float:
     """Return the coefficient of restitution of a rigid mass on a Kelvin-Voigt stop that never pulls.
 
-    The ratio is the damping ratio of the mass on the stop, >= 0 (equations.md 6.9).
+    `ratio` is the damping ratio of the mass on the stop, >= 0 (equations.md 6.9).
 
     Examples
     --------
@@ -126,7 +126,7 @@ def damping_ratio_of(restitution: float) -> float:
 def restitution_of_product(product: float) -> float:
     """Return the coefficient of restitution of a Hunt-Crossley stop: p (1 + e) = ln((1 + p) / (1 - p e)).
 
-    The product p is that of its damping and the speed (equations.md 6.10).
+    The product p is the damping of the stop times the speed (equations.md 6.10).
 
     Examples
     --------
@@ -136,11 +136,11 @@ def restitution_of_product(product: float) -> float:
     if product < 1.5 * NEARLY_ELASTIC:
         return 1.0 - 2.0 * product / 3.0
     most = min(1.0, (1.0 - CLOSEST) / product)
-    return _root(lambda e: _off(product, e), LEAST, most)
+    return _root(lambda e: _off(product, e), LOWEST_SEARCHED, most)
 
 
 def product_of_restitution(restitution: float) -> float:
-    """Return damping times speed at which a Hunt-Crossley stop has a coefficient of restitution.
+    """Return the product of damping and speed that gives a Hunt-Crossley stop a coefficient of restitution.
 
     >>> round(product_of_restitution(0.882189986), 9)
     0.2
@@ -152,7 +152,7 @@ def product_of_restitution(restitution: float) -> float:
 
 
 def _root(off: Callable[[float], float], least: float, most: float) -> float:
-    """Return where a function rises through 0; `most`, below which it is negative, where it comes too close to that."""
+    """Return the root of a rising function from `least` to `most`; `most` where the function is negative there."""
     from scipy.optimize import brentq
 
     if off(most) < 0.0:

@@ -1,4 +1,4 @@
-"""Other models of the same thing, which are no ways of solving it: other laws of contact, fewer or more modes, ..."""
+"""Other models of the same system, not other ways to solve it: other contact laws, fewer or more modes, ..."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from vibroimpact.orchestrator.study.ways.equal_restitution import (
 from vibroimpact.orchestrator.study.ways.way import Way, can_have, time_scale, way_by_scene
 
 CONTACT_TIMES = (1e-1, 1e-2, 1e-3)
-"""Of yielding stops that stand for a rigid one, over the period."""
+"""Contact times of compliant stops that stand for a rigid stop, over the period."""
 MOST_MODES = 64
 LEAST_TRIED_MODES = 8
-"""Modes of a beam up to which, at least, others than its own are tried."""
+"""Least upper bound of the tried numbers of modes of a beam; with more than 2 modes the bound is 4 times as many."""
 MODES_TRIED = (1, 2, 4, 8, 16, 32, MOST_MODES)
 
 
 def other_models(scene: Scene, speed: float) -> list[Way]:
     """Return other models of a scene of the short form without a sweep.
 
-    The speed is that of its impacts, typically, m/s; NaN where there are none.
+    `speed` is the typical speed of its impacts, m/s; NaN without impacts.
     """
     body, ways = scene.body, []
     if scene.stops:
@@ -45,9 +45,10 @@ def other_models(scene: Scene, speed: float) -> list[Way]:
 
 
 def other_modes(scene: Scene) -> list[Way]:
-    """Return fewer and more modes: of a beam natural ones, and with residual vectors of its stops; of a chain fewer.
+    """Return the ways with other numbers of modes: fewer for a chain, fewer and more for a beam.
 
-    They are told by the most of them. With rigid stops on a beam nothing converges, and none is shown.
+    A beam with stops also has ways with residual vectors. The reference of all of them is the finest number of modes.
+    A beam with rigid stops has none of these ways, since nothing converges there.
     """
     body = scene.body
     if body.HAS_MASSES:
@@ -56,7 +57,7 @@ def other_modes(scene: Scene) -> list[Way]:
         return []
     most = max(LEAST_TRIED_MODES, 4 * body.size)
     counts = sorted({n for n in MODES_TRIED if n <= most} | {body.size})
-    kinds = (False, True) if scene.stops else (False,)  # a residual vector is that of a stop
+    kinds = (False, True) if scene.stops else (False,)  # each residual vector belongs to a stop
     changes = [{"body.modes": n, "body.residual": residual} for residual in kinds for n in counts]
     able = [change for change in changes if can_have(scene, change)]
     if not able:
@@ -78,7 +79,7 @@ def other_modes(scene: Scene) -> list[Way]:
 
 
 def _fewer_modes(scene: Scene) -> list[Way]:
-    """Return fewer modes of a chain, whose reference has all of them."""
+    """Return the ways with fewer modes of a chain, whose reference has all modes."""
     changes = [{"body.modes": n} for n in MODES_TRIED if n < scene.body.size]
     whole = scene.with_values({"body.modes": scene.body.size})
     return [
@@ -90,8 +91,8 @@ def _fewer_modes(scene: Scene) -> list[Way]:
     ]
 
 
-def told_by(ways: Sequence[Way]) -> str:
-    """Return in words what other numbers of modes are compared with; empty where there are none."""
+def modes_reference(ways: Sequence[Way]) -> str:
+    """Return the reference of other numbers of modes, in words; empty where there are no such ways."""
     finest = next((way.against.body for way in ways if way.against is not None), None)
     if finest is None:
         return ""
@@ -102,11 +103,11 @@ def told_by(ways: Sequence[Way]) -> str:
 
 
 def _equal_restitution(scene: Scene, speed: float) -> Iterator[Way]:
-    """Yield stops of other laws that give the mass that hits them the same coefficient of restitution."""
+    """Yield ways with stops of other laws, with the same coefficient of restitution."""
     stops: Sequence[Stop] = scene.stops
     masses = body_points(scene).contact_masses().tolist()
     if not speed > 0.0:
-        speed = 1.0  # at which nothing hits: of a law that depends on it, any
+        speed = 1.0  # nothing hits the stops, so any speed will do
     found = [restitution_at(stop, mass, speed) for stop, mass in zip(stops, masses, strict=True)]
     if not all(LEAST_RESTITUTION <= one <= 1.0 for one in found):
         return

@@ -1,4 +1,4 @@
-"""Trials with steps of equal size: a body and its stops as an importer couples them that knows no events."""
+"""Trials with steps of equal size: a body and its stops, coupled as in an importer without events."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.study.ways.strangers import stranger_of, thrown_ba
 
 
 class _Seen:
-    """What steps of equal size show of a motion: its extremes after them, and when it was found beyond a stop."""
+    """The motion as seen after steps of equal size: its extremes, and the steps that ended beyond a stop."""
 
     def __init__(self, begin: float) -> None:
         self._begin = begin
@@ -28,19 +28,19 @@ class _Seen:
         self.lowest, self.highest = math.inf, -math.inf
 
     def note(self, now: float, displacement: float) -> None:
-        """Note where the observed point is after a step."""
+        """Add the displacement of the observed point after a step, m."""
         if now > self._begin:
             self.lowest, self.highest = min(self.lowest, displacement), max(self.highest, displacement)
 
     def note_impact(self, now: float, velocity: float, stop: int) -> None:
-        """Note that the body was found beyond a stop (0-based)."""
+        """Add an impact at a stop (0-based), at the end of a step that ended beyond it."""
         if now > self._begin:
             self.impacts.append((now, abs(velocity), stop + 1.0))
 
     def observation(
         self, final: tuple[float, float], began: float, failure: str, reached: float
     ) -> Observation:
-        """Return it as what a run shows."""
+        """Return the observation of the run."""
         found = np.array(self.impacts).reshape(-1, 3)
         return Observation(
             *(found, self.lowest, self.highest, final),
@@ -51,10 +51,10 @@ class _Seen:
 
 
 class PlainStepsTrial:
-    """A body on rigid stops that is looked at after steps (s) of equal size, as an importer without events does.
+    """A body with rigid stops, observed after steps (s) of equal size, as in an importer without events.
 
-    Where it is found beyond a stop its velocity there is turned round, all of its state otherwise kept: by an impulse
-    at that point. Between two such corrections its motion is exact: all of the error is that of the steps.
+    Where a step ends beyond a stop, an impulse there reverses the velocity by the restitution; the displacements stay.
+    The motion between two impulses is exact: all of the error comes from the steps.
     """
 
     def __init__(self, scene: Scene, step: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:
@@ -99,7 +99,7 @@ class PlainStepsTrial:
         return seen.observation(driver.observed(), began, failure, now / end)
 
     def _thrown_back(self, now: float, motion: Floats, seen: _Seen) -> Floats | None:
-        """Return the state after the impulses of all stops that the body is beyond; None where there are none."""
+        """Return the state after the impulses of all stops that the body has passed; None without an impulse."""
         displacements, velocities = motion.reshape(2, -1)
         state: Floats | None = None
         for k, stop in enumerate(self._stops):
@@ -116,10 +116,10 @@ class PlainStepsTrial:
 
 
 class PlainForcesTrial:
-    """A body and its yielding stops, each an FMU, that exchange motion and force after steps (s) of equal size.
+    """A body and its compliant stops, each an FMU, that exchange motion and force after steps (s) of equal size.
 
-    What a tool does that knows no events: the stop's force is held over a step. With the exchange `jacobi` the stop
-    sees the motion at the start of a step, with `gauss_seidel` that at its end.
+    A tool without events works in this way: the force of the stop is held over a step. With the exchange `jacobi` the
+    stop gets the motion at the start of a step, with `gauss_seidel` the motion at its end.
     """
 
     def __init__(
@@ -190,7 +190,7 @@ class PlainForcesTrial:
         return seen.observation(driver.observed(), began, failure, now / end)
 
     def _push(self) -> None:
-        """Write what the stops answer into the force inputs of the body."""
+        """Write the forces of the stops into the force inputs of the body."""
         self._force.values[:] = 0.0
         for place, sign, answer in zip(self._pushed, self._signs, self._answers, strict=True):
             self._force.values[place] -= sign * answer.get()[0]

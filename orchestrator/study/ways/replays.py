@@ -1,4 +1,4 @@
-"""A replay as studies see it: driven by all samples of its recording, or by every second, fourth, ... of them."""
+"""The trial of a replay, driven by all samples of its recording or by every second, fourth, ... sample."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from vibroimpact.orchestrator.study.observation import (
 )
 
 THINNED = (2, 4, 8, 16, 32)
-"""One of how many samples is kept, as a slower board without a filter would have."""
+"""Factors by which the samples are thinned out, as on a slower board without a filter."""
 DEADLINE = "execution.deadline"
-"""The key that a replay names which has taken too long."""
+"""Key in the message of a replay that has taken too long."""
 LEAST_SAMPLES = 64
-"""Samples that are left, below which a recording is thinned no further."""
+"""Least number of samples of the shortest channel after thinning; factors that leave fewer are not tried."""
 
 
 class ReplayTrial:
-    """A replay of the first recording that a scene names, with one of `every` samples of each channel.
+    """A replay of the first recording of a scene, with one of `every` samples of each channel.
 
-    UsageError: the scene names no recording. DatasetError: it cannot be read.
+    UsageError: the scene names no recording. DatasetError: the recording cannot be read.
     """
 
     is_guarded = False
@@ -44,7 +44,7 @@ class ReplayTrial:
         self._variance: float | None = None
 
     def run(self) -> Observation:
-        """Simulate the replay once; its score, which is the same each time, is found once and not timed."""
+        """Simulate the replay once; its score, the same in each run, is computed once and not timed."""
         began, replayer = time.perf_counter(), self._replayer
         try:
             motion = replayer.simulate()
@@ -62,9 +62,7 @@ class ReplayTrial:
             try:
                 self._variance = min((c.variance for c in compare_motion(replayer, motion)), default=math.nan)
             except EstimationError:
-                self._variance = (
-                    math.nan
-                )  # too little is left to be scored; what moves is compared all the same
+                self._variance = math.nan  # too few samples for a score; the motion is compared all the same
         return Observation(
             motion.impacts[:, [IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT]],
             samples=np.column_stack(motion.readings) if motion.readings else None,
@@ -79,7 +77,7 @@ class ReplayTrial:
 
 
 def thinned(recording: Recording, every: int) -> Recording:
-    """Return a recording with one of so many samples of each channel, the first among them."""
+    """Return a recording with one of `every` samples of each channel, starting with the first sample."""
     if every == 1:
         return recording
     axes = {id(channel.axis): _thinned_axis(channel.axis, every) for channel in recording.channels.values()}
@@ -102,10 +100,10 @@ def _thinned_axis(axis: TimeAxis, every: int) -> TimeAxis:
 
 
 def rates_of(scene: Scene) -> dict[int, float]:
-    """Return how far the recording of a scene can be thinned, with the rate that is left, 1/s.
+    """Return the possible thinning factors of a scene's recording, each with the rate that is left, 1/s.
 
-    It is that of the channel that drives, or of the first that is compared. DatasetError: the recording cannot be read,
-    or has no such channel.
+    The rate belongs to the driving channel, or else to the first compared channel. DatasetError: the recording cannot
+    be read, or has no such channel.
     """
     replay = scene.replay
     assert replay is not None
@@ -127,6 +125,6 @@ def first_part_of_replay(scene: Scene, part: float) -> Scene:
 
 
 def span_of(scene: Scene) -> tuple[float, float]:
-    """Return when the replay of a scene begins and ends, s."""
+    """Return the start and the end of the replay of a scene, s."""
     with Replayer(scene, open_signals(recording_of(scene, 1)), execution="fused") as replayer:
         return float(replayer.time[0]), float(replayer.time[-1])

@@ -1,4 +1,4 @@
-"""A trial in which the body is a stranger to its stops: the importer finds its arrivals by step revision."""
+"""A trial whose body has no stops in its FMU: the importer finds the impacts by step revision."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from vibroimpact.orchestrator.study.ways.strangers import stranger_of
 
 
 class RevisedTrial:
-    """A body that knows nothing of its stops, as the FMU of another tool: the `[[contact]]` of general scenes.
+    """A body without stops in its FMU, like the FMU of another tool: the `[[contact]]` of general scenes.
 
-    Steps (at most `step`, s) that end beyond a stop are made again until they end at it; a stop that yields answers
-    with the force, held over each step, that closes the energy of the contact, in `contact_steps` steps; a rigid one
-    throws the body back over a very short step.
+    Steps (at most `step`, s) that end beyond a stop are repeated until they end at the stop. A compliant stop answers
+    with a force held over each of `contact_steps` steps, which closes the energy balance of the contact. A rigid stop
+    reverses the velocity over a very short step.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class RevisedTrial:
         )
 
     def _note(self, event: Event) -> None:
-        """Note an arrival, which is told before it is answered: at the stop that the body is at and moves towards."""
+        """Add an impact before its answer, at the nearest stop towards which the body moves."""
         if not self._recording:
             return
         displacements, velocities = self._contacts.get().reshape(2, -1)

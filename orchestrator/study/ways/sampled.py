@@ -1,4 +1,4 @@
-"""A trial that knows the motion by its samples only, as a recording does."""
+"""A trial that reads the motion off its samples only, as from a recording."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.study.ways.span import first_periods
 class SampledTrial:
     """A scene whose impacts and extremes are read off samples of its motion, `rate` a second, in whole periods.
 
-    An impact is where the last sample before it is, with the velocity there: what a recording tells without a model.
+    An impact has the time and the velocity of the last sample before it, as in a recording without a model.
     """
 
     def __init__(self, scene: Scene, rate: float, wrap: Wrapper | None = None, part: float = 1.0) -> None:

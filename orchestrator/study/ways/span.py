@@ -13,8 +13,8 @@ from vibroimpact.orchestrator.study.ways.replays import first_part_of_replay
 def window_of(scene: Scene, floats: Mapping[str, float], part: float) -> tuple[float, float]:
     """Return start and end of the recording of the first part of a scene of the short form, s.
 
-    Both come earlier: the part, 0 < part <= 1, is one of all that is simulated. `floats` are the real parameters of its
-    body.
+    The part, 0 < part <= 1, scales all of the simulated time: both come earlier. `floats` are the real parameters of
+    the body.
     """
     begin, end = recorded_window(scene, floats)
     return part * begin, part * end
@@ -39,7 +39,7 @@ def first_part(scene: Scene, part: float) -> Scene:
 
 
 def first_periods(scene: Scene, part: float) -> Scene:
-    """Return a scene of the short form that records so much less, in whole periods where it is forced, 1 at least."""
+    """Return a scene of the short form that records only a part, in whole periods, at least 1, where it is forced."""
     if part == 1.0:
         return scene
     if scene.period is None:

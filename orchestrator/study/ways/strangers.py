@@ -1,4 +1,4 @@
-"""A body that knows nothing of its stops: what its FMU shows where they are, and what pushes it there."""
+"""A body without stops in its FMU: the motion and the force input of its FMU at each stop of the scene."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from vibroimpact.orchestrator.study.observation import Floats
 
 @dataclass(frozen=True, slots=True)
 class Stranger:
-    """The parameters of a body without stops, and the names of its variables at each of them."""
+    """The parameters of a body without stops, and the names of its variables at each stop."""
 
     floats: dict[str, float]
-    """Parameters, by variable name, SI."""
+    """Real parameters by variable name, SI."""
     integers: dict[str, int]
-    """Likewise."""
+    """Integer parameters by variable name."""
     displacements: tuple[str, ...]
-    """Displacement of the point in front of each stop."""
+    """Variable of the displacement in front of each stop."""
     velocities: tuple[str, ...]
-    """And its velocity."""
+    """Variable of the velocity in front of each stop."""
     forces: tuple[str, ...]
-    """Input that acts there; empty where the body has none at a stop."""
+    """Force input in front of each stop; empty where the body has none at a stop."""
 
 
 def stranger_of(scene: Scene) -> Stranger:
@@ -36,9 +36,9 @@ def stranger_of(scene: Scene) -> Stranger:
 
 
 def thrown_back(scene: Scene) -> tuple[tuple[str, ...], Floats]:
-    """Return the start velocities of a body, and their changes by an impulse at each rigid stop, for 1 m/s there.
+    """Return the names of the start velocities of a body, and their changes by an impulse at each rigid stop.
 
-    They are the names of the velocities, N of them, and the changes, shape (stop, N).
+    There are N names; the changes have shape (stop, N). Each impulse changes the velocity at its stop by 1 m/s.
     """
     body, rigid = body_points(scene), [LAWS[stop.law].is_rigid for stop in scene.stops]
     shapes = body.contact_shapes()[rigid]

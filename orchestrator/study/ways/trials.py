@@ -1,7 +1,7 @@
-"""Trials that no scene asks for: a body coupled by FMI 2.0, or integrated by CVode.
+"""Trials that no scene can ask for: a body coupled by FMI 2.0, or integrated by CVode.
 
-Each simulates the body and the stops of a scene of the short form from its start to its end, as its own run does, and
-observes the same.
+Each trial simulates the body and the stops of a scene of the short form from start to end, like the scene's own run.
+Its observation has the same quantities.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from vibroimpact.orchestrator.study.observation import LATE, Floats, Observation
 from vibroimpact.orchestrator.study.ways.span import window_of
 
 ROWS_A_PERIOD = 4
-"""Rows of an integration in a period, times the square of the number of modes: an integrator's steps between two rows
+"""Rows of an integration in a period, over the square of the number of modes: the integrator's steps between two rows
 are limited. The impacts have rows of their own."""
-LOST = 1e3
-"""Displacement, over the scene's own, above which a motion is lost."""
+OUT_OF_BOUNDS = 1e3
+"""Displacement over the reference's largest displacement, above which a motion has left all bounds."""
 
 
 class CoupledTrial:
@@ -86,11 +86,11 @@ class CoupledTrial:
             self._recording = True
             self._counts.get()
             if begin == 0.0:
-                self._counts.values[:] = 0  # contacts that the start state has closed are new
+                self._counts.values[:] = 0  # contacts that the start state closes count as new
             self._switch.values[:] = True
             self._switch.set()
             self._importer.advance(end)
-            self._note(None)  # an event is told before it is resolved: the last one is counted here
+            self._note(None)  # `on_event` comes before the event is resolved: the last event is counted here
         except DeadlineReached:
             failure = LATE
         lowest, highest = map(float, self._extremes.get())
@@ -123,7 +123,7 @@ class CoupledTrial:
 class ModelExchangeTrial:
     """The body's FMU for model exchange, integrated by FMPy's CVode to a relative tolerance.
 
-    FMPy calls the FMU itself, and nobody counts its calls: `wrap` is not used.
+    FMPy calls the FMU itself, so the calls are not counted: `wrap` is not used.
     """
 
     def __init__(
@@ -146,14 +146,14 @@ class ModelExchangeTrial:
 
         def step_finished(now: float) -> bool:
             nonlocal reached, is_late
-            if reached == 0.0:  # what FMPy loads before its first step is no part of the run's time
+            if reached == 0.0:  # the time in which FMPy loads libraries does not count
                 self._deadline.begin(scene.execution.deadline)
             reached, is_late = now, self._deadline.is_over
             return not is_late
 
         ports = range(1, len(scene.stops) + 1)
-        told = ("count", "last_time", "last_velocity")
-        output = [f"contact[{k}].{what}" for k in ports for what in told]
+        reported = ("count", "last_time", "last_velocity")
+        output = [f"contact[{k}].{what}" for k in ports for what in reported]
         interval = (scene.period or end) / (ROWS_A_PERIOD * getattr(scene.body, "size", 1) ** 2)
         try:
             rows = integrated(
@@ -186,11 +186,11 @@ class ModelExchangeTrial:
         )
 
     def close(self) -> None:
-        """Nothing is held between two runs."""
+        """Do nothing: no resource is held between two runs."""
 
 
 def far_off(found: Observation, expected: Observation) -> bool:
-    """Return whether a motion has left all bounds, as one does that has fallen through its stop."""
+    """Return whether a motion has left all bounds, for example by falling through its stop."""
     size = max(abs(expected.lowest), abs(expected.highest))
     reach = max(abs(found.lowest), abs(found.highest), abs(found.final[0]))
-    return math.isfinite(size) and size > 0.0 and reach > LOST * size
+    return math.isfinite(size) and size > 0.0 and reach > OUT_OF_BOUNDS * size

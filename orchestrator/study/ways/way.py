@@ -1,4 +1,4 @@
-"""What a way of simulating a scene is, and how one is opened."""
+"""A way to simulate a scene, and its opening as a trial."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from vibroimpact.orchestrator.study.ways.span import first_part
 
 
 class Trial(Protocol):
-    """A way of simulating a scene, opened: it can be run again and again."""
+    """An opened way to simulate a scene, which can run again and again."""
 
     def run(self) -> Observation:
         """Simulate the scene once."""
 
     def close(self) -> None:
-        """Free what was opened."""
+        """Free the opened components."""
 
 
 class Opener(Protocol):
-    """Opens a way, over all of its scene's time or the first part of it."""
+    """Opens a way over all of its scene's time or over the first part."""
 
     def __call__(self, wrap: Wrapper | None, part: float = 1.0) -> Trial:
         """Return the trial; `wrap` wraps the functions of all FMUs."""
@@ -39,24 +39,24 @@ class Opener(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A way of simulating a scene at one setting."""
+    """A way to simulate a scene at one setting."""
 
     name: str
-    """What differs in kind: `fused`, `coupled, FMI 2.0`, `model exchange, CVode`, ..."""
+    """Kind of the way: `fused`, `coupled, FMI 2.0`, `model exchange, CVode`, ..."""
     knob: str
-    """The key, or the number, that is set; empty where there is nothing to set."""
+    """Key or number that is set; empty where there is nothing to set."""
     setting: float
-    """Its value; NaN without a knob."""
+    """Value of the knob; NaN without a knob."""
     changes: Mapping[str, Any]
-    """Keys of the scene, with the values that make it run this way; empty where no scene says it."""
+    """Keys of the scene, with the values that make it run this way; empty where no scene can ask for it."""
     open: Opener
-    """Opens the way; given a wrapper of the functions of all FMUs, or None, and the part of the time to simulate."""
+    """Opens the way, with a wrapper of the functions of all FMUs, or None, and the part of the time to simulate."""
     model: bool = False
-    """Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise."""
+    """Whether the way simulates another model (another contact law, fewer modes) instead of the same one."""
     against: Scene | None = None
-    """The finest model of its kind, where its errors are told by that one and not by the study's reference."""
+    """The finest model of its kind, where errors are measured against it; None for the study's reference."""
     scene: Scene | None = None
-    """What is simulated, where its own runner does it."""
+    """The simulated scene, where its own runner simulates it."""
 
     @property
     def label(self) -> str:
@@ -88,7 +88,7 @@ class CallCounter:
         self.calls: Counter[str] = Counter()
 
     def wrap(self, name: str, function: Function) -> Function:
-        """Return a function that is counted."""
+        """Return the function with its calls counted."""
 
         def counted(*arguments: Any) -> Any:
             self.calls[name] += 1
@@ -98,12 +98,12 @@ class CallCounter:
 
 
 def opened_trial(scene: Scene, wrap: Wrapper | None = None) -> SceneTrial | ReplayTrial:
-    """Open a scene as it says itself; of a replay nobody wraps the functions."""
+    """Open a scene with its own settings; `wrap` is not used for a replay."""
     return SceneTrial(scene, wrap) if scene.replay is None else ReplayTrial(scene)
 
 
 def opened_part(scene: Scene, part: float, wrap: Wrapper | None = None) -> Trial:
-    """Open a scene as it says itself, to simulate the first part of its time."""
+    """Open a scene with its own settings, to simulate the first part of its time."""
     if part == 1.0:
         return opened_trial(scene, wrap)
     if not scene.is_lone_body:
@@ -114,7 +114,7 @@ def opened_part(scene: Scene, part: float, wrap: Wrapper | None = None) -> Trial
 def way_by_scene(
     name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], *, model: bool = False
 ) -> Way:
-    """Return the way in which the scene's own runner runs it, with other values of some keys."""
+    """Return the way of the scene's own runner, with other values of some keys."""
     changed = scene.with_values(changes) if changes else scene
 
     def opened(wrap: Wrapper | None, part: float = 1.0) -> Trial:
@@ -124,7 +124,7 @@ def way_by_scene(
 
 
 def can_have(scene: Scene, changes: Mapping[str, Any]) -> bool:
-    """Return whether a scene is one with these values, too."""
+    """Return whether a scene is valid with these changes."""
     try:
         scene.with_values(changes)
     except SceneError:
@@ -133,7 +133,7 @@ def can_have(scene: Scene, changes: Mapping[str, Any]) -> bool:
 
 
 def time_scale(scene: Scene) -> float:
-    """Return the forcing period, or that of the slowest motion of an unforced oscillator, or a hundredth, s."""
+    """Return the forcing period, else the period of an unforced oscillator, else a hundredth of the whole time, s."""
     if scene.period is not None:
         return scene.period
     numbers = {} if scene.body.IS_STRUCTURE else float_parameters(scene, None)

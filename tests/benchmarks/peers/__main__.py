@@ -1,4 +1,4 @@
-"""`make peers`: measure all ways on all problems, write record, figure and page; `--page` takes the record there is."""
+"""`make peers`: measure all ways on all problems, write record, figure and page; `--page` reuses the record."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"  # before numpy is imported: processor time is that of one thread
+    os.environ[_name] = "1"  # before numpy is imported: processor time then counts one thread
 
 from peers.jax_flights import one_thread  # noqa: E402
 
@@ -35,11 +35,11 @@ PACKAGES = ("numpy", "scipy", "FMPy", "scikit-sundae", "diffrax", "jax", "mujoco
 
 
 DOTS = 110
-"""Of the picture, an inch: it is one of many on a page."""
+"""Resolution of the picture, dots per inch: a page has many pictures."""
 
 
 def machine() -> dict[str, str]:
-    """Return the processor and the versions that the figures hold for."""
+    """Return the processor and the versions of the packages, for the record of the figures."""
     model = platform.processor() or platform.machine()
     if Path("/proc/cpuinfo").is_file():
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -54,27 +54,27 @@ def machine() -> dict[str, str]:
 
 
 def measure(keys: Sequence[str]) -> None:
-    """Measure some problems, all without a key, and put each into the record as soon as it is measured."""
+    """Measure the problems with these keys, or all without a key; save each to the record once it is measured."""
     for case in cases():
         if keys and case.key not in keys:
             continue
         print(case.title, file=sys.stderr, flush=True)
         found, reference = measured(case)
         rows = [row.record() | {"cost": finite(row.cost)} for row in found]
-        told = {"key": case.key, "title": case.title, **{key: finite(v) for key, v in reference.items()}}
-        _put(told, rows)
+        summary = {"key": case.key, "title": case.title, **{key: finite(v) for key, v in reference.items()}}
+        _put(summary, rows)
 
 
 def _put(case: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     old = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {"cases": [], "rows": []}
     order = [one.key for one in cases()]
-    told = [one for one in old["cases"] if one["key"] != case["key"]] + [case]
+    entries = [one for one in old["cases"] if one["key"] != case["key"]] + [case]
     kept = [row for row in old["rows"] if row["case"] != case["key"]] + rows
     record = {
         "date": datetime.date.today().isoformat(),
         "machine": machine(),
         "one_period": finite(cost_of_a_run(orbit(1))),
-        "cases": sorted(told, key=lambda one: order.index(one["key"])),
+        "cases": sorted(entries, key=lambda one: order.index(one["key"])),
         "rows": sorted(kept, key=lambda row: order.index(row["case"])),
     }
     RECORD.parent.mkdir(exist_ok=True)
@@ -82,7 +82,7 @@ def _put(case: dict[str, Any], rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> int:
-    """Measure, or take the record there is; write figure and page."""
+    """Measure, or reuse the existing record; write figure and page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--page", action="store_true", help="measure nothing: figure and page from the record"

@@ -1,6 +1,6 @@
 """CVODE of SUNDIALS by scikit-sundae, with its root finding and the Jacobian; slopes are Python functions.
 
-Adams and BDF, each for all problems, though the one is advised for motion that is not stiff, the other for stiff.
+Adams and BDF both run all problems, although Adams is advised for motion that is not stiff, and BDF for stiff motion.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from vibroimpact.orchestrator.study.observation import Floats
 METHODS = ("Adams", "BDF")
 MOST_STEPS = 1_000_000
 AT_EVENT = 2
-"""Status of a result that an event has ended."""
+"""Status of a result that ends at an event."""
 
 
 def _callbacks(problem: Problem, phase: Phase, clock: Clock) -> tuple[Callable[..., None], ...]:
-    """Return slope, event and Jacobian in the form of scikit-sundae, which hands over the array to be filled."""
+    """Return slope, event and Jacobian in the form of scikit-sundae, which passes the array to be filled."""
     slope, event, matrix = (
         slope_of(problem, phase),
         event_of(problem, phase, clock),
@@ -45,7 +45,7 @@ def _callbacks(problem: Problem, phase: Phase, clock: Clock) -> tuple[Callable[.
 
 
 def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run:
-    """Return what simulates a problem with one method of CVODE at a tolerance."""
+    """Return a function that simulates a problem with one method of CVODE at a tolerance."""
     from sksundae.cvode import CVODE
 
     phases = list(Phase)[: len(problem.pieces)]
@@ -69,7 +69,7 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
     solvers = [solver(phase) for phase in phases]
 
     def integrate(phase: Phase, t: float, y: Floats, first: float) -> tuple[float, Floats, bool]:
-        # its own first steps are short enough for any bounce; one that is asked for fails its error test
+        # CVODE's own first steps are short enough for any bounce; a prescribed first step fails its error test
         found = solvers[phase].solve([t, problem.end], y)
         if not found.success:
             raise ArithmeticError(str(found.message))

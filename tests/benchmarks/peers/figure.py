@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.page import COLOURS, canvas, page_style
 
 WIDTH, HEIGHT = 170.0, 150.0
-"""mm."""
+"""Width of the figure and height of a panel, mm."""
 MARKERS = "*osD^vP<>X"
 LOWEST, TOP = 1e-15, 30.0
-"""Error at the foot of a panel; where failures are drawn. What a reference is not known to is drawn at its estimate."""
+"""Error at the foot of a panel; height of failures. An error below the reference's own is drawn at that estimate."""
 
 
 def draw(record: Mapping[str, Any]) -> Figure:
-    """Draw the error of each way over its cost; what failed is a cross at the top, where its time went."""
+    """Draw the error of each way over its cost; a failure is a cross at the top, above the time it took."""
     rows: Sequence[Mapping[str, Any]] = record["rows"]
     names = list(dict.fromkeys(row["way"] for row in rows))
     with page_style():

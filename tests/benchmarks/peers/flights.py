@@ -1,8 +1,8 @@
 """The loop of a careful user around an integrator with events: impacts, chatter, rest, release, compliant contacts.
 
-Each event ends an integration; the state is changed by hand, and the integration begins again. A flight that starts on
-the stop is given a first step of half its ballistic length, since a step over the whole bounce shows no change of sign.
-A chatter ends where the rebound is slow: by the geometric sum of what is left of it (equations.md 3.1, first order).
+Each event ends an integration; the loop changes the state, and the integration starts again. A flight that starts on
+the stop gets a first step of half its ballistic length. A longer step, over the whole bounce, shows no change of sign.
+A chatter ends at a slow rebound: the geometric sum gives the rest of it (equations.md 3.1, first order).
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from peers.ways import Clock, Found, observed
 from vibroimpact.orchestrator.study.observation import Floats
 
 SLOW, SLOWEST = 0.1, 1e-4
-"""Rebound that is taken for rest, over the root of the tolerance: the geometric sum errs by about its square. And the
-largest, m/s: faster impacts are compared."""
+"""Rebound velocity below which the body rests, over the root of the tolerance: the geometric sum errs by about its
+square. And its largest value, m/s: faster impacts are compared."""
 HELD_STEP = 1.0 / 16.0
-"""Largest step of a rest, over the period: the release is no zero of a motion that is nothing but rest."""
+"""Largest step of a rest, over the period: a motion that only rests shows no zero at the release."""
 LEAVING_STEP = 1e-3
 """First step after a release, over the period."""
 MOST_IMPACTS = 100_000
 
 Integrate = Callable[[Phase, float, Floats, float], tuple[float, Floats, bool]]
-"""Given the piece, the time, the state and a first step (0: free to choose): the time and the state of its event or of
-the end, and whether it was an event."""
+"""Takes the piece, the time, the state and a first step (0: free to choose). Returns the time and the state of its
+event or of the end, and whether it was an event."""
 
 
 def slow_rebound(tolerance: float) -> float:
-    """Return the speed of a rebound that is taken for rest, m/s."""
+    """Return the rebound velocity below which the body rests, m/s."""
     return min(SLOW * math.sqrt(tolerance), SLOWEST)
 
 
@@ -43,7 +43,7 @@ def follow(problem: Problem, integrate: Integrate, slow: float, clock: Clock) ->
     problem : Problem
     integrate : callable
     slow : float
-        Speed of a rebound that is taken for rest, m/s.
+        Rebound velocity below which the body rests, m/s.
     clock : Clock
     """
     impacts: list[tuple[float, float]] = []
@@ -71,7 +71,7 @@ def _after(
     impacts: list[tuple[float, float]],
     rests: list[float],
 ) -> tuple[Phase, Floats, float]:
-    """Return the next piece, the state after an event, and the first step from it (0: free to choose)."""
+    """Return the next piece, the state after an event, and the next first step (0: free to choose)."""
     if phase == Phase.HELD:
         return Phase.FREE, y, LEAVING_STEP * problem.period
     if phase == Phase.PRESSED:
@@ -95,7 +95,7 @@ def _after(
 
 
 def slope_of(problem: Problem, phase: Phase) -> Callable[[float, Floats], list[float] | Floats]:
-    """Return y' of a piece: for one mode in plain numbers, which cost less than arrays of two."""
+    """Return y' of a piece; one mode uses plain floats, which cost less than arrays of two."""
     piece, w, shift = problem.pieces[phase], problem.angular_frequency, problem.forcing_phase
     if problem.modes == 1:
         (_, _), (a, b) = piece.matrix.tolist()
@@ -116,7 +116,7 @@ def slope_of(problem: Problem, phase: Phase) -> Callable[[float, Floats], list[f
 
 
 def event_of(problem: Problem, phase: Phase, clock: Clock) -> Callable[[float, Floats], float]:
-    """Return what rises through zero at the end of a piece; it looks at the clock too, once a step."""
+    """Return a function that rises through zero at the end of a piece; it also checks the clock at each step."""
     piece, w, shift = problem.pieces[phase], problem.angular_frequency, problem.forcing_phase
     row, load, constant = piece.event_row, piece.event_load, piece.event_constant
 
@@ -128,5 +128,5 @@ def event_of(problem: Problem, phase: Phase, clock: Clock) -> Callable[[float, F
 
 
 def longest_step(problem: Problem, phase: Phase) -> float:
-    """Return the largest step of a piece, s; infinite where it does not matter."""
+    """Return the largest step of a piece, s; infinite where any step is allowed."""
     return HELD_STEP * problem.period if phase == Phase.HELD else math.inf

@@ -1,8 +1,8 @@
-"""FMPy's own importer (`simulate_fmu`) with our FMUs: co-simulation in FMI 3.0 and 2.0, model exchange by CVode.
+"""FMPy's own importer (`simulate_fmu`) with this package's FMUs: co-simulation in FMI 3.0 and 2.0, and CVode.
 
-What is set is the output interval of co-simulation, FMPy's step: between two rows the FMU is exact, but
-it tells its last impact alone, so that of several between two rows all but one are missed. And the tolerance of CVode,
-whose rows come at events too. Archives are unpacked and descriptions are read outside of the time that is measured.
+The setting of co-simulation is the output interval, FMPy's step. Between two rows the FMU is exact, but it reports only
+its last impact: FMPy misses all but one of several impacts between two rows. The setting of model exchange is the
+tolerance of CVode, whose rows come at events too. The measured time excludes unpacking and reading of descriptions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.study.ways.all_ways import INTEGRATOR_TOLERANCES
 from vibroimpact.orchestrator.study.ways.trials import ROWS_A_PERIOD
 
 ROWS = (1.0, 16.0, 256.0)
-"""Rows of co-simulation in a period."""
+"""Rows of co-simulation per forcing period."""
 OUTPUT = (
     "displacement",
     "velocity",
@@ -60,7 +60,7 @@ def _run(
 
 
 def opened(version: str, kind: str, problem: Problem, setting: float, clock: Clock) -> Run:
-    """Return what simulates a problem by one version and kind of its FMU."""
+    """Return a function that simulates a problem by one version and kind of its FMU."""
     folder = str(unpack(fmu_path(problem.scene.body.FMU, version)).folder)
     if kind == "CoSimulation":
         options: dict[str, Any] = {
@@ -78,7 +78,7 @@ def opened(version: str, kind: str, problem: Problem, setting: float, clock: Clo
         except LateError:
             raise
         except Exception as error:
-            # FMPy raises plain Exception where a solver gives up
+            # FMPy raises a plain Exception when a solver gives up
             raise ArithmeticError(f"FMPy: {error}") from error
         new = np.flatnonzero(np.diff(rows["contact[1].count"], prepend=0) > 0)
         times, speeds = rows["contact[1].last_time"][new], rows["contact[1].last_velocity"][new]

@@ -1,4 +1,4 @@
-"""Our own run: the stop inside the body's FMU, one step over the whole motion, impacts and rests recorded."""
+"""This package's own run: the stop inside the body's FMU, one step over the motion, impacts and rests recorded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAME = "fused FMU"
 
 
 def opened(problem: Problem, setting: float, clock: Clock) -> Run:
-    """Return what simulates a problem; there is nothing to set."""
+    """Return a function that simulates a problem; the setting has no effect."""
     runner = open_runner(
         problem.scene.with_values({"record.impacts": True, "record.extrema": False}), "fused"
     )
@@ -29,5 +29,5 @@ def opened(problem: Problem, setting: float, clock: Clock) -> Run:
 
 
 def ways() -> list[Way]:
-    """Return the one way."""
+    """Return the single way of this package."""
     return [Way(NAME, "", "", lambda problem: (math.nan,), opened, ours=True)]

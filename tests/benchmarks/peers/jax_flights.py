@@ -1,7 +1,7 @@
 """diffrax, compiled by JAX: Dopri8 and Kvaerno5 with events, one motion or many at once (vmapped).
 
-The whole motion with all its impacts is one compiled loop. Events are found by Newton's method, as its pages advise;
-the motions of a batch differ in the amplitude of the force, as in a sweep, and the first is the one that is asked for.
+One compiled loop is the whole motion with all its impacts. Newton's method finds events, as diffrax's pages advise. The
+motions of a batch differ in the amplitude of the force, as in a sweep; the first has the amplitude of the problem.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from peers.ways import ABSOLUTE, Clock, Found, Run, Way, observed, tolerances
 from vibroimpact.orchestrator.study.observation import Floats
 
 BATCH = 128
-"""Motions that are simulated at once."""
+"""Motions simulated at once."""
 SPREAD = 1e-3
-"""Of the force's amplitude in a batch, relative."""
+"""Spread of the force's amplitude in a batch, relative."""
 FIRST_STEP = 1e-2
 """First step of a flight that does not start on the stop, over the period."""
 ROOT = 1e-10
-"""Last step of the search for a root, whose convergence is quadratic; relative to the time."""
+"""Last step of the root search relative to the time; its convergence is quadratic."""
 MOST_STEPS = 200_000
-"""Of one flight."""
+"""Largest number of steps of one flight."""
 ROOM, MOST_RESTS = 400, 16
-"""Impacts and rests that there is room for."""
+"""Largest numbers of impacts and of rests."""
 
 
 def one_thread() -> None:
-    """Keep JAX to one thread and to double precision: before it is imported for the first time."""
+    """Set JAX to one thread and to double precision; to be called before JAX is first imported."""
     os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
     os.environ["JAX_ENABLE_X64"] = "1"
     os.environ["JAX_PLATFORMS"] = "cpu"
 
 
 class Numbers(NamedTuple):
-    """The numbers of a problem, which a compiled function is given: rungs of a ladder share it."""
+    """The parameters of a problem, as arguments of a compiled function: rungs of a ladder share the function."""
 
     matrices: Floats
     loads: Floats
@@ -60,7 +60,7 @@ class Numbers(NamedTuple):
 
 def _numbers(problem: Problem) -> Numbers:
     pieces = problem.pieces
-    numbers: Any = Numbers  # a row of arrays, then numbers
+    numbers: Any = Numbers  # arrays with one row for each piece, then numbers
     found: Numbers = numbers(
         *(
             np.array([getattr(piece, name) for piece in pieces])
@@ -80,7 +80,7 @@ def _numbers(problem: Problem) -> Numbers:
 
 @cache
 def _compiled(modes: int, rigid: bool, method: str, batch: int) -> Any:
-    """Return the compiled function: amplitudes, tolerance, slow rebound and numbers to what became of each motion."""
+    """Return the compiled function from amplitudes, tolerance, slow rebound and numbers to each motion's results."""
     import diffrax
     import jax
     import jax.numpy as jnp
@@ -99,14 +99,14 @@ def _compiled(modes: int, rigid: bool, method: str, batch: int) -> Any:
         return p.rows[phase] @ y + p.event_loads[phase] * wave + p.event_constants[phase]
 
     def struck(t: Any, y: Any, size: Any, slow: Any, p: Any) -> Any:
-        """Return the state after a rigid impact, whether the body rests, when the rest began, the first step."""
+        """Return the state after a rigid impact, whether the body rests, the start of the rest, and the first step."""
         r, speed = p.restitution, p.shape @ y[n:]
         y = y.at[:n].add(p.direction * (p.position - p.shape @ y[:n]))
         still = y.at[n:].add(-p.direction * speed)
         pull = -event(t, still, (int(Phase.HELD), size, p))
         rests = (r * speed < slow) & (pull > 0.0)
         after = jnp.where(rests, still, y.at[n:].add(-p.direction * (1.0 + r) * speed))
-        # a rest may be in no hurry; a bounce begins with half of its ballistic length
+        # any first step suits a rest; a bounce starts with half of its ballistic length
         first = jnp.where(rests | (pull <= 0.0), FIRST_STEP * _period(p), r * speed / pull)
         return after, rests, t + 2.0 * r * speed / (pull * (1.0 - r)), first
 
@@ -125,7 +125,7 @@ def _compiled(modes: int, rigid: bool, method: str, batch: int) -> Any:
                 diffrax.ODETerm(slope),
                 solver,
                 t,
-                # the force of a rest is watched over a part of the period at a time
+                # a rest is followed over a part of the period at a time, to see its release
                 jnp.where(phase == Phase.HELD, jnp.minimum(t + HELD_STEP * period, end), end),
                 jnp.minimum(first, end - t),
                 y,
@@ -178,7 +178,7 @@ def _compiled(modes: int, rigid: bool, method: str, batch: int) -> Any:
 
 
 def opened(method: str, batch: int, problem: Problem, tolerance: float, clock: Clock) -> Run:
-    """Return what simulates a problem with one solver of diffrax; it is compiled here, by a first run."""
+    """Return a function that simulates a problem with one solver of diffrax; a first run compiles it here."""
     import jax
 
     ready: Any = jax.block_until_ready
@@ -211,7 +211,7 @@ def _period(p: Any) -> Any:
 def ways() -> list[Way]:
     """Return one motion by an explicit and by an implicit solver, and many by the explicit one.
 
-    A batch by the implicit one takes minutes on the beam, and nothing ends what is compiled.
+    A batch by the implicit solver takes minutes on the beam, and a compiled run cannot be stopped.
     """
 
     def way(method: str, batch: int) -> Way:

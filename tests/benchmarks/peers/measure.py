@@ -20,12 +20,12 @@ from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, Errors, errors_
 from vibroimpact.orchestrator.study.references import Reference
 
 CAP = 2.0
-"""Processor time that one run of a problem may take, s."""
+"""Longest processor time of one run of a problem, s; a longer run is a failure."""
 ROUNDS = 3
 LONG = 0.25
-"""Processor time of a run, s, above which it is timed once and not in each round."""
+"""Processor time of a run, s, above which it is timed only in the first round."""
 LEAST = 0.02
-"""Processor time of a measurement, s: what is quicker is run several times in it."""
+"""Processor time of a measurement, s: a quicker run is repeated until it is used up."""
 MODULES = {
     "scikit-sundae": "sksundae",
     "diffrax": "diffrax",
@@ -42,17 +42,17 @@ class Row:
     Attributes
     ----------
     error : float
-        Relative; NaN where there is a failure.
+        Relative error; NaN where there is a failure.
     failure : str
-        What is wrong; empty where nothing is.
+        Reason of a failure; empty without one.
     seconds : list of float
-        Processor time of a run over the periods that it simulates, s, of each round.
+        Processor time of a run over its number of forcing periods, s, in each round.
     rest_error : float
-        Of the end of the first chatter, over the period; NaN where none was seen, or there is none.
+        Error of the end of the first chatter, over the period; NaN where there is none.
     impacts_seen : int
-        Of a ladder: the rungs above the stop whose impact was found.
+        In a ladder: number of rungs above the stop whose impact was found.
     growth : list of float
-        Relative error of the velocity of each of the first impacts of chaotic motion; empty elsewhere.
+        Relative velocity error of each of the first impacts of chaotic motion; empty elsewhere.
     """
 
     case: str
@@ -69,7 +69,7 @@ class Row:
 
     @property
     def cost(self) -> float:
-        """Median processor time of a forcing period, s; NaN where nothing was timed."""
+        """Median processor time per forcing period, s; NaN without a timing."""
         return statistics.median(self.seconds) if self.seconds else math.nan
 
     def record(self) -> dict[str, Any]:
@@ -88,12 +88,12 @@ def all_ways() -> list[Way]:
 
 
 def is_installed(way: Way) -> bool:
-    """Return whether the package of a way is there."""
+    """Return whether the package of a way is installed."""
     return not way.package or find_spec(MODULES[way.package]) is not None
 
 
 def measured(case: Case) -> tuple[list[Row], dict[str, float]]:
-    """Measure all ways on a case; also return how far the reference may be off, and is from the second road."""
+    """Measure all ways on a case; also return the reference's estimated error, and its distance from the second."""
     known = {name: reference(problem) for name, problem in case.rungs.items()}
     roads = [off_second_road(problem, known[name], case.quantity) for name, problem in case.rungs.items()]
     rows: list[Row] = []
@@ -123,14 +123,14 @@ def measured(case: Case) -> tuple[list[Row], dict[str, float]]:
 
 
 def estimate(known: Reference, quantity: str) -> float:
-    """Return how far a reference may be off in a quantity, or in the worst of all."""
+    """Return the estimated error of a reference in a quantity, or the largest of all quantities."""
     return max(known.error.values()) if quantity == "all" else known.error[quantity]
 
 
 def _tried(
     case: Case, known: Mapping[str, Reference], way: Way, setting: float, row: Row
 ) -> tuple[list[Run], int] | None:
-    """Run a way once, and note its error; None where it has no time worth measuring."""
+    """Run a way once, and note its error; None where the run failed or was too slow."""
     runs: list[Run] = []
     found: list[Found] = []
     try:
@@ -161,7 +161,7 @@ def _tried(
 
 
 END_OF_CHATTER = 2.50982609171410943
-"""Of examples/chatter.toml: equations.md 9, found there in 40 digits."""
+"""End of the first chatter of examples/chatter.toml, s: from equations.md 9, computed there in 40 digits."""
 
 
 def _failure(case: Case, known: Mapping[str, Reference], errors: Sequence[Errors]) -> tuple[str, int]:
@@ -178,7 +178,7 @@ def _failure(case: Case, known: Mapping[str, Reference], errors: Sequence[Errors
 
 
 def _seconds(runs: Sequence[Run]) -> float:
-    """Return the processor time of one run of each, s."""
+    """Return the processor time of one run of all given runs, s."""
     gc.collect()
     count, began = 0, time.process_time()
     while True:
@@ -191,7 +191,7 @@ def _seconds(runs: Sequence[Run]) -> float:
 
 
 def cost_of_a_run(problem: Problem) -> float:
-    """Return the median processor time of a fused run of a problem, s: of a short one, what any run costs."""
+    """Return the median processor time of a fused run, s; a short problem gives the fixed cost of a run."""
     run = fused.opened(problem, math.nan, Clock(CAP))
     run()
     return statistics.median(_seconds([run]) for _ in range(ROUNDS))

@@ -13,7 +13,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def with_measurement(text: str, record: Mapping[str, Any]) -> str:
-    """Return a page with what is between the two markers made from the record anew.
+    """Return a page whose text between the two markers is made anew from the record.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _table(record: Mapping[str, Any]) -> str:
 
 
 def _error(error: float, known: float) -> str:
-    """Return an error; below what the reference is known to, that."""
+    """Return an error as text, or "<" and the error of the reference where that is larger."""
     return f"{error:.0e}" if error > known else f"< {known:.0e}"
 
 

@@ -1,8 +1,8 @@
 """The six problems: scenes of this package, and the linear pieces of their motion that other solvers integrate.
 
-Each is a body of N modes under a harmonic force with one stop above it. Between two events its motion is linear,
-y' = matrix y + load cos(Omega t + phase) + constant with y = (q, q'), and the next event is the rise of another linear
-form through zero. So all solvers are given the same few arrays.
+Each is a body of N modes under a harmonic force with one stop above it. Its motion between two events is linear,
+y' = matrix y + load cos(Omega t + phase) + constant with y = (q, q'). The next event is the rise of another linear form
+through zero. So all solvers get the same few arrays.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from vibroimpact.orchestrator.study.references import scales_of
 
 SEED_ORBIT = ImpactOscillator(1.0, 0.2, 1.0, 0.5, 1.0, 0.7)
 GRAZES = tuple(10.0**-n for n in range(2, 13))
-"""How far the peak of a motion is above its stop, or below it, over the stop's distance."""
+"""Distance of the peak of a motion from its stop, above and below, over the stop's position."""
 
 
 class Phase(IntEnum):
-    """How the body stands to its stop, in the order of `Problem.pieces`."""
+    """State of the contact between body and stop, in the order of `Problem.pieces`."""
 
     FREE = 0
     HELD = 1
@@ -38,12 +38,12 @@ class Phase(IntEnum):
     PRESSED = 2
     """In contact with a compliant stop."""
     SLACK = 3
-    """Off a compliant stop that it has compressed, still beyond its rest position."""
+    """Separated from a compressed compliant stop, but still beyond the stop's rest position."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A linear piece of the motion; it ends where event_row y + event_load cos(...) + event_constant rises through 0"""
+    """A linear piece of the motion, up to a rise of event_row y + event_load cos(...) + event_constant through 0."""
 
     matrix: Floats
     load: Floats
@@ -55,12 +55,12 @@ class Piece:
 
 @dataclass(frozen=True)
 class Problem:
-    """One motion to be simulated, from time 0 to its end.
+    """One motion, from time 0 to its end.
 
     Attributes
     ----------
     scene : Scene
-        What this package runs.
+        The scene that this package runs.
     natural, damping, shape, force : ndarray, shape (mode,)
         Angular frequencies (rad/s), 2 zeta w (1/s), shape at the stop (kg^-1/2), modal force (N kg^-1/2).
     """
@@ -88,34 +88,34 @@ class Problem:
 
     @property
     def angular_frequency(self) -> float:
-        """Of the force, rad/s."""
+        """Angular frequency of the force, rad/s."""
         assert self.scene.forcing is not None
         return self.scene.forcing.angular_frequency
 
     @property
     def forcing_phase(self) -> float:
-        """Of the force at time 0, rad."""
+        """Phase of the force at time 0, rad."""
         assert self.scene.forcing is not None
         return self.scene.forcing.phase
 
     @property
     def period(self) -> float:
-        """Of the force, s."""
+        """Period of the force, s."""
         return 2.0 * math.pi / self.angular_frequency
 
     @cached_property
     def end(self) -> float:
-        """When the recorded periods of the scene end, s; the first begins where the force has phase 0."""
+        """End of the scene's recorded periods, s; the first of them starts at phase 0 of the force."""
         return scales_of(self.scene).window[1]
 
     @property
     def periods(self) -> float:
-        """How many are simulated."""
+        """Number of simulated forcing periods."""
         return self.end / self.period
 
     @property
     def start(self) -> Floats:
-        """(q, q') at time 0."""
+        """State (q, q') at time 0."""
         body = self.scene.body
         if not isinstance(body, OscillatorBody):
             return np.zeros(2 * self.modes)
@@ -129,13 +129,13 @@ class Problem:
 
     @cached_property
     def pieces(self) -> tuple[Piece, ...]:
-        """The pieces, by `Phase`."""
+        """The linear pieces, in the order of `Phase`."""
         n, phi, a = self.modes, self.shape, self.stop.position
         none = np.zeros(n)
         free = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.natural**2), -np.diag(self.damping)]])
         load = np.concatenate([none, self.force])
         gap = np.concatenate([phi, none])
-        # contact force of a body that is held: what takes away the acceleration of the contact (equations.md 3.4)
+        # the contact force of a held body cancels the acceleration of the contact point (equations.md 3.4)
         holds = np.concatenate([none, self.direction])
         row = phi @ free[n:]
         held = Piece(
@@ -149,7 +149,7 @@ class Problem:
         pieces = [Piece(free, load, np.zeros(2 * n), gap, 0.0, -a), held]
         if not self.is_rigid:
             rate = self.stop.damping / self.stop.stiffness
-            # the force over the stiffness, a length: events are looked for in the same unit
+            # the force over the stiffness is a length, the unit of all event functions
             press = np.concatenate([phi, rate * phi])
             push = self.stop.stiffness * np.concatenate([none, phi])
             pieces += [
@@ -163,7 +163,7 @@ class Problem:
         return float(self.shape @ y[: self.modes]), float(self.shape @ y[self.modes :])
 
     def pull(self, t: float, y: Floats) -> float:
-        """Return the acceleration into the stop of a body that is on it and not moving towards it, m/s^2."""
+        """Return the acceleration into the stop of a body at rest on it, m/s^2."""
         still = y.copy()
         still[self.modes :] -= self.direction * self.contact(y)[1]
         held = self.pieces[Phase.HELD]
@@ -173,15 +173,15 @@ class Problem:
 
 @dataclass(frozen=True)
 class Case:
-    """A line of the study: one problem, or several that are rungs of a ladder.
+    """A line of the study: one problem, or several as rungs of a ladder.
 
     Attributes
     ----------
     key, title : str
     quantity : str
-        What the error is of, as `vibroimpact accuracy --of` has it.
+        Quantity of the error, a value of `vibroimpact accuracy --of`.
     rungs : mapping of str to Problem
-        By a name each.
+        Problems by name.
     """
 
     key: str
@@ -254,7 +254,7 @@ def cantilever(modes: int, periods: int) -> Problem:
 
 
 def orbit(periods: int) -> Problem:
-    """Return the P(1,1) motion, from a point of it in the middle of a flight."""
+    """Return the P(1,1) motion, starting in the middle of a flight."""
     ((velocity, theta),) = SEED_ORBIT.single_impact_motions(1.0)
     start = flown(SEED_ORBIT, (1.0, -SEED_ORBIT.restitution * velocity), theta, math.pi)
     stop = {"position": 1.0, "restitution": SEED_ORBIT.restitution}
@@ -274,7 +274,7 @@ def flown(
         return turned.real, (1j * frequency * turned).real
 
     x, v = state[0] - forced(0.0)[0], state[1] - forced(0.0)[1]
-    # the free motion is the real part of size exp(rate u)
+    # the free motion is the real part of size * exp(rate u)
     size = complex(x, (rate.real * x - v) / rate.imag)
     free = size * complex(math.cos(rate.imag * duration), math.sin(rate.imag * duration))
     free *= math.exp(rate.real * duration)
@@ -283,10 +283,10 @@ def flown(
 
 
 def graze(excess: float) -> Problem:
-    """Return a steady motion whose peak is above its stop by a share of the stop's distance, or below it.
+    """Return a steady motion whose peak is above its stop (or below it) by a share of the stop's position.
 
-    It starts from its trough; its peak is in the middle of the one period that is simulated. A damping ratio of .1 and
-    an angular frequency of .7; the stop is at 1.
+    It starts from its trough, and lasts one period with its peak in the middle. The damping ratio is .1, the angular
+    frequency .7, and the stop is at 1.
     """
     zeta, frequency = 0.1, 0.7
     size = math.hypot(1.0 - frequency**2, 2.0 * zeta * frequency)
@@ -299,7 +299,7 @@ def graze(excess: float) -> Problem:
 
 
 def cases() -> list[Case]:
-    """Return the six, in the order of the issue."""
+    """Return the six cases, in the order of the issue."""
     above = {f"peak above the stop by {e:.0e}": graze(e) for e in GRAZES}
     below = {f"peak below the stop by {e:.0e}": graze(-e) for e in GRAZES}
     chaos = {"position": 0.0, "restitution": 0.8}

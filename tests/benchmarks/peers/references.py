@@ -1,8 +1,8 @@
-"""What errors are measured against, and how far a second, independent road is from it.
+"""The reference of all errors, and its distance from a second, independent computation.
 
-The reference is that of `vibroimpact accuracy`: the closed form on the P(1,1) orbit, else the fused run. A second road
-is that of the tests of structures: DOP853 between events at a relative tolerance of 1e-13, nothing of ours. On grazes,
-of which that has half the digits, it is the 40-digit flow of `tests/support/exact_motion.py`.
+The reference is that of `vibroimpact accuracy`: the closed form on the P(1,1) orbit, else the fused run. The second
+computation is that of the tests of structures: DOP853 between events at a relative tolerance of 1e-13, without code of
+this package. It has half the digits on grazes, so the 40-digit flow of `tests/support/exact_motion.py` replaces it.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ def reference(problem: Problem) -> Reference:
 
 
 def off_second_road(problem: Problem, known: Reference, quantity: str) -> float:
-    """Return the error of the second road against the reference; NaN where it is compared by no impact.
+    """Return the error of the second computation against the reference; NaN where no impact is compared.
 
     Raises
     ------
     ArithmeticError
-        The two do not have the same impacts.
+        The two computations do not have the same impacts.
     """
     if quantity == "impact_time":
         return _off_exact(problem, known)
@@ -61,7 +61,7 @@ def off_second_road(problem: Problem, known: Reference, quantity: str) -> float:
 
 
 def _off_exact(problem: Problem, known: Reference) -> float:
-    """Return how far the first impact of a graze is from that of the exact flow, over the period."""
+    """Return the distance of the first impact of a graze from the exact flow's, over the period."""
     if not len(known.observation.impacts):
         return math.nan
     body = Oscillator(1.0, problem.damping[0], 1.0, problem.force[0], problem.angular_frequency)

@@ -1,4 +1,4 @@
-"""scipy's `solve_ivp` with terminal events: RK45, DOP853 and Radau, which is given its Jacobian."""
+"""scipy's `solve_ivp` with terminal events: RK45, DOP853, and Radau with its Jacobian."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ METHODS = ("RK45", "DOP853", "Radau")
 
 
 def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run:
-    """Return what simulates a problem with one method of `solve_ivp` at a tolerance."""
+    """Return a function that simulates a problem with one method of `solve_ivp` at a tolerance."""
     phases = list(Phase)[: len(problem.pieces)]
     slopes = [slope_of(problem, phase) for phase in phases]
     events: list[Any] = [event_of(problem, phase, clock) for phase in phases]

@@ -1,10 +1,11 @@
-"""MuJoCo: steps of equal size, the stop a soft limit of a tendon that reads off the contact point, all steps in C.
+"""MuJoCo: steps of equal size, the stop a soft limit of a tendon that measures the contact point, all steps in C.
 
-Each mode is a slide joint with its spring and dashpot, the force a motor on a second tendon. A limit is a spring
-and a dashpot that push only; with negative `solref` they are given directly, and with the smallest `solimp` they are
-added to the other forces. So a Kelvin-Voigt stop is the same model but for 1e-4 of the other forces. A rigid stop is
-another model: a contact of ten steps with the damping ratio that gives a rigid mass its restitution (equations.md 6.9),
-which becomes stiffer as steps become shorter. Impacts are crossings of the stop between two steps, interpolated.
+Each mode is a slide joint with its spring and dashpot; the force is a motor on a second tendon. A limit is a spring and
+a dashpot that only push. A negative `solref` gives them directly, and the smallest `solimp` adds them to the other
+forces. So a Kelvin-Voigt stop is the same model up to 1e-4 of the other forces.
+
+A rigid stop is another model: a contact of ten steps, which becomes stiffer as steps become shorter. Its damping ratio
+gives a rigid mass its restitution (equations.md 6.9). Impacts are interpolated crossings of the stop between two steps.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from vibroimpact.orchestrator.study.ways.equal_restitution import damping_ratio_
 
 STEPS_A_PERIOD = (500.0, 5_000.0)
 CONTACT_STEPS = 10.0
-"""Length of a contact that stands for a rigid one, steps."""
+"""Length of a contact that replaces a rigid impact, steps."""
 IMPEDANCE = 1e-4
-"""The smallest that MuJoCo takes."""
+"""Smallest impedance that MuJoCo accepts."""
 REST = 0.05
-"""A contact that lasts longer is a rest, over the period."""
+"""Length of a contact, over the period, above which it is a rest."""
 INTEGRATORS = ("Euler", "RK4")
 
 
@@ -52,7 +53,7 @@ def model_of(problem: Problem, step: float, integrator: str) -> str:
 
 
 def _limit(problem: Problem, step: float) -> tuple[float, float]:
-    """Return stiffness and damping of the limit, over the mass that meets it: 1/s^2 and 1/s."""
+    """Return stiffness and damping of the limit over the effective mass at the stop: 1/s^2 and 1/s."""
     share = float(problem.shape @ problem.shape)
     if not problem.is_rigid:
         return share * problem.stop.stiffness, share * problem.stop.damping
@@ -62,11 +63,11 @@ def _limit(problem: Problem, step: float) -> tuple[float, float]:
 
 
 def opened(integrator: str, problem: Problem, steps: float, clock: Clock) -> Run:
-    """Return what simulates a problem by so many steps a period."""
+    """Return a function that simulates a problem by `steps` steps a period."""
     import mujoco
     from mujoco import rollout
 
-    # else it writes a file where the command was given; a motion that fails shows in its error
+    # without this MuJoCo writes a log file into the current folder; the error of a failed motion shows it anyway
     mujoco.set_mju_user_warning(lambda _: None)
     count = math.ceil(problem.end / problem.period * steps)
     step = problem.end / count
@@ -77,7 +78,7 @@ def opened(integrator: str, problem: Problem, steps: float, clock: Clock) -> Run
     spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.empty(mujoco.mj_stateSize(model, spec))
     mujoco.mj_getState(model, data, start, spec)
-    # the force is held over a step: that of its middle
+    # the force is constant over a step, with its value at the middle
     instants = (np.arange(count) + 0.5) * step
     force = np.cos(problem.angular_frequency * instants + problem.forcing_phase)[None, :, None]
     states = np.empty((1, count, start.size))

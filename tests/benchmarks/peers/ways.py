@@ -1,4 +1,4 @@
-"""What a way of simulating a problem is to the measurement."""
+"""A way of simulating a problem, as the measurement sees it: settings, a function that runs, and a result."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from peers.problems import Problem
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
-"""Relative tolerances of the integrators; the absolute one is a thousandth of it."""
+"""Relative tolerances of the integrators; the absolute tolerance is a thousandth of each."""
 ABSOLUTE = 1e-3
 
 
 class LateError(Exception):
-    """A run took more processor time than it may."""
+    """A run exceeded its processor time."""
 
 
 class Clock:
-    """Processor time that a run may take.
+    """Limit of the processor time of a run.
 
     Parameters
     ----------
@@ -33,27 +33,27 @@ class Clock:
         self.start()
 
     def start(self) -> None:
-        """Count from now."""
+        """Restart the count."""
         self._end = time.process_time() + self.seconds
 
     def check(self) -> None:
-        """Raise `LateError` when the time is over."""
+        """Raise `LateError` when the time is used up."""
         if time.process_time() > self._end:
             raise LateError
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a run showed.
+    """Result of a run.
 
     Attributes
     ----------
     observation : Observation
         Impacts, and displacement and velocity of the contact point at the end.
     rests : ndarray, shape (rest,)
-        When each rest on the stop began, s: the ends of chatters.
+        Start of each rest on the stop, s: the end of its chatter.
     share : int
-        How many runs were made at once, over which the time is shared.
+        Number of runs made at once, which share the time.
     """
 
     observation: Observation
@@ -72,18 +72,18 @@ class Way:
     ----------
     name : str
     package : str
-        The distribution that it needs beside this package's own; empty for none.
+        Distribution that it needs in addition to this package's own; empty for none.
     knob : str
-        What is set.
+        Name of the setting.
     settings : callable
-        Given a problem: the values, from coarse to fine.
+        Function of a problem; returns the values, from coarse to fine.
     open : callable
-        Given a problem, a setting and the clock: what runs it. Whatever happens once (compilation, files) happens here,
-        outside of the time that is measured.
+        Function of a problem, a setting and the clock; returns the function that runs. Compilation and files cost time
+        only here, outside of the measurement.
     ours : bool
-        Whether the fused FMU does the work, whoever drives it.
+        Whether the fused FMU does the work, by whatever importer.
     batch : int
-        Motions in one run, each of which may take the time of a run.
+        Motions in one run; the time limit counts for each.
     """
 
     name: str
@@ -116,6 +116,6 @@ def with_tolerances(
 def observed(
     impacts: list[tuple[float, float]], final: tuple[float, float], failure: str = ""
 ) -> Observation:
-    """Return what a run showed from the times (s) and velocities (m/s) of its impacts on the one stop."""
+    """Return the result of a run, from times (s) and velocities (m/s) of the impacts on its one stop."""
     rows = np.array(impacts, dtype=float).reshape(-1, 2)
     return Observation(np.column_stack([rows, np.ones(len(rows))]), final=final, failure=failure)

@@ -22,7 +22,7 @@ VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural
                                                  const double p[], double tolerance);
 VI_DOOR void vi_door_structure_free(vi_door_structure *structure);
 
-/* Follow long rests by series too. */
+/* Follow long rests by series, in place of their exact flow. */
 VI_DOOR void vi_door_structure_by_series(vi_door_structure *structure);
 
 /* Record impacts and sticks, extremes of the point `observed`, periods; follow energies. */
@@ -34,7 +34,7 @@ VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double
 VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double duration, const double held[],
                                       const double held_rate[], double most_impacts);
 
-/* Why the last advance was given up with this result; message has room for VI_MESSAGE_LENGTH. */
+/* Write the reason why the last advance ended with this result; message has room for VI_MESSAGE_LENGTH. */
 VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int result, char message[]);
 
 /* Modal displacements and velocities, contact statuses and forces; facts: time, forcing work, damping loss, contact
@@ -42,7 +42,7 @@ VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int resul
 VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], double p[], int status[], double force[],
                                      double facts[6]);
 
-/* Move up to `room` rows of eight numbers (record.h) out of the record; returns how many. */
+/* Move up to `room` rows of eight numbers (record.h) out of the record; returns their number. */
 VI_DOOR int vi_door_structure_rows(vi_door_structure *structure, double rows[], int room);
 
 #endif

@@ -1,7 +1,7 @@
-/* A bouncing ball as many write it: flight is exact, but the ground is looked at only where a step ends.
+/* A bouncing ball with the usual mistake: flight is exact, but the ground is checked only at the end of a step.
  *
- * Inside a step the ball flies through the ground. If it then is on or below it and falls, it bounces, at the end
- * of the step: too late, and too fast, by up to g times the step. */
+ * Inside a step the ball flies through the ground. At the end of the step a ball on or below the ground that falls
+ * bounces. The bounce is too late, and too fast by up to g times the step. */
 #include <float.h>
 
 #include "model.h"

@@ -1,6 +1,6 @@
-/* A buffer on the ground, as other tools make one: a spring and a dashpot that begin at a position and never pull.
+/* A buffer on the ground, as other tools make one: a spring and a dashpot that start at a position and never pull.
  *
- * It says neither where that is nor on which side. Its answer is that of the end of a step, as many tools have it. */
+ * It reports neither position nor side. Its answer belongs to the end of a step, as in many tools. */
 #include "model.h"
 
 enum { D = 1, U, FORCE, STIFFNESS, DAMPING, GAP };

@@ -1,7 +1,7 @@
-/* A sampler with two input clocks: `tick` has a constant interval, `late` one that the FMU says at initialization.
+/* A sampler with two input clocks: `tick` has a constant interval, `late` one that the FMU gives at initialization.
  *
- * At a tick of `tick` y = 10 ticks + u, of that instant; u and y are variables of that clock and may be touched only while
- * it ticks. `late` counts alone. sum' = ticks + late_ticks, which shows between its ticks when they were. */
+ * At a tick of `tick` y = 10 ticks + u of that instant. u and y are variables of that clock: they are accessible only
+ * while it ticks. `late` only counts. sum' = ticks + late_ticks, so the sum reveals the times of the ticks. */
 #include "fmi3Functions.h"
 #include "model.h"
 

@@ -1,6 +1,6 @@
-/* An integrator, y' = u, that misbehaves as told by `fault`: in every step that ends at or after `fault_time`, or where
- * `fault_place` says, there after `fault_after` calls of this process that go well. What happens before parameters
- * can be set is told by the environment: VIBROIMPACT_FAULTY_LOAD, VIBROIMPACT_FAULTY_INSTANTIATE. */
+/* An integrator, y' = u, with the fault `fault` in every step that ends at or after `fault_time`. With `fault_place`
+ * the fault comes in that call, after `fault_after` good calls in this process. Two variables of the environment bring
+ * a fault before parameters can be set: VIBROIMPACT_FAULTY_LOAD, VIBROIMPACT_FAULTY_INSTANTIATE. */
 #if defined(__linux__)
 #define _GNU_SOURCE
 #endif
@@ -53,7 +53,7 @@ enum {
     FAULT_BY_INPUT,
     FAULT_PENDING
 };
-/* s; a lie that lies beyond every run */
+/* s; a false end of a step, beyond every run */
 #define BEYOND 360000.0
 #define PAST (-1e9)
 enum { LOGGED_LINES = 1000000, PRINTED_LINES = 100000 };
@@ -118,7 +118,7 @@ static void flood_output(void)
     fflush(stdout);
 }
 
-/* A process that stays, in this one's session or in one of its own. */
+/* Start a process that stays, in this one's session or in one of its own. */
 static void start_process(bool away)
 {
     if (fork() == 0) {
@@ -138,7 +138,7 @@ static void flush_to_zero(void)
 #endif
 }
 
-/* Lines that are no text, one without words, one longer than any buffer. */
+/* Log a line that is no text, one without words, and one longer than any buffer. */
 static void log_strangely(double time, void *instance)
 {
     static char word[100000];
@@ -152,7 +152,7 @@ static void corrupt_heap(void)
 {
     signal(SIGSEGV, SIG_DFL);
     char *block = malloc(24);
-    /* kept from the compiler's sight, which would refuse it */
+    /* hidden from the compiler, which would refuse it */
     char *volatile inside = block + 8;
     free(inside);
 }
@@ -164,7 +164,7 @@ static void close_files(void)
     }
 }
 
-/* What any call can do; false: nothing of these. */
+/* Do a fault that is possible in any call; false: the fault is another one. */
 static bool misbehave_anywhere(int fault, double time, void *instance)
 {
     switch (fault) {
@@ -224,7 +224,7 @@ static step_answer says(model *m, double time)
     return STEP_SAYS;
 }
 
-/* The fault that is asked for; with `by_input` one input of a hundred brings each of three. */
+/* Return the fault of this call; with `by_input` one input of a hundred brings each of three faults. */
 static int asked_for(const model *m)
 {
     if ((int)m->value[FAULT] != FAULT_BY_INPUT) {
@@ -276,7 +276,7 @@ static step_answer misbehave(model *m, double time, void *instance)
     return STEP_DONE;
 }
 
-/* Has this call its turn? It has from the call after `fault_after` ones on, which this process counts. */
+/* Whether this call is faulty: the calls of this process after the first `fault_after` ones are. */
 static bool is_due(const model *m, occasion where)
 {
     static int calls[PLACES];
@@ -333,7 +333,7 @@ bool model_update(model *m)
     if ((int)m->value[FAULT] != FAULT_ENDLESS_EVENTS || m->time < m->value[FAULT_TIME]) {
         return false;
     }
-    /* another value each time, so that waiting for outputs that stay the same does not help either */
+    /* another value each time: the outputs never settle either */
     m->value[Y] = m->value[Y] > 0.0 ? -1.0 : 1.0;
     return true;
 }

@@ -1,5 +1,5 @@
-/* FMI 2.0 co-simulation of the model that it is compiled with. Strict where importers get it wrong: the
- * communication point must be where the FMU is, and steps go forward. */
+/* FMI 2.0 co-simulation of the model that it is compiled with. Strict about common mistakes of importers: the
+ * communication point must be the FMU's own time, and steps go forward. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* FMI 3.0 co-simulation of the model that it is compiled with. Strict where importers get it wrong: the
- * communication point must be where the FMU is, steps go forward, and event mode is for those who asked for it. */
+/* FMI 3.0 co-simulation of the model that it is compiled with. Strict about common mistakes of importers: the
+ * communication point must be the FMU's own time. Steps go forward, and event mode needs a request for it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
-/* A mass on a spring of its own that knows nothing of contacts: displacement and velocity out, a force in, which is
- * held over a step.
+/* A mass on a spring of its own, without contacts. Displacement and velocity go out; a force comes in, and is constant
+ * over a step.
  *
- * mass x'' + stiffness x = f + load, on its exact flow or by Euler steps; as bodies are that take no impulse too. */
+ * mass x'' + stiffness x = f + load, on its exact flow or by Euler steps. Some schemes take no impulse, as some bodies. */
 #include <math.h>
 
 #include "model.h"
@@ -63,7 +63,7 @@ static void euler(double *x, double size)
     }
 }
 
-/* Multiples of the inner step in a step. */
+/* Return the number of multiples of the inner step in a step. */
 static double grid_steps(const model *m, double size)
 {
     const double before = m->time / m->value[INNER_STEP], after = (m->time + size) / m->value[INNER_STEP];

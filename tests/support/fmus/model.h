@@ -1,5 +1,5 @@
-/* What a model of these FMUs is: a flat struct, and what happens in a step. The adapters fmi2.c and fmi3.c do the
- * rest, and are compiled once for each model. */
+/* A model of these FMUs: a flat struct, and a function for a step. The adapters fmi2.c and fmi3.c do the rest; they are
+ * compiled once for each model. */
 #ifndef TEST_MODEL_H
 #define TEST_MODEL_H
 
@@ -8,7 +8,7 @@
 
 enum { MODEL_VALUES = 10 };
 
-/* Where an adapter is, as `fault_place` in the model descriptions of Faulty. */
+/* Call in which an adapter is, as `fault_place` in the model descriptions of Faulty. */
 typedef enum {
     AT_STEP,
     AT_INSTANTIATE,
@@ -24,7 +24,7 @@ typedef enum {
     PLACES
 } occasion;
 
-/* A state: copying it saves it. Integers and enumerations are kept as doubles too, and of texts the number of bytes. */
+/* A state: copying it saves it. Integers and enumerations are stored as doubles too; a text by its number of bytes. */
 typedef struct {
     double time;                /* s */
     double value[MODEL_VALUES]; /* by value reference; 0 is the time in FMI 3.0 and unused in FMI 2.0 */

@@ -1,3 +1,3 @@
-/* The mass without a state that can be kept: none of its steps can be repeated. */
+/* The mass without a state that can be saved: none of its steps can be repeated. */
 #define HAS_STATE false
 #include "mass.c"

@@ -1,7 +1,7 @@
-/* A bouncing ball with a solver of its own, as FMI's Reference-FMUs have it: explicit Euler in steps of 1 ms. Where a step
- * of the solver has ended on or below the ground, the ball bounces there, inside the step of the importer: h is then
- * the smallest positive number, and nobody who looks at the ends of steps sees it fall below 0. With event mode and
- * early return the step ends at the bounce, and event mode makes it. */
+/* A bouncing ball with a solver of its own, like FMI's Reference-FMUs: explicit Euler in steps of 1 ms. When a step of
+ * the solver ends on or below the ground, the ball bounces there, inside the step of the importer. h is then the
+ * smallest positive number, so the ends of steps never show h below 0. With event mode and early return the step ends
+ * at the bounce, and event mode makes it. */
 #include <float.h>
 #include <math.h>
 
@@ -9,7 +9,7 @@
 
 enum { H = 1, V, G, E, BOUNCES, SOLVER_TIME };
 
-/* Step of the solver, s; nearer than this a communication point is one of its own (s, absolute). */
+/* Step of the solver, s; distance within which a communication point counts as a solver step, s (absolute). */
 #define SOLVER_STEP 1e-3
 #define CLOSE 1e-5
 /* Velocity below which the ball stops bouncing, m/s. */

@@ -1,4 +1,4 @@
-/* The token of an FMU; that of a tool that looks at none is "*". */
+/* The token of an FMU; "*" stands for a tool that accepts every token. */
 #pragma once
 
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-"""Spectral density by Welch's method: the sums of the thesis (B.1, B.2), what they hold, and what is refused."""
+"""Spectral density by Welch's method: the sums of the thesis (B.1, B.2), its mean square, and its refusals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NOISE = np.random.default_rng(3).normal(0.3, 1.2, 16384)
 
 
 def test_the_density_is_the_mean_over_segments_of_the_thesis() -> None:
-    """The sums of equations.md 8.8, written out."""
+    """Compare with the sums of equations.md 8.8, written out."""
     size, rate = 1024, 500.0
     window = 1.0 - np.abs(np.arange(size) - size / 2) / (size / 2)
     segments = [NOISE[first : first + size] for first in range(0, NOISE.size - size + 1, size // 2)]

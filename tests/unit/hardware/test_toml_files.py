@@ -1,4 +1,4 @@
-"""TOML files that a user writes beside measurements: one that is too large is refused, and never read in part."""
+"""TOML files that a user writes beside measurements: a file that is too large is refused, never read in part."""
 
 from __future__ import annotations
 

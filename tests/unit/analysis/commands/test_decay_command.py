@@ -1,4 +1,4 @@
-"""`vibroimpact estimate` as a person uses it: tables, dataset, figure, and what it says of misuse."""
+"""`vibroimpact estimate` as a person uses it: tables, dataset, figure, and its messages on misuse."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_decay_is_printed_written_and_drawn(
         row = found.sel(estimator="law", quantity="coulomb")
         assert float(row.interval_low) < TRUTH.coulomb < float(row.interval_high)
         assert str(row.unit.values) == "m s-2"
-        # The motion under the law is the measured one but for its noise of .03.
+        # The motion under the law is the measured motion except for its noise of .03.
         assert float(np.std(found.measured - found.law_fit)) == pytest.approx(0.03, rel=0.1)
         assert set(found.law.values) == {
             "viscous", "coulomb", "quadratic", "viscous+coulomb", "viscous+quadratic", "coulomb+quadratic",
@@ -105,7 +105,7 @@ def test_misuse_leaves_with_2_and_says_what_to_do(
         ("{} --drive force --band 1 2", "response {} --drive force --band 1 2"),
         ("{} --forcing-frequency 10", "impacts {} --forcing-frequency 10"),
         ("{} --channel arm --law none", "decay {} --channel arm --law none"),
-        # what the options leave open the data decide
+        # the data decide where the options leave the kind open
         ("{} --channel arm --from 3 -o a.nc", "decay {} --channel arm --from 3 -o a.nc"),
         ("--from 3 {}", "decay --from 3 {}"),
         (
@@ -137,7 +137,7 @@ def test_a_simulated_free_decay_and_a_swept_resonance_need_no_options(
     assert estimate("decay", free, "--law", "none", "-o", tmp_path / "one.nc") == 0
     run_scene(parse_scene(BODY + SWEPT, "swept.toml"), swept)
     assert estimate("response", swept, "-o", tmp_path / "two.nc", "--figure", tmp_path / "two.png") == 0
-    # The scene: stiffness 800, mass 2, damping ratio .03.
+    # Numbers of the scene: stiffness 800, mass 2, damping ratio .03.
     for name, method in (("one.nc", "exponential"), ("two.nc", "response")):
         with xr.open_dataset(tmp_path / name) as found:
             values = found.estimate.sel(estimator=method)
@@ -167,12 +167,12 @@ def test_each_run_of_a_sweep_of_the_stop_is_estimated_with_its_own_stop(tmp_path
     assert estimate("impacts", swept, "--run", "1", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
         best = found.estimate.sel(estimator="trajectory")
-        # Held at the stop that the scene has written, the trajectories would not follow the motion.
+        # With the stop that the scene text has, the trajectories would not follow the motion.
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
 
 
 def test_an_accelerated_base_is_the_force_of_the_mass_turned_round(tmp_path: Path) -> None:
-    # The load per mass of the scene above, 4 N on 2 kg: relative to the base the motion differs in its sign only.
+    # The load per mass of the scene above, 4 N on 2 kg: relative to the base only the sign of the motion differs.
     based = IMPACTING.replace("amplitude = 4.0", 'kind = "base_acceleration"\namplitude = 2.0')
     run_scene(parse_scene(BODY + based, "base.toml"), tmp_path / "base.nc")
     assert estimate("impacts", tmp_path / "base.nc", "-o", tmp_path / "found.nc") == 0
@@ -185,7 +185,7 @@ def test_an_accelerated_base_is_the_force_of_the_mass_turned_round(tmp_path: Pat
 def test_a_clock_that_drifts_has_its_frequency_fitted_when_asked_for(tmp_path: Path) -> None:
     run = tmp_path / "impacts.nc"
     run_scene(parse_scene(BODY + IMPACTING, "impacts.toml"), run)
-    # The scene says 35 rad/s; the generator of an experiment would say something else.
+    # The scene has 35 rad/s; the generator of an experiment would state another frequency.
     assert (
         estimate(
             "impacts", run, "--angular-frequency", "35.03", "--clock-drifts", "-o", tmp_path / "found.nc"

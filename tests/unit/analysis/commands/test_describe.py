@@ -1,4 +1,4 @@
-"""`vibroimpact describe` of each kind of file: what it says, and that it says it of nothing else."""
+"""`vibroimpact describe` of each kind of file: its output, and its refusal of other files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibroimpact.analysis.spikes import spike_report
 
 
 def described(file: Path) -> list[str]:
-    """Return the lines that are printed of a file, runs of blanks as one."""
+    """Return the lines printed for a file, runs of blanks as one."""
     done = in_this_process("describe", file)
     assert done.returncode == 0, done.stderr
     return [" ".join(line.split()) for line in done.stdout.splitlines()]

@@ -1,4 +1,4 @@
-"""The command `vibroimpact spikes`, in this process: what it prints, what it writes, what it refuses."""
+"""The command `vibroimpact spikes`, in this process: its prints, its files, its refusals."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_remarks_of_the_import_are_counted_not_repeated(record: Path, tmp_path: 
 
 
 def test_masked_parts_of_an_observation_are_not_looked_at(tmp_path: Path) -> None:
-    # a beat each second, none from 40 to 60 s because nobody looked: no gap
+    # a beat each second, none from 40 to 60 s because that span was masked: no gap
     beats = np.array([float(n) for n in range(1, 100) if not 40 < n < 60])
     for name, attrs in (("seen", {}), ("masked", {"masked": np.array([40.0, 60.0])})):
         train = EventTrain("beats", beats, (0.0, 100.0), attrs=attrs)
@@ -137,7 +137,7 @@ def test_contact_time_and_the_sum_above_the_threshold_are_printed_for_each_spike
         for name, column, size in (("length", 1, 1e3), ("duration", 2, 1e3), ("impulse_above", 3, 1.0)):
             shown = [float(row[column]) for row in rows[:12]]
             assert shown == pytest.approx(size * data[f"spike_{name}"].values[:12], rel=1e-3)
-    # of a half-sine of 1 ms, 2/3 ms are above half of its peak, with cos(pi/6) of its impulse
+    # a half-sine of 1 ms is above half of its peak for 2/3 ms, with cos(pi/6) of its impulse
     assert float(rows[0][2]) == pytest.approx(2.0 / 3.0, rel=0.03)
     assert float(rows[0][3]) == pytest.approx(IMPULSE * np.cos(np.pi / 6.0), rel=0.02)
 

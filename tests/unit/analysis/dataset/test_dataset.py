@@ -68,7 +68,7 @@ def test_a_dataset_with_every_variable_has_nothing_for_the_cf_checker_to_say(
 ) -> None:
     path = written(everything(units=units), tmp_path)
     report = tmp_path / "report.json"
-    # In its own process: the checker's own warnings are not ours.
+    # In a process of its own: the checker's own warnings are not ours.
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CF_CHECK, path, report], capture_output=True, text=True
     )
@@ -246,7 +246,7 @@ def test_an_up_down_sweep_is_selected_by_direction_and_nearest_frequency(tmp_pat
     with open_dataset(written(up_down(), tmp_path)) as opened:
         assert opened.displacement_range.dims == ("direction", "angular_frequency")
         found = opened.displacement_max.sel(direction="down").sel(angular_frequency=1.9, method="nearest")
-        # On the way down the frequency 2 comes first: position 3 of the file.
+        # On the way down, frequency 2 comes first: position 3 of the file.
         assert found.values.tolist() == [4.0, 4.0, 4.0]
         assert int(opened.run_id.sel(direction="down", angular_frequency=0.0)) == 5
 
@@ -445,7 +445,7 @@ def test_parts_merge_into_the_order_of_the_campaign(tmp_path: Path) -> None:
     runs = [record(float(k), impacts=k, samples=1) for k in range(4)]
     whole = dataset_of(runs)
     late = dataset_of(runs[2:], run_index=[2, 3], coordinates={"angular_frequency": np.array([2.0, 3.0])})
-    # A part may be in any order inside too.
+    # A part may have its runs in any order, too.
     early = dataset_of(runs[1::-1], run_index=[1, 0], coordinates={"angular_frequency": np.array([1.0, 0.0])})
     merged = merge_datasets([written(late, tmp_path, "late.nc"), written(early, tmp_path, "early.nc")])
     xr.testing.assert_identical(merged, whole)
@@ -630,7 +630,7 @@ def test_a_run_with_an_impossible_value_is_marked_and_everything_is_written(
     xr.testing.assert_identical(
         stored.drop_vars(["outcome", "message"]), dataset.drop_vars(["outcome", "message"])
     )
-    # Joined with others it is as it was: what is marked is not marked again, and is no reason to refuse the whole.
+    # Merging with other parts leaves the run as it was: it is not marked twice, and the whole is not refused.
     again = read_flat(written(merge_datasets([tmp_path / "runs.nc"]), tmp_path, "again.nc"))
     xr.testing.assert_identical(again, stored)
     check(stored)
@@ -729,7 +729,7 @@ def test_sampled_variables_of_components_keep_their_own_names_as_attributes() ->
         "component_variable": "body.velocity",
         "units": "m/s",
     }
-    # Of a component's variable only its component knows the unit, whatever its name.
+    # Only the component knows the unit of its variable, whatever the variable's name.
     unknown = coupled_dataset([coupled_record(1.0, samples=1)], unit_of={})
     assert unknown["body_velocity"].attrs["units"] == "1"
     assert unknown["stop_contact_1_law"].attrs["units"] == "1"

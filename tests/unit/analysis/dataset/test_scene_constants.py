@@ -1,4 +1,4 @@
-"""What a scene does not sweep is in its dataset: datasets of two scenes stay told apart when they are joined."""
+"""Constants of a scene in its dataset: they keep datasets of two scenes apart after a join."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_two_stops_are_named_as_a_sweep_of_both_would_name_them(tmp_path: Path) 
     text = SCENE.replace("[record]", lower + "[record]").format(position=0.1, sweep=sweep)
     found = opened(tmp_path, text)
     assert constants(found).items() >= {"stop_1_position": 0.1, "stop_2_position": -1.0}.items()
-    # the swept stiffness has the short name, so the other one says whose it is
+    # the swept stiffness has the short name, so the other one names its stop
     assert found.stiffness.values.tolist() == [4.0, 5.0]
     assert float(found.stop_2_stiffness) == 9.0
     assert found.stop_2_stiffness.attrs["units"] == "1"

@@ -1,4 +1,4 @@
-"""`ds.vibroimpact` in a notebook, the table of all impacts, and what xarray knows of the package."""
+"""`ds.vibroimpact` in a notebook, the table of all impacts, and the entry point of xarray."""
 
 from __future__ import annotations
 

@@ -54,7 +54,8 @@ def test_the_amplitude_is_that_of_the_reference_time() -> None:
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_standard_errors_are_the_spread_of_repeated_fits_whether_noise_is_white_or_not(memory: float) -> None:
-    # Autoregressive noise of unit variance; at memory .9 its spectrum at the oscillation is 3.4 times the white one.
+    # Autoregressive noise of unit variance; at memory .9 its spectrum at the oscillation is 3.4 times that of white
+    # noise.
     draws, values, errors = 50, [], []
     generator = np.random.default_rng(11)
     for _ in range(draws):
@@ -71,7 +72,7 @@ def test_standard_errors_are_the_spread_of_repeated_fits_whether_noise_is_white_
             ]
         )
     ratio = np.std(values, axis=0, ddof=1) / np.sqrt(np.mean(np.square(errors), axis=0))
-    # A spread of 50 draws is known to 10 %; the white formula would be at 1.8 for the coloured noise.
+    # A spread of 50 draws is known to 10 %; the white formula would give 1.8 for the coloured noise.
     assert np.all((ratio > 0.7) & (ratio < 1.3)), ratio
 
 
@@ -86,7 +87,7 @@ def test_effective_samples_of_autoregressive_noise_follow_its_spectrum() -> None
 def test_white_noise_passes_for_noise_and_a_hidden_tone_does_not() -> None:
     generator = np.random.default_rng(4)
     alarms = sum(not residual_test(generator.normal(size=600), 10.0, 0.2).adequate for _ in range(300))
-    # One in a hundred is asked for: 3 of 300, and with 8 it would be a wrong test (probability .004).
+    # Significance .01: 3 of 300 are expected; more than 8 have the probability .004.
     assert alarms <= 8
     tone = generator.normal(size=600) + 0.5 * np.sin(0.2 * np.arange(600))
     verdict = residual_test(tone, 10.0, 0.2)
@@ -115,7 +116,7 @@ def test_intervals_of_the_decrement_hold_the_truth() -> None:
             DecaySamples(TIME, decaying(TIME) + 0.1 * generator.normal(size=len(TIME)))
         ).decrement.interval
         inside += low <= truth <= high
-    # 57 expected, 1.7 standard deviation.
+    # 57 expected, standard deviation 1.7.
     assert inside >= 52, inside
 
 
@@ -174,7 +175,7 @@ def test_what_is_no_decay_is_refused_with_the_reason() -> None:
         fit_exponential(decay_samples(channel(np.full(len(TIME), 2.0)), 0.0))
     with pytest.raises(EstimationError, match="2 periods"):
         fit_exponential(decay_samples(channel(decaying(TIME)), 0.0, 1.5))
-    # Each turning point is a third of the one before: the fourth is below noise of .3.
+    # Each turning point is a third of the one before: the fourth is below the noise of .3.
     noise = 0.3 * np.random.default_rng(0).normal(size=80)
     few = DecaySamples(TIME[:80], decaying(TIME[:80], rate=1.8) + noise)
     with pytest.raises(EstimationError, match="4 peaks or more above the noise"):

@@ -1,4 +1,4 @@
-"""Damping laws: their motion, their choice, and the honesty of their intervals."""
+"""Damping laws: their motion, their choice, and the coverage of their intervals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TIME = np.arange(0.0, 30.0, 0.06)
 
 
 def body(*terms: str) -> Damped:
-    # In sums each takes its share, so that the motion lasts.
+    # In sums of terms each takes its share, so that the motion lasts.
     return Damped(**{term: RATES[term] / len(terms) for term in terms})
 
 
@@ -35,8 +35,8 @@ def measured(motion: np.ndarray, noise: float, seed: int) -> DecaySamples:
 
 @pytest.mark.parametrize("law", ALL_LAWS, ids=lambda law: law.name)
 def test_the_motion_of_each_law_is_that_of_an_adaptive_integrator(law) -> None:
-    # Reference: scipy's DOP853, restarted at every turning point; with a cubic spring too. In the last swing before
-    # friction holds the body, quadratic damping is replaced by a viscous one of equal loss: 5e-6 of the start.
+    # Reference: scipy's DOP853, restarted at every turning point, also with a cubic spring. In the last swing before
+    # friction holds the body, a viscous term of equal loss replaces quadratic damping: an error of 5e-6 of the start.
     known = Damped(**{term: RATES[term] for term in law.terms}, cubic=-1e-3)
     columns = (known.omega, known.viscous, known.coulomb, known.quadratic, known.cubic)
     coefficients = Coefficients(*(np.array([value]) for value in columns))
@@ -45,7 +45,7 @@ def test_the_motion_of_each_law_is_that_of_an_adaptive_integrator(law) -> None:
 
 
 def test_friction_holds_the_body_off_its_equilibrium_for_good() -> None:
-    # Undamped but for friction: the amplitude falls by 2 c / omega^2 in each swing (energy), then it stays.
+    # Only friction damps: the amplitude falls by 2 c / omega^2 in each swing (energy), then it stays.
     friction, omega = 4.0, 4.0
     nothing = np.zeros(1)
     coefficients = Coefficients(np.array([omega]), nothing, np.array([friction]), nothing, nothing)
@@ -68,7 +68,7 @@ def test_a_noisy_decay_is_given_its_own_law_and_it_is_adequate(law) -> None:
     assert best.test.adequate, best.test.words()
     for term in best.law.terms:
         found = best.coefficients[term]
-        # Four standard errors: one false alarm in ten thousand; a term that is not there is then zero.
+        # Four standard errors: one false alarm in ten thousand; a term missing in the truth is then zero.
         assert abs(found.value - getattr(truth, term)) < 4.0 * found.standard_error
     alone = [fit for fit in choice.fits if not set(law.terms) <= set(fit.law.terms)]
     assert all(fit.aic > best.aic + 2.0 or not fit.physical for fit in alone)
@@ -80,7 +80,7 @@ def test_the_wrong_law_is_called_inadequate_and_its_structure_is_measured() -> N
     assert not choice.best.test.adequate
     assert any("none of the laws is adequate" in line for line in choice.words()) is False
     assert "inadequate" in " ".join(choice.words())
-    # What is left over, known here: the difference of the motions.
+    # The residual without noise, known here: the difference of the motions.
     left = np.sqrt(np.mean((choice.best.fitted - 2.0 - truth) ** 2))
     assert choice.best.test.structure == pytest.approx(left, rel=0.05)
     assert choice.best.test.noise_floor == pytest.approx(0.02, rel=0.15)
@@ -100,8 +100,8 @@ def test_no_adequate_law_is_said_in_words() -> None:
 
 
 def test_a_law_that_would_feed_energy_in_is_never_chosen() -> None:
-    # Coulomb motion bends the logarithm of the envelope down; with viscous + quadratic only a negative
-    # quadratic term can do that.
+    # Coulomb motion bends the logarithm of the envelope down; in viscous + quadratic only a negative quadratic term can
+    # do that.
     choice = choose_law(
         measured(body("coulomb").motion(START, TIME), 0.02, 1),
         [damping_law("viscous+quadratic"), damping_law("viscous")],
@@ -125,7 +125,7 @@ def test_intervals_of_a_law_hold_the_truth_nineteen_times_in_twenty() -> None:
             inside[term] += low <= getattr(truth, term) <= high
             scaled[term].append((found.value - getattr(truth, term)) / found.standard_error)
     for term in law.terms:
-        # Binomial: 38 of 40 expected, 1.4 standard deviation; the errors are also not much too large.
+        # Binomial: 38 of 40 expected, standard deviation 1.4; the errors are not much too large either.
         assert inside[term] >= 34
         assert 0.65 < np.std(scaled[term]) < 1.35
 

@@ -82,7 +82,7 @@ def test_spectra_are_those_of_the_thesis() -> None:
     found = response(segment=size)
     np.testing.assert_allclose(found.h1, (cross / own)[1:], rtol=1e-9)
     np.testing.assert_allclose(found.coherence, (np.abs(cross) ** 2 / (own * other))[1:], rtol=1e-9)
-    # Noise bandwidth 4/3 lines, and half overlap of this window costs 1/16 of correlation.
+    # The noise bandwidth is 4/3 lines; half overlap of this window has a correlation of 1/16.
     assert found.resolution == pytest.approx(4.0 / 3.0 / (size * INTERVAL), rel=1e-3)
     segments = len(list(starts))
     assert found.averages == pytest.approx(segments / (1.0 + 2.0 / 16.0), rel=0.01)
@@ -129,7 +129,7 @@ def test_a_noisy_transmissibility_is_recovered_within_its_errors_nineteen_times_
         low, high = fit.damping_ratio.interval
         inside += low <= RATIO <= high
         assert abs(fit.modal_constant.value - 1.3) < 5.0 * fit.modal_constant.standard_error
-    # 57 expected, 1.7 standard deviation.
+    # 57 expected, standard deviation 1.7.
     assert inside >= 52
 
 
@@ -172,7 +172,7 @@ def test_a_simulated_sweep_gives_back_its_oscillator(tmp_path: Path) -> None:
     curve, remarks = swept_response(path, 0.5, "N")
     fit = fit_resonance(curve)
     assert not remarks
-    # Reference: the numbers of the scene; the transient has died out by e^-37.
+    # Reference: the numbers of the scene; the transient has decayed by e^-37.
     assert fit.natural_angular_frequency.value == pytest.approx(NATURAL, rel=1e-9)
     assert fit.damping_ratio.value == pytest.approx(RATIO, rel=1e-8)
     assert fit.modal_constant.value == pytest.approx(1.0 / MASS, rel=1e-8)
@@ -209,7 +209,7 @@ impacts = true
 
 
 def test_lines_that_come_twice_without_a_half_power_point_are_fitted() -> None:
-    # a sweep up and down that ends just past the peak: no width of it to begin with, no distance of two lines
+    # a sweep up and down that ends just past the peak: the peak has no width there, and lines have no distance
     omega = np.repeat(np.linspace(0.71, 1.02, 40), 2)
     amplitude = 1.0 / np.abs(1.0 - omega**2 + 0.1j * omega)
     found = fit_resonance(Curve(omega, amplitude, np.zeros(80), "displacement", "1"))

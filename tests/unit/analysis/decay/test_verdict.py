@@ -1,4 +1,4 @@
-"""The first line of a free decay: which estimates are sure, and what no damping law explains."""
+"""The first line of a free decay: the sure estimates, and motion that no damping law explains."""
 
 from __future__ import annotations
 

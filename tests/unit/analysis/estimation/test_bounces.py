@@ -39,7 +39,7 @@ time_series = { rate = 500 }
 
 
 def ball(restitution, noise=0.0, bounces=12, first=0.7, seed=0, rate=500.0):
-    """Return the height of a ball, each flight `restitution` times as long as the one before."""
+    """Return the height of a ball; each flight is `restitution` times as long as the flight before."""
     lengths = first * np.cumprod(np.append(1.0, np.broadcast_to(restitution, bounces - 1)))
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     time = np.arange(0.0, starts[-1], 1.0 / rate)
@@ -61,7 +61,7 @@ def test_intervals_of_bounces_hold_the_truth_in_most_of_60_records():
         estimate_bounces(ball(0.75, 3e-3, seed=seed)).values["flight_times"]["restitution"].covers(0.75)
         for seed in range(60)
     ]
-    # 51 or fewer of 60 would be seen once in 200 times
+    # 51 or fewer of 60 have a probability of 1 in 200
     assert sum(held) > 51
 
 
@@ -72,14 +72,14 @@ def test_a_restitution_that_falls_with_the_speed_is_reported_against_the_speed()
         assert "restitution" not in found.values["flight_times"]
         assert "The restitution changes with the speed of impact" in found.remarks[0]
         known = found.of_speed
-        # the record begins at the stop in full flight, whose end is the first impact
+        # the record begins at the stop, at the start of a full flight; its end is the first impact
         true = truth[: len(known.speed)]
         held += ((known.low <= true) & (true <= known.high)).tolist()
         assert np.all(np.abs(known.fitted - true) < 5e-3)
     # neighbouring speeds of one record are correlated
     assert np.mean(held) > 0.8
     dataset = found.dataset()
-    # a flight of T ends 9.81 T / 2 fast; the first is .7 s long
+    # a flight of T ends with the speed 9.81 T / 2; the first lasts .7 s
     assert float(dataset.bounce_speed[0]) == pytest.approx(0.5 * 9.81 * 0.7, rel=0.01)
     assert dataset.bounce_speed.attrs["units"] == "m s-1"
 
@@ -104,7 +104,7 @@ def test_two_bounces_are_refused_with_what_to_do():
 
 
 def test_a_ball_that_comes_to_rest_is_read_as_a_decay_without_a_warning():
-    # windows in which nothing moves have no weight: one window alone has no slope
+    # windows without motion have no weight: a single window has no slope
     flying = ball(0.6, bounces=8)
     values = np.append(flying.values, np.zeros(3000))
     decay = estimate_decay(decay_samples(channel_of(np.arange(len(values)) / 500.0, values), None, None), ())
@@ -125,7 +125,7 @@ def test_estimate_of_a_ball_under_its_weight_takes_the_flight_times(tmp_path):
 
 
 def filmed(rate, noise, seed, held=0.0):
-    """Return restitution and height of a ball that is held, dropped, bounces 6 to 11 times, and rests where held > 0.
+    """Return restitution and height of a ball that is held, dropped, bounces 6 to 11 times, and rests if held > 0.
 
     Flights are 2 V / g long, so a drop from h is half a flight of 2 sqrt(2 h / g).
     """
@@ -144,7 +144,7 @@ def filmed(rate, noise, seed, held=0.0):
 
 
 def answers(rate, noise, seeds, held=0.0):
-    """Return which records have an answer, and which intervals of restitution and stop hold the truth."""
+    """Return masks of the records with an answer, and of the intervals of restitution and stop that hold the truth."""
     answered, held_by = [], []
     for seed in seeds:
         restitution, height = filmed(rate, noise, seed, held)
@@ -165,7 +165,7 @@ def answers(rate, noise, seeds, held=0.0):
 def test_a_filmed_ball_has_an_answer_where_its_parabolas_are_plain(rate, noise, fewest):
     answered, held = answers(rate, noise, range(10))
     assert sum(answered) >= fewest
-    # 15 or fewer of 20 would be seen once in 300 times
+    # 15 or fewer of 20 have a probability of 1 in 300
     assert np.sum(held) > 0.75 * len(held)
 
 
@@ -178,7 +178,7 @@ def test_a_filmed_ball_has_an_answer_where_its_parabolas_are_plain(rate, noise, 
 def test_intervals_of_filmed_balls_hold_the_truth_in_95_of_100(rate, noise, fewest, held):
     answered, held_by = answers(rate, noise, range(1000, 1200), held)
     assert np.mean(answered) >= fewest
-    # of 400 of 95 % fewer than 368 would be seen once in 200 times
+    # fewer than 368 of 400 have a probability of 1 in 200 at 95 %
     assert np.mean(held_by) > 0.92
 
 
@@ -190,7 +190,7 @@ def test_noise_alone_has_no_flights():
 
 
 def test_flights_that_drag_bends_are_not_taken_for_parabolas():
-    # a flight whose second half is slower than the first: no parabola, yet its ends are where they were
+    # a flight whose second half is slower than the first is no parabola, yet its ends stay where they were
     height = ball(0.8, 1e-4)
     bent = height.values * (1.0 + 0.2 * np.sin(9.0 * height.time))
     found = estimate_bounces(channel_of(height.time, bent))

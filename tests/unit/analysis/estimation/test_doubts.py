@@ -1,4 +1,4 @@
-"""Whoever is not to be relied on is said to be so, in one line, and whoever is, is."""
+"""An unreliable estimate says so in one line; a reliable one does not."""
 
 import io
 import math
@@ -128,7 +128,7 @@ def test_the_failure_of_one_method_leaves_the_others(monkeypatch):
 
 @pytest.mark.parametrize(
     ("name", "apart", "contradicts"),
-    # at 2.5 standard errors the 95 % intervals have no point in common either
+    # at 2.5 standard errors, too, the 95 % intervals are disjoint
     [("restitution", 0.025, False), ("restitution", -0.035, True), ("phase", 2 * math.pi + 0.02, False)],
 )
 def test_methods_contradict_each_other_when_chance_does_not_explain_how_far_they_are_apart(
@@ -143,7 +143,7 @@ def test_methods_contradict_each_other_when_chance_does_not_explain_how_far_they
 
 
 def test_chatter_that_is_not_seen_leaves_the_estimates_sure():
-    # of impacts in the noise some flights have one in them: they are left out, and the fitted motion goes through them
+    # some flights contain a weak impact within the noise: they are left out, and the fitted motion passes through them
     found = estimate_impacts(
         record_of(CHAOTIC, periods=40).channel(0.01), Forcing(2.8), Known(offset=None), methods=METHODS
     )
@@ -161,14 +161,14 @@ def test_a_stiffness_that_the_motion_does_not_show_is_not_given():
 
 
 def test_a_valley_of_stiffness_force_and_offset_is_not_sure():
-    # P(1,1) in noise, the forcing frequency alone known: offset and static deflection are 4 to 16 errors off
+    # P(1,1) in noise, only the forcing frequency known: offset and static deflection err by 4 to 16 standard errors
     found = estimates_of(drawn(341, 101), methods=METHODS)
     assert found.verdict.startswith("not sure, because ")
     assert "stiffness, force and offset fit alike" in found.verdict
 
 
 def test_few_samples_in_a_flight_leave_the_weak_form_right():
-    # samples chosen by the kinks beside them have noise that is not 0 on average: the offset was 5.1 errors off
+    # samples chosen by the kinks next to them have noise of nonzero mean: the offset erred by 5.1 standard errors
     one = drawn(162, 101)
     found = estimates_of(one, methods=["weak_form"]).values["weak_form"]
     for name in ("natural_frequency", "static_deflection", "offset"):
@@ -194,7 +194,7 @@ def test_the_verdict_comes_first_and_doubts_follow_the_table():
 def test_intervals_follow_the_valley_of_a_stiffness_that_is_hardly_known():
     p = Parameters(0.8, 0.1, 20.0, 35.0, 1.5, 0.3, 0.4, 0.1)
     names = ("natural_frequency", "offset")
-    # stiffness of 20 %: its root is not half-way, and what is divided by it bends the other way
+    # a standard error of 20 % of the stiffness: the interval of its root is not symmetric
     low, high = Coordinates(names, p).intervals(p, np.diag([2.0, 1e-9]) ** 2, 0.95)["natural_frequency"]
     assert low == pytest.approx(math.sqrt(400.0 - 1.96 * 80.0), rel=1e-2)
     assert high == pytest.approx(math.sqrt(400.0 + 1.96 * 80.0), rel=1e-2)
@@ -227,7 +227,7 @@ def test_the_figure_shows_signal_impacts_and_what_is_left_above_the_intervals(pl
     assert labels[:2] == ["displacement (m)", "residual (m)"]
     signal = draw_estimates(dataset).axes[0]
     low, high = signal.get_xlim()
-    # of a long record some flights, or none would be told apart
+    # a long record shows only some flights, or none would be distinguishable
     assert 5 < np.count_nonzero((dataset.impact_time > low) & (dataset.impact_time < high)) <= 11
     old = dataset.drop_vars(["measured", "fitted", "time"])
     assert len(draw_estimates(old).axes) == len(labels) - 2

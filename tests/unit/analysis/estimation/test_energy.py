@@ -12,7 +12,7 @@ from vibroimpact.analysis.estimation.segments import segment
 from vibroimpact.analysis.estimation.smoothing import choose_window, smoother
 from vibroimpact.fmus.errors import EstimationError
 
-#: Regression splines of a fifteenth of a period: exact to more digits than are asked of noiseless samples.
+#: Regression splines of .15 periods: exact to more digits than are needed for noiseless samples.
 FINE = 0.15
 
 
@@ -32,7 +32,7 @@ def balance_of(parameters, per_period=400, periods=6):
 def forcing_energy(truth, halves):
     """Return the work of the force over one flight, per unit mass."""
     work = math.cos(truth.phase) * halves.work_cos[0] + math.sin(truth.phase) * halves.work_sin[0]
-    # what adds to the speed after an impact is the work with the other sign
+    # work of opposite sign adds to the speed after an impact
     return truth.natural_frequency**2 * truth.static_deflection * (work[1] - work[0])
 
 
@@ -46,7 +46,7 @@ def test_the_window_is_that_of_the_motion_and_the_size_of_the_noise():
     windows = [choose_window(found.signal, flights, fine, w, noise) for noise in sizes]
     assert windows == sorted(windows)
     assert windows[-1] > 1.5 * windows[0]
-    # of the slopes at the stop, what smoothing takes away is of the size of what noise leaves, at most twice that
+    # the error of the slopes at the stop from smoothing is at most twice their error from noise
     for window, noise in zip(windows, sizes, strict=True):
         wrong, left = 0.0, 0.0
         for flight in flights:
@@ -120,7 +120,7 @@ def test_period_one_motion_cannot_give_damping_amplitude_and_phase_together():
 
 def test_more_energy_after_the_impacts_than_there_is_motion_is_refused():
     truth, balance, halves = balance_of(WORKED)
-    # ten times the true damping takes more than the force gives
+    # ten times the true damping takes more energy than the force gives
     with pytest.raises(EstimationError, match="residual energy between 0 and the kinetic energy"):
         balance.restitution(halves.energy(replace(truth, damping_ratio=-2.0)))
 
@@ -135,7 +135,7 @@ def test_noise_in_the_squares_is_subtracted():
     errors = 0.01 * record.peak * np.random.default_rng(5).standard_normal((400, len(record.time)))
 
     def squares(samples):
-        """Return the sum of int y'^2 over all halves as the noise leaves it."""
+        """Return the sum of int y'^2 over all halves, with the contribution of the noise."""
         return sum(
             np.sum((samples[:, flight.index] @ half.speeds.T) ** 2, axis=1)
             for flight, pair in zip(flights, zip(*2 * [iter(balance.halves)], strict=True), strict=True)
@@ -150,7 +150,7 @@ def test_noise_in_the_squares_is_subtracted():
 
 
 def test_the_force_is_not_read_too_low_where_noise_makes_the_speeds_uncertain():
-    # weighted by the measured speeds the two are 2.4 and 3.1 standard errors off on average
+    # weighted by the measured speeds, both err by 2.4 and 3.1 standard errors on average
     parameters = Parameters(0.792, 0.1257, 61.1, 58.75, 0.108, 0.0, 0.0114)
     record = record_of(parameters, periods=40)
     known = Known(damping_ratio=0.1257, stop_position=0.0114)

@@ -57,7 +57,7 @@ def test_contact_found_alone_is_where_the_motion_turns():
 
 
 def test_start_values_of_period_one_motion_are_those_of_the_worked_examples():
-    # a / x_max = .25 shifts the frequency by 1.72285878782861; driven and damped, 20 rad/s are read as 18.728
+    # a / x_max = .25 shifts the frequency by 1.72285878782861; with drive and damping, 20 rad/s are read as 18.728
     assert natural_frequency_of(0.25, 1.0, 2.0 * math.pi / 1.72285878782861) == pytest.approx(1.0, abs=1e-13)
     assert stop_position_of(1.0, 1.0, 2.0 * math.pi / 1.72285878782861) == pytest.approx(0.25, abs=1e-13)
     record = record_of(WORKED, periods=6, per_period=400)
@@ -105,7 +105,7 @@ def test_weak_damping_is_not_separated_from_restitution_by_the_energies():
     assert not found.values
     assert "separate damping from restitution" in found.refusals[0].reason
     assert "Give the damping ratio" in found.refusals[0].reason
-    # each percent of the velocity is five times the damping ratio
+    # the damping ratio errs by five times its value for each percent of the velocity
     assert abs(found.conditioning["joint_damping_ratio_per_relative_velocity"]) > 0.5
 
 
@@ -144,7 +144,7 @@ def test_correlated_rests_widen_the_intervals_and_are_said():
 
 
 def test_a_restitution_that_changes_is_not_called_adequate():
-    # two halves of different restitution: each is period one
+    # two halves with different restitutions: each half alone is period one
     first, second = record_of(THESIS, periods=6), record_of(replace(THESIS, restitution=0.6), periods=6)
     step = first.time[1]
     values = np.concatenate([first.values, second.values])
@@ -212,7 +212,7 @@ def test_modes_of_a_chain_and_its_restitution_are_found_from_both_sensors():
         assert found.force[k].value == pytest.approx(force[k], rel=2e-2)
     assert found.contact_mass == pytest.approx(1.0)
     assert found.restitution.value == pytest.approx(0.55, abs=5e-3)
-    # two roads: speeds of the contact point, and residual energy with the contact mass
+    # two methods: speeds of the contact point, and residual energy with the contact mass
     assert found.restitution_from_energy.value == pytest.approx(found.restitution.value, abs=5e-3)
 
 
@@ -264,7 +264,7 @@ def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
     [(0.69, -0.2, 0.66), pytest.param(0.72, 0.0, 0.8, marks=pytest.mark.long)],
 )
 def test_forcing_below_resonance_is_estimated(ratio, stop, restitution):
-    # several flights in a period of the force: what suits that period is longer than they are
+    # several flights in a period of the force: a window that suits this period is longer than a flight
     parameters = replace(
         WORKED,
         damping_ratio=0.13,

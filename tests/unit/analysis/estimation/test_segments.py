@@ -31,7 +31,7 @@ def test_noise_is_told_from_motion_with_impacts(noise):
 def test_every_impact_of_a_period_one_motion_is_found_from_the_displacement_alone(parameters, noise):
     record = record_of(parameters, periods=8)
     found = cut(record, noise)
-    # one impact in each forcing period; those at the very ends of the record have no room for a fit
+    # one impact in each forcing period; impacts at the very ends of the record leave no space for a fit
     assert len(found.impacts) in (7, 8)
     intervals = np.diff([impact.time for impact in found.impacts])
     period = 2.0 * math.pi / parameters.angular_frequency
@@ -40,8 +40,8 @@ def test_every_impact_of_a_period_one_motion_is_found_from_the_displacement_alon
 
 
 def test_the_instant_between_samples_is_found_to_a_small_part_of_a_sample():
-    # worked example of the kink: cubics over 12 samples on each side, 400 samples in a period, no noise:
-    # the instants are one forcing period apart, and the ratio of the velocities is the restitution
+    # Worked example of the kink: cubics over 12 samples on each side, 400 samples in a period, no noise.
+    # The instants are one forcing period apart, and the ratio of the velocities is the restitution.
     record = record_of(WORKED, periods=6, per_period=400)
     step = record.time[1]
     found = cut(record, window=12 * step)
@@ -64,7 +64,7 @@ def test_the_stated_error_of_the_instants_is_their_scatter():
                 min(impact.time - instant for instant in exact if abs(impact.time - instant) < 0.01)
             )
             stated.append(impact.time_error)
-    # from 120 instants the scatter is known to 7 %
+    # the scatter of 120 instants is known to 7 %
     assert np.std(errors) == pytest.approx(np.mean(stated), rel=0.25)
 
 
@@ -132,7 +132,7 @@ def test_too_few_samples_are_refused():
 
 @pytest.mark.parametrize("known", [False, True])
 def test_forcing_far_below_resonance_hides_neither_a_known_stop_nor_its_side(known):
-    # the longest window has several flights in it: its kinks are on the other side
+    # the longest window contains several flights: its kinks are on the other side
     one = drawn(213, 101)
     stop = one.truth["stop_position"]
     found = segment(

@@ -37,8 +37,8 @@ def test_noiseless_flights_give_damping_and_frequency(parameters):
 
 
 def test_linear_form_reproduces_the_worked_example():
-    # 200 samples in a flight, K = 5, s^3 (1-s)^3: noiseless .0599998 and 19.9999997 there; here with the samples
-    # anywhere between the impacts, and with noise of 1e-3 of the peak .05987 +- .00051 and 20.0004 +- .0028
+    # 200 samples in a flight, K = 5, s^3 (1-s)^3: the worked example has .0599998 and 19.9999997 without noise. Here
+    # samples lie anywhere between the impacts; noise of 1e-3 of the peak gives .05987 +- .00051 and 20.0004 +- .0028.
     record = record_of(WORKED, periods=6, per_period=200)
     _found, flights, _ = flights_of(record)
     errors = 1e-3 * record.peak * np.random.default_rng(2).standard_normal((60, len(record.time)))
@@ -67,7 +67,7 @@ def test_weighting_by_the_noise_halves_the_scatter_and_takes_the_bias_away():
         searched.append(search.parameters.damping_ratio)
         stated.append(math.sqrt(search.covariance[0, 0]))
     assert np.std(whitened) < 0.7 * np.std(plain)
-    # the search over all samples that begins there states its own scatter, which is no larger
+    # the search over all samples from this start states its own scatter, which is no larger
     for values in (whitened, searched):
         assert np.std(values) == pytest.approx(np.mean(stated), rel=0.3)
         assert abs(np.mean(values) - 0.1) < 3.0 * np.std(values) / math.sqrt(60)
@@ -91,7 +91,7 @@ def test_an_unknown_zero_of_the_displacement_is_found():
 
 
 def test_a_drifting_clock_is_found_over_many_flights():
-    # the generator runs .2 % faster than the recording's clock says: over 60 periods three quarters of a radian
+    # the generator is .2 % faster than the recording's clock: over 60 periods three quarters of a radian
     record = record_of(WORKED, periods=60)
     flights = flights_of(record, 3e-3)[2]
     wrong = replace(record.truth, angular_frequency=35.0 / 1.002)

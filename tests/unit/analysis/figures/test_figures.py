@@ -175,7 +175,7 @@ def test_a_map_of_an_up_down_sweep_has_a_column_for_each_direction(tmp_path: Pat
 
 
 def test_the_points_of_a_crowd_are_small_and_faint_and_all_there(tmp_path: Path) -> None:
-    # 300 impacts of chaos beside 300 of one periodic orbit and three of another
+    # 300 impacts of chaos next to 300 of one periodic orbit and three of another
     runs = [record(1.0, impacts=300), record(2.0, impacts=300), record(3.0, impacts=3)]
     assert runs[1].impacts is not None
     runs[1].impacts[:, 2] = 2.0
@@ -197,7 +197,7 @@ def noisy(count: int, missing: tuple[int, ...] = ()) -> list[RunRecord]:
 
 
 def test_a_map_of_rounding_is_one_colour_and_says_so(tmp_path: Path) -> None:
-    # drawn over its own range of 3e-15 it looked like a fractal basin
+    # drawn over its own range of 3e-15, the map looked like a fractal basin
     grid = {"mass": np.repeat([1.0, 2.0, 3.0], 3), "position": np.tile([0.1, 0.2, 0.3], 3)}
     figure = figures.draw(opened(dataset_of(noisy(9, missing=(4,)), coordinates=grid), tmp_path))
     above, below, bar, _ = figure.axes
@@ -265,7 +265,7 @@ def test_a_map_of_keys_that_move_together_has_the_values_of_one_that_tells_its_p
             (cells,) = panel.collections
             assert panel.get_ylabel() == axis
             np.testing.assert_allclose(cells.get_coordinates()[:, 0, 1], edges, atol=1e-12)
-        # the row of a value is that of its runs
+        # the row of a value is the row of its runs
         (cells,) = figures.draw(dataset, "map").axes[0].collections
         place = np.argsort(dataset.gap.values)
         np.testing.assert_array_equal(cells.get_array(), dataset.displacement_range.values[:, place].T)
@@ -327,7 +327,7 @@ def test_variables_of_components_have_a_panel_for_each_unit_and_a_line_at_each_e
         [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else []
         for axis in figure.axes
     ]
-    # What is too long for the axis is named above it.
+    # A name that is too long for the axis stands above it.
     assert legends == [["ball.h", "other.h", "event"], [], ["other.energy[1].kinetic"]]
     assert smallest_font(figure) >= 7
 
@@ -357,7 +357,7 @@ def test_a_ladder_of_macro_steps_shows_the_order_of_each_exchange() -> None:
         ["Jacobi 1.00", "Gauss-Seidel 2.00", "iterated (none)"],
     ]
     assert (above.get_xscale(), above.get_yscale(), below.get_yscale()) == ("log", "log", "log")
-    # A drift may have either sign; its magnitude is what falls.
+    # A drift may have either sign; only its magnitude falls.
     assert (below.get_lines()[1].get_ydata() > 0).all()
     assert texts(figure) == ["error (m)", "macro step (s)", "energy drift (-)"]
     assert figure.get_suptitle() == "Two coupled oscillators"
@@ -494,7 +494,7 @@ def test_a_file_that_is_damaged_in_its_data_is_one_message_too(tmp_path: Path) -
     path = tmp_path / "runs.nc"
     write_dataset(dataset_of([record(float(k), impacts=400) for k in range(3)]), path, compression=1)
     content = bytearray(path.read_bytes()[:-LINE_LENGTH])  # as a file of version 0.1, without its hash
-    # Damage in the middle of the compressed values; the structure of the file stays whole.
+    # Damage in the middle of the compressed values; the structure of the file stays intact.
     middle = slice(len(content) // 2, len(content) * 3 // 4)
     content[middle] = bytes(len(content[middle]))
     path.write_bytes(content)
@@ -581,5 +581,5 @@ def test_a_logarithmic_sweep_has_a_logarithmic_axis_in_diagrams_and_maps() -> No
     field = vi.draw(vi.run(vi.Scene.from_dict(tables | {"sweep": both}), progress=False)).axes[0]
     assert (field.get_xscale(), field.get_yscale()) == ("log", "linear")
     low, high = field.get_xlim()
-    assert low == pytest.approx(10.0 / 10.0**0.5)  # half a cell beside the first value, in its own spacing
+    assert low == pytest.approx(10.0 / 10.0**0.5)  # half a cell below the first value, in its own spacing
     assert high == pytest.approx(1e5 * 10.0**0.5)

@@ -1,4 +1,4 @@
-"""Kinds of figures: strobe, return map, spectrum, impacts per period, work-precision; and what fits which data."""
+"""Kinds of figures (strobe, return map, spectrum, impacts per period, work-precision), and the data that fit each."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
 
 
 def grid(impacts: list[float], folder: Path) -> xr.Dataset:
-    """Runs over mass and position, each with so many impacts a period, all of velocity 10 to the power of them."""
+    """Runs over mass and position, with these impacts per period, all of velocity 10 to this power."""
     runs = [record(1.0, impacts=1) for _ in impacts]
     for run, number in zip(runs, impacts, strict=True):
         assert run.periods is not None
@@ -52,7 +52,7 @@ def test_impacts_per_period_are_a_map_with_gray_where_there_are_none(tmp_path: P
     figure = figures.draw(grid([0.0, 0.5, 1.0, 1.0, 1.5, 2.0], tmp_path), "impacts-per-period")
     axis, bar = figure.axes
     (mesh,) = axis.collections
-    # mass is across: a row for each position
+    # mass is horizontal: a row for each position
     values = np.ma.filled(mesh.get_array(), np.nan).reshape(3, 2)
     np.testing.assert_array_equal(values, [[np.nan, 1.0], [0.5, 1.5], [1.0, 2.0]])
     assert axis.get_title() == "gray: no impact"
@@ -93,13 +93,13 @@ def test_the_strobe_of_one_run_is_its_poincare_section(tmp_path: Path) -> None:
     (axis,) = figures.draw(dataset, "strobe", run=4).axes
     points = axis.get_lines()[0].get_xydata()
     assert points.tolist() == [[4.5, 4.25]] * 3
-    # one point has no scale of its own
+    # a single point defines no scale
     assert axis.get_xlim() == pytest.approx((2.25, 6.75))
 
 
 @pytest.mark.parametrize("kind", ["strobe", "run"])
 def test_the_only_run_of_a_dataset_can_be_named(kind: str, tmp_path: Path) -> None:
-    # its number has no dimension, as that of a scene with one point
+    # its index has no dimension, as in a scene with one point
     one = opened(up_down(), tmp_path).sel(angular_frequency=1.0, direction="down")
     assert not one["run_index"].dims
     runs = one.vibroimpact.runs
@@ -125,7 +125,7 @@ def test_a_return_map_joins_each_impact_with_the_next_on_its_own_stop() -> None:
 
 
 def forced(scene: str, units: str = "SI") -> xr.Dataset:
-    """Ten and a half periods of 2 Hz with a third harmonic, about a mean of 5."""
+    """Return ten and a half periods of 2 Hz with a third harmonic, about a mean of 5."""
     time = np.arange(0.0, 5.25, 0.005)
     wave = 5.0 + 3.0 * np.cos(4.0 * np.pi * time) + 0.3 * np.sin(12.0 * np.pi * time)
     rows = np.column_stack([time, wave])
@@ -208,7 +208,7 @@ def test_work_precision_has_each_error_over_the_seconds_that_it_took() -> None:
     figure = figures.draw(ladder(), "work-precision")
     (axis,) = figure.axes
     jacobi, iterated = axis.get_lines()
-    # from small steps to large ones; what is exact, or was not timed, leaves a gap
+    # from small steps to large ones; an exact value, or one without a time, leaves a gap
     assert jacobi.get_xdata().tolist() == pytest.approx([0.008, 0.004, 0.002])
     assert iterated.get_xdata().tolist() == pytest.approx([0.024, 0.006, 0.003])
     assert iterated.get_ydata() == pytest.approx(np.array([0.0125, 0.05, 0.1]) ** 2)
@@ -240,7 +240,7 @@ TIME = clock()
 
 
 def replay(folder: Path, *, named: bool = True) -> Path:
-    """A replay of one recording that was fitted, and of another, three times as large, that was not."""
+    """Return a replay of one recording used in the fit, and of another, three times as large, not used in it."""
     both = [
         compare(TIME, ring(TIME - HIT), channel(size * ring(TIME - HIT)), lag=0.0, polarity=1)
         for size in (1.0, 3.0)
@@ -426,7 +426,7 @@ def test_slopes_of_intervals_end_at_the_grid_on_which_the_instants_were_written(
     for axis, grid in ((raw, 0.01), (figure.axes[3], 0.01 / float(np.median(np.diff(times))))):
         drawn = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in axis.get_lines()]
         assert min(x.min() for x in drawn if x.size) >= grid
-    # each number stands left of its own line
+    # each number stands to the left of its own line
     for text, line in zip(raw.texts, raw.get_lines()[::3], strict=True):
         x = line.get_xdata()[np.isfinite(line.get_ydata())]
         assert text.xy[0] in x

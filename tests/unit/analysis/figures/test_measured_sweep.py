@@ -1,4 +1,4 @@
-"""A measured sweep over a simulated one: each period a point, up and down told apart, what is flagged marked."""
+"""A measured sweep over a simulated one: each period a point, separate marks for up and down, marks for flags."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLIPPED, DRIFT = 1, 4
 
 
 def record(size: float) -> RunRecord:
-    """Return a run of two periods: of a range, and of one that is a tenth larger."""
+    """Return a run of two periods: one of this range, and one a tenth larger."""
     periods = np.full((2, 5), np.nan)
     periods[:, 0], periods[:, 1] = [0.5 * size, 0.6 * size], [-0.5 * size, -0.5 * size]
     return RunRecord(Outcome.ok, "", periods)

@@ -1,4 +1,4 @@
-"""What all figures share: their style, their size, their title."""
+"""The common properties of all figures: their style, their size, their title."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def sweep(folder: Path) -> xr.Dataset:
 
 
 def test_a_matplotlibrc_of_the_current_folder_is_not_read(tmp_path: Path) -> None:
-    # what matplotlib itself cannot import with
+    # a file with which matplotlib itself cannot be imported
     (tmp_path / "matplotlibrc").write_bytes(b"lines.linewidth: 9\nno.such: 1\n\xff\xfe\x00")
     dataset = sweep(tmp_path)
     command = [sys.executable, "-W", "error", "-c", DRAWING]

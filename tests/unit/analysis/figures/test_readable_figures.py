@@ -1,4 +1,4 @@
-"""What a reviewer must be able to read off a figure: layers, stops, classes, whole sentences, short instants."""
+"""Readability of figures for a reviewer: layers, stops, classes, whole sentences, short instants."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
 
 
 def long_run(turns: int, start: float = 0.0) -> xr.Dataset:
-    """Return a run that goes round in circles of slowly varying size, 30 samples a turn."""
+    """Return a run of circles of slowly varying size, 30 samples a turn."""
     phase = 2.0 * np.pi * np.arange(30 * turns) / 30
     size = 1.0 + 0.3 * np.sin(0.37 * phase)
     rows = np.column_stack([start + phase, size * np.sin(phase), size * np.cos(phase)])
@@ -38,7 +38,7 @@ def long_run(turns: int, start: float = 0.0) -> xr.Dataset:
 
 
 def hits_of_two_stops(directions: list[Direction] | None = None) -> xr.Dataset:
-    """Return a sweep of three runs, with impacts on both stops, on the first, on the second."""
+    """Return a sweep of three runs: impacts on both stops, on the first, on the second."""
     runs = [record(float(k), impacts=4) for k in range(3)]
     for run, stops in zip(runs, ([1, 2, 1, 2], [1, 1, 1, 1], [2, 2, 2, 2]), strict=True):
         assert run.impacts is not None

@@ -1,4 +1,4 @@
-"""Which part of a motion is drawn, and what its time series show: stops, impacts, quantities with their units."""
+"""The drawn part of a motion, and the contents of its time series: stops, impacts, quantities with their units."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NAMES = ["displacement[2]", "displacement[3]", "velocity[3]", "contact_force"]
 def chain(
     scene: str = CHAIN, impacts_per_period: int = 1, units: str = "SI", **changes: object
 ) -> xr.Dataset:
-    """Forty periods of a chain between two stops, sampled, which was let swing for a while before."""
+    """Return forty sampled periods of a chain between two stops, after some time of motion."""
     waves = [np.sin(2.0 * np.pi * (TIME / PERIOD - 0.1 * k)) for k in range(len(NAMES))]
     number = PERIODS * impacts_per_period
     hits = np.ones((number, 7))

@@ -1,4 +1,4 @@
-"""A dataset file ends with the SHA-256 of its content: damage is known before a library opens the file."""
+"""A dataset file ends with the SHA-256 of its content, so that damage is known before a library opens the file."""
 
 from __future__ import annotations
 
@@ -101,14 +101,14 @@ def test_other_files_have_no_hash(tmp_path: Path, content: bytes) -> None:
 def test_a_file_that_lost_its_end_is_noticed_in_every_version_of_hdf5(
     version: int, place: int, tmp_path: Path
 ) -> None:
-    # the superblock of HDF5 1.14 is of version 0, that of HDF5 2 of version 2
+    # the superblock of HDF5 1.14 has version 0, that of HDF5 2 has version 2
     head = bytearray(b"\x89HDF\r\n\x1a\n" + bytes([version]) + bytes(91))
     head[place : place + 8] = (5000).to_bytes(8, "little")
     content = bytes(head) + bytes(4900)
     path = tmp_path / "runs.nc"
     path.write_bytes(content + closing_line(content))
     assert matches_recorded_hash(path)
-    # the line is damaged where it begins, but the content still says how long it is
+    # the line is damaged at its beginning, but the content still states its length
     path.write_bytes(content + b"X" + closing_line(content)[1:])
     with pytest.raises(DatasetError, match="SHA-256"):
         matches_recorded_hash(path)

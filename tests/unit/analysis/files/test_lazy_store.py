@@ -42,7 +42,7 @@ def test_threads_read_and_write_side_by_side(tmp_path: Path) -> None:
     write_dataset(
         dataset_of([record(float(value), impacts=1) for value in range(3000)]), tmp_path / "runs.nc"
     )
-    # in a process of its own, which such a fault takes with it
+    # in a separate process, which such a fault would end
     ended = warm.run(THREADS, tmp_path / "runs.nc")
     assert ended.returncode == 0, ended.stderr[-2000:]
 

@@ -1,4 +1,4 @@
-"""Files that crash, hold up or fool the libraries which read them: one line, and no process is left."""
+"""Files that crash, delay or deceive the libraries which read them: one line, and no process is left."""
 
 import os
 import signal
@@ -50,7 +50,7 @@ reader_child.main()
 
 @pytest.fixture(autouse=True)
 def probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """Use a server of the test's own, with a cache of its own; give the files that it was asked to read."""
+    """Use a server and a cache of the test's own; yield the names of the files that it was to read."""
     server, asked = ReaderServer(), []
     original = server.ask
 
@@ -70,7 +70,7 @@ def probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str
 
 @pytest.fixture
 def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Let damaged files do something to the process that reads them."""
+    """Return a function that lets damaged files do something to the process that reads them."""
 
     def set_up(what: str) -> None:
         child = tmp_path / "child.py"
@@ -88,7 +88,7 @@ def old_dataset(path: Path) -> Path:
 
 
 def forget(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Know no more than a process that begins."""
+    """Forget all verdicts, as in a new process."""
     monkeypatch.setattr(probing, "_of_files", {})
     monkeypatch.setattr(probing, "_of_contents", {})
 
@@ -195,7 +195,7 @@ def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: C
 
 
 def _readers(process: int) -> list[psutil.Process]:
-    """Return the process below another that reads files, and the one that it has made for the file it reads."""
+    """Return the process below another that reads files, and the process that it has made for the file it reads."""
     return psutil.Process(process).children(recursive=True)
 
 
@@ -208,7 +208,7 @@ def _wait_until(happened: Callable[[], bool]) -> None:
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Let this process hear SIGINT: a shell that starts tests in the background lets them ignore it."""
+    """Let this process receive SIGINT: a shell that starts tests in the background makes them ignore it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

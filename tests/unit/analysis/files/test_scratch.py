@@ -1,4 +1,4 @@
-"""Scratch folders: gone at the end of a process, or swept by the next one; nothing else is."""
+"""Scratch folders: gone at the end of a process, or swept by the next one; all other folders stay."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if sys.argv[1] == "wait":
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder for temporary files of this process and those it starts."""
+    """Return the folder for temporary files of this process and its child processes."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path

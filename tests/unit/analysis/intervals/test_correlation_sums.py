@@ -23,7 +23,7 @@ def henon(number: int) -> Floats:
 
 
 def logistic(number: int) -> Floats:
-    """Return the logistic map at 4; its invariant density is that of the arcsine law, of dimension 1."""
+    """Return the logistic map at 4; its invariant density is the arcsine law, with dimension 1."""
     values, x = np.empty(number), 0.3
     for k in range(number):
         x = 4.0 * x * (1.0 - x)
@@ -32,13 +32,13 @@ def logistic(number: int) -> Floats:
 
 
 def test_uniform_points_of_the_unit_square_have_the_correlation_sum_of_their_area() -> None:
-    # (2 eps - eps^2)^2: probability that two uniform points of the square are within eps in both coordinates. Delay
-    # vectors of a uniform sequence are such points, and pairs that share a number are a vanishing part
+    # (2 eps - eps^2)^2 is the probability that two uniform points of the square are within eps in both coordinates.
+    # Delay vectors of a uniform sequence are such points, and pairs that share a number are a vanishing part.
     values = np.random.default_rng(1).random(20_000)
     radii = radius_ladder(1.0 / 64.0, 0.5)
     sums = correlation_sums(values, 2, theiler=1, radii=radii).sums[1]
     expected = (2.0 * radii - radii**2) ** 2
-    # of 2e4 points: the relative scatter of C is about sqrt(2 / (N eps)) at worst
+    # for 2e4 points the relative scatter of C is at most about sqrt(2 / (N eps))
     assert np.all(np.abs(sums / expected - 1.0) < 0.02)
 
 
@@ -53,20 +53,20 @@ def test_the_slopes_of_the_henon_map_saturate_at_its_dimension_of_1_2() -> None:
     sums = correlation_sums(henon(8000), 5, theiler=1)
     slopes = fitted_slopes(sums)
     assert np.all(np.abs(slopes[1:] - 1.21) < 0.05)
-    # and the radii of the statement: over two decades the local slope stays there
+    # over the two decades of this statement the local slope stays there
     middle = (sums.radii > 0.01) & (sums.radii < 0.3)
     assert np.all(np.abs(sums.local_slopes[2, middle] - 1.21) < 0.2)
 
 
 def test_the_slopes_of_the_logistic_map_do_not_grow_with_the_embedding_beyond_1() -> None:
     slopes = fitted_slopes(correlation_sums(logistic(6000), 4, theiler=1))
-    # the two singularities of its density make the slope come to 1 slowly, from below
+    # the two singularities of its density make the slope approach 1 slowly, from below
     assert np.all((slopes > 0.88) & (slopes < 1.05))
 
 
 def test_the_slopes_of_white_noise_are_those_of_the_embedding() -> None:
     slopes = fitted_slopes(correlation_sums(np.random.default_rng(3).random(6000), 4, theiler=1))
-    # the edges of the cube take something off: more, the more dimensions there are
+    # the edges of the cube reduce the slope, more in higher dimensions
     assert np.all((slopes < np.arange(1, 5) + 0.05) & (slopes > 0.9 * np.arange(1, 5)))
 
 
@@ -84,7 +84,7 @@ def test_no_vector_reaches_over_a_gap() -> None:
     joined = np.concatenate([first, [np.nan], second])
     radii = radius_ladder(0.05, 1.0)
     sums = correlation_sums(joined, 3, radii=radii)
-    # whole vectors: 198 and 148 of three
+    # whole vectors: 198 and 148 of three values
     assert sums.pairs[2] == math.comb(198 + 148, 2)
     assert sums.near[2, -1] == sums.pairs[2]
 
@@ -97,7 +97,7 @@ def test_the_count_does_not_depend_on_the_number_of_threads() -> None:
 
 
 def test_a_block_boundary_loses_no_pair() -> None:
-    # every pair of numbers that are all the same is near, in any embedding and for any length about the block of 512
+    # every pair of equal numbers is near, in any embedding and for any length about the block of 512
     for number in (2, 511, 512, 513, 1024, 1030):
         near = near_pairs(np.ones(number), radius_ladder(0.5, 1.0), 2)
         assert near[0, 0] == math.comb(number, 2)

@@ -58,7 +58,7 @@ def test_a_cycle_is_found_through_jitter(intervals: tuple[float, ...], jitter: f
 
 
 def test_equal_intervals_hide_p_and_the_verdict_says_so() -> None:
-    # P(2,4) with equal intervals, each of two periods, cannot be told from P(1,2)
+    # P(2,4) with equal intervals of two periods each cannot be distinguished from P(1,2)
     train = interval_train(np.arange(0.0, 100.0, 2.0))
     cycle = read_cycle(train, 1.0)
     assert cycle.words.startswith("P(1,2)")

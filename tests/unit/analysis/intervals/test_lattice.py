@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 def spike_train(
     rng: np.random.Generator, places: int, missed: float, spurious: float, jitter: float, drift: float = 0.0
 ) -> Floats:
-    """Return spikes of a period-1 motion of 1 s, some missed, at most one spurious one an interval (thesis 5.4.3)."""
+    """Return spikes of a period-1 motion of 1 s: some missed, at most one spurious in an interval (thesis 5.4.3)."""
     true = np.arange(float(places)) + drift * np.sin(2.0 * np.pi * np.arange(places) / places)
     extra = np.flatnonzero(rng.random(places - 1) < spurious)
     kept = (true + jitter * rng.normal(size=places))[rng.random(places) >= missed]
@@ -34,7 +34,7 @@ def test_missed_and_spurious_spikes_lie_within_their_standard_errors_at_the_righ
     ]
     assert not any(lattice.reason for lattice in found)
     scores = np.array([(f.missed.value - missed) / f.missed.standard_error for f in found])
-    # of 80 normal scores 68 % are within 1, give or take 5.2 %; their mean scatters by .11
+    # of 80 normal scores 68 % +- 5.2 % are within 1; their mean scatters by .11
     assert 0.52 < np.mean(np.abs(scores) < 1.0) < 0.84
     assert abs(scores.mean()) < 0.4
     if spurious > 0.0:
@@ -46,7 +46,7 @@ def test_missed_and_spurious_spikes_lie_within_their_standard_errors_at_the_righ
 
 
 def test_delay_points_of_missed_and_of_spurious_spikes_have_their_known_shares() -> None:
-    # worked out by hand: p = .1 gives .81, .081, .0081; s = .04 gives (1-s)^2/(1+s), s/(1+s), 2 s(1-s)/(1+s), s^2/(1+s)
+    # by hand: p = .1 gives .81, .081, .0081; s = .04 gives (1-s)^2/(1+s), s/(1+s), 2 s(1-s)/(1+s), s^2/(1+s)
     assert [lattice_share(0.1, 0.0, 1, j) for j in (1, 2, 3)] == pytest.approx([0.81, 0.081, 0.0081])
     assert lattice_share(0.1, 0.0, 2, 3) == pytest.approx(0.9**2 * 0.1**3)
     shares = expected_shares(0.0, 0.04)
@@ -59,7 +59,7 @@ def test_a_long_simulation_has_the_shares_that_the_probabilities_give(missed: fl
     train = interval_train(spike_train(np.random.default_rng(7), 100_000, missed, spurious, 0.002))
     observed = observed_shares(train, interval_lattice(train))
     expected = expected_shares(missed, spurious)
-    # counts of about 1e5 points: 5 standard errors, and the spurious spikes that fall on the lattice unseen (2 %)
+    # counts of about 1e5 points: 5 standard errors, plus spurious spikes on the lattice, which are invisible (2 %)
     margin = 5.0 * np.sqrt(expected / 1e5) + 1e-6 + 0.03 * spurious * (expected > 0.0)
     assert np.all(np.abs(observed - expected) < margin)
 
@@ -69,7 +69,7 @@ def test_the_interval_of_the_lattice_is_known_much_better_than_the_bins_of_the_d
         interval_train(spike_train(np.random.default_rng(1), 2000, 0.1, 0.04, 0.01) * 0.0452)
     )
     assert lattice.interval == pytest.approx(0.0452, rel=2e-5)
-    # the scatter about the mean of 41 neighbours is a little less or more than that of the spikes
+    # the scatter about the mean of 41 neighbours is slightly different from that of the spikes
     assert lattice.jitter == pytest.approx(0.01 * 0.0452, rel=0.2)
 
 

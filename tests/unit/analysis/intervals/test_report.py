@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 def skipping_train() -> Floats:
-    """Return a train of 1 s with jitter, every twentieth spike or so missed and some spurious."""
+    """Return a train of 1 s with jitter, about every twentieth spike missed, and some spurious spikes."""
     rng = np.random.default_rng(1)
     true = np.arange(500.0) + 0.01 * rng.normal(size=500)
     return np.sort(np.concatenate([true[rng.random(500) > 0.05], rng.uniform(0.0, 499.0, 10)]))
@@ -50,7 +50,7 @@ def test_the_same_seed_gives_the_same_surrogates_and_another_does_not() -> None:
     first, again, other = (interval_report(times, seed=seed) for seed in (1, 1, 2))
     assert first.identical(again)
     assert not np.array_equal(first["surrogate_slope_raw"], other["surrogate_slope_raw"])
-    # what is no surrogate does not depend on it
+    # results without a surrogate do not depend on the seed
     assert np.array_equal(first["slope_raw"], other["slope_raw"])
 
 
@@ -127,11 +127,11 @@ def between(times: Floats) -> list[tuple[float, float]]:
 
 
 def test_intervals_whose_neighbours_are_all_masked_show_no_cycle_and_no_lattice() -> None:
-    # Every second interval is masked: the others are alike two on, but no two in a row are known.
+    # Every second interval is masked: the others are equal two places on, but no two neighbours are known.
     beats = np.arange(40.0)
     alternate = interval_report(beats[:20], masked=between(beats[:20])[::2])
     assert alternate.attrs["cycle"].startswith("the intervals repeat after no cycle")
-    # One interval is left, as long as the lattice's but between two spurious spikes.
+    # One interval is left, as long as the lattice's, but between two spurious spikes.
     shifted = np.sort(np.append(np.delete(beats, 11), [10.5, 11.5]))
     alone = interval_report(shifted, masked=[s for s in between(shifted) if s[0] != 11.0])
     assert "no two places of it side by side" in alone.attrs["lattice"]
@@ -182,7 +182,7 @@ def test_the_figure_shows_delay_points_density_and_every_embedding(tmp_path: Pat
     assert [text.get_text() for text in density.get_legend().get_texts()][1] == "peaks: 1"
     for axis in (raw, logarithms):
         assert [text.get_text() for text in axis.texts] == ["1", "2", "3", "4", "5", "6"]
-        # of every embedding: all C, those in the window, the surrogate
+        # three lines for each embedding: all C, C in the window, the surrogate
         assert len(axis.lines) == 3 * 6
     figures.save(figure, tmp_path / "intervals.png")
     assert np.ptp(matplotlib.image.imread(tmp_path / "intervals.png")) > 0.5

@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import EstimationError, UsageError
 
 def test_an_interval_with_a_masked_instant_in_it_does_not_count() -> None:
     train = interval_train(np.array([0.0, 1.0, 2.0, 4.5, 5.5, 6.5]), masked=[(3.0, 3.0), (5.5, 5.5)])
-    # the seam at 3 s lies in one interval; that at the event of 5.5 s touches both beside it
+    # the seam at 3 s lies in one interval; the seam at the event of 5.5 s touches both neighbours
     assert train.kept.tolist() == [True, True, False, False, False]
     assert train.intervals.tolist() == [1.0, 1.0]
 
@@ -70,7 +70,7 @@ def test_a_poisson_train_has_fano_factor_and_variation_1_and_its_rate_within_its
     scores, fano, variation = np.array(values).T
     assert fano.mean() == pytest.approx(1.0, abs=0.04)
     assert variation.mean() == pytest.approx(1.0, abs=0.02)
-    # Student's t of 19 degrees of freedom: standard deviation 1.06; of 20 scores it lies in .6 to 1.6
+    # Student's t of 19 degrees of freedom has the standard deviation 1.06; that of 20 scores lies in .6 to 1.6
     assert 0.6 < scores.std() < 1.6
 
 
@@ -78,12 +78,12 @@ def test_a_clock_has_no_variance_at_its_own_bins_and_says_how_the_offset_matters
     train = interval_train(np.arange(0.0, 100.0), window=(0.0, 100.0))
     whole = fano_factor(train, 2.0)
     assert (whole.value, whole.highest) == (0.0, 0.0)
-    # bins of 1.5 s hold one event or two, by turns: variance 1/4 over mean 3/2
+    # bins of 1.5 s alternate between one event and two: variance 1/4 over mean 3/2
     assert fano_factor(train, 1.5).value == pytest.approx(1.0 / 6.0, rel=0.02)
 
 
 def test_an_event_at_an_edge_belongs_to_the_bin_that_begins_there() -> None:
-    # .1 * 3 is a little more than .3, and .1 * 6 a little more than .6
+    # .1 * 3 is slightly more than .3, and .1 * 6 slightly more than .6
     train = interval_train(np.arange(40) * 0.1, window=(0.0, 4.0))
     assert bin_counts(train, 0.3)[:13].tolist() == [3.0] * 13
 

@@ -37,7 +37,7 @@ def swept(line: str) -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def dataset() -> xr.Dataset:
-    """Return from rest: no impact, P(2,2), P(1,2), P(1,1), no impact."""
+    """Return a sweep of runs from rest: no impact, P(2,2), P(1,2), P(1,1), no impact."""
     return swept('"forcing.angular_frequency" = { values = [1.5, 0.6, 0.78, 0.9, 1.1] }')
 
 

@@ -20,7 +20,7 @@ from vibroimpact.analysis.landmarks import (
 from vibroimpact.fmus.errors import DatasetError
 
 THESIS = ImpactOscillator.from_scene(SCENE)
-# Step .0125; it has a point .001 above the period doubling, where transients alternate for a long time.
+# Step .0125; one point is .001 above the period doubling, where transients alternate for a long time.
 POINTS = 81
 
 
@@ -39,7 +39,7 @@ def test_grazing_frequencies_are_those_of_the_thesis_oscillator() -> None:
 def test_the_lower_graze_keeps_its_digits_when_the_force_nearly_reaches_the_stop() -> None:
     oscillator = replace(THESIS, amplitude=1 - 1e-12)
     middle = 1 - 2 * 0.05**2
-    # First order in the small rest of 1 - F^2/a^2.
+    # To first order in the small difference 1 - F^2/a^2.
     rest = 1 - oscillator.amplitude**2
     assert grazing_frequencies(oscillator)[0] == pytest.approx(math.sqrt(rest / (2 * middle)), rel=1e-9)
 
@@ -116,7 +116,7 @@ def test_every_landmark_is_read_within_two_grid_steps(sweep: xr.Dataset) -> None
 
 
 def test_the_lower_graze_is_extrapolated_far_inside_one_grid_step(sweep: xr.Dataset) -> None:
-    # Inverse squared amplitude is a parabola in squared frequency; what is left is the decaying transient.
+    # Inverse squared amplitude is a parabola in squared frequency; only the decaying transient deviates.
     assert bifurcation_readings(sweep)[0].steps < 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Operations of this package: each argument has words, and what is run takes the operation."""
+"""Operations of this package: each argument has words, and the code behind each takes the operation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Basins over maps whose basins are known, and dimensions of borders that are known."""
+"""Basins of maps with known basins, and dimensions of known borders."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ BORDER = 0.3
 
 
 class KnownMap:
-    """A map: starts left of BORDER go to (-1, 0), those between it and 3 to a cycle of two, the others never settle.
+    """A map: starts left of BORDER go to (-1, 0), starts from there to 3 to a cycle of two, others never settle.
 
-    The chaotic starts above y = 0 hit a second stop at a rate of their own; with `bridge`, a share of all changes over.
+    The chaotic starts above y = 0 hit a second stop at a rate of their own. The share `bridge` of all chaotic starts
+    changes over.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class KnownMap:
         x, y = states.T
         rate = self._rate**periods
         left = np.column_stack([-1.0 + rate * (x + 1.0), rate * y])
-        # a cycle of two about (1, 0): y turns round
+        # a cycle of two about (1, 0): y changes its sign
         turned = (-1.0) ** periods * np.sign(y + 1e-300)
         right = np.column_stack([1.0 + rate * (x - 1.0), turned * (0.5 + rate * (abs(y) - 0.5))])
         where = np.where(x < BORDER, 0, np.where(x < 3.0, 1, 2))
@@ -193,7 +194,7 @@ def test_the_share_of_a_border_and_the_dimension_of_a_line() -> None:
 
 
 def test_the_dimension_of_a_cantor_set_of_lines() -> None:
-    # even or odd, the step in which a point falls into a middle third: the border is the Cantor set
+    # the border is the Cantor set: points are labelled by the parity of the step in which they fall into a middle third
     x = (np.arange(3**7) + 0.5) / 3**7
     side = np.full(x.size, -1)
     for step in range(7):

@@ -1,4 +1,4 @@
-"""Classes of runs: of synthetic motions whose period is known, and of simulated ones."""
+"""Classes of runs: synthetic motions with a known period, and simulated motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Energies of the modes of orbits: the worked examples of equations.md 5 and 9, limits, and data that contradict."""
+"""Energies of the modes of orbits: the worked examples of equations.md 5 and 9, limits, and contradictory data."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.analysis.orbits.energies import (
 from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.fmus.errors import UsageError
 
-#: Identity (6.32) over the energy that impacts meet, of orbits of a few periods.
+#: Error of identity (6.32) over the energy before impacts, for orbits of a few periods.
 CLOSED = 1e-12
 
 
@@ -30,7 +30,7 @@ def chain(
     restitution: float,
     position: float = 0.1,
 ) -> ImpactingBody:
-    """A chain with dampings in proportion to the stiffnesses, its stop on the last mass."""
+    """Return a chain with dampings in proportion to the stiffnesses, and its stop at the last mass."""
     springs = np.array([*stiffnesses, 0.0])
     modes = chain_modes(np.array(masses), springs, damping * springs)
     tip = modes.shapes[-1]
@@ -52,7 +52,7 @@ def test_the_chain_of_the_thesis_exchanges_what_equations_9_says() -> None:
     (orbit, *_) = closed_form(thesis())
     found = orbit_energies(orbit)
     assert found.lost.sum() == pytest.approx(0.158204452755, abs=5e-13)
-    # thesis 6.3.3 read -.3247 and .1668 J off its samples
+    # thesis 6.3.3 read -.3247 and .1668 J from its samples
     np.testing.assert_allclose(found.change, [[-0.32460411, 0.16639966]], atol=5e-9)
     np.testing.assert_allclose(found.before, [[0.36859999, 0.0078044]], atol=5e-9)
     np.testing.assert_allclose(found.after, [[0.04399588, 0.17420406]], atol=5e-9)
@@ -90,7 +90,7 @@ def test_what_an_elastic_impact_loses_is_nothing_and_a_plastic_one_all_that_it_m
 ) -> None:
     found = orbit_energies(closed_form(thesis(restitution))[0])
     assert found.residual.sum() == pytest.approx((1.0 - restitution**2) * found.kinetic.sum(), abs=1e-14)
-    # the slope is without bound at 0: rounding of the energies shows as its root
+    # the slope is unbounded at 0: rounding of the energies shows as its square root
     assert found.restitution.value == pytest.approx(restitution, abs=1e-7 if restitution == 0.0 else 1e-13)
     assert not found.restitution.problem
 

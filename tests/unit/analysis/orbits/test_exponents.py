@@ -28,7 +28,8 @@ CHAIN: dict[str, Any] = {
 
 
 def test_the_known_exponent_of_a_chaotic_oscillator() -> None:
-    # the motion hangs on the last bits of the engine: so many periods tell the exponent to a quarter of the tolerance
+    # the motion depends on the last bits of the engine; this many periods give the exponent to a quarter of the
+    # tolerance
     found = vi.lyapunov(vi.run({**CHAOS, "record": CHAOS["record"] | {"recorded_periods": 200_000}}))
     assert float(found.lyapunov_exponent[0]) == pytest.approx(0.322, abs=0.006)
     assert float(found.standard_error[0]) < 0.002

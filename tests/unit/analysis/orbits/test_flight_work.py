@@ -1,4 +1,4 @@
-"""Exact integrals over a flight: against an integration of their own, and balances that hold at any damping."""
+"""Exact integrals over a flight: against an independent integration, and balances that hold at any damping."""
 
 from __future__ import annotations
 

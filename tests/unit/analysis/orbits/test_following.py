@@ -76,7 +76,7 @@ def test_a_change_of_stability_at_a_branch_point_is_said_to_have_no_cause_that_w
     branch = follower.branch(find_orbit(body, [0.1, 0.1 + np.pi], [0, 1]), 0.99)
     (point,) = branch.points
     assert point.kind == "stability change"
-    # the loss of symmetry: a multiplier of half an orbit and its mirror image passes +1
+    # the loss of symmetry: a multiplier of half an orbit combined with its mirror image passes +1
     assert point.at.value == pytest.approx(0.97282430, abs=2e-6)
     assert all(each.orbit.is_stable for each in branch.orbits if each.value > point.at.value + 1e-6)
     assert not any(each.orbit.is_stable for each in branch.orbits if each.value < point.at.value - 1e-6)

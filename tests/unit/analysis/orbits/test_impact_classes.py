@@ -1,4 +1,4 @@
-"""Classes of runs of which impacts alone are known."""
+"""Classes of runs from impacts alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.analysis.orbits.impact_classes import own_period, states_of_per
 
 
 def table(time: np.ndarray, velocity: np.ndarray, contact: np.ndarray, rests: bool = False) -> xr.Dataset:
-    """Return impacts as a dataset has them."""
+    """Return impacts in the form of a dataset."""
     restitution = np.full(time.size, 0.5)
     if rests:
         restitution[-1] = 0.0

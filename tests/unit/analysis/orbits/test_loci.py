@@ -1,4 +1,4 @@
-"""Loci of bifurcations against the explicit ones of one mode: equations.md 4.5 and 4.6."""
+"""Loci of bifurcations against the explicit loci of one mode: equations.md 4.5 and 4.6."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def points() -> dict[str, SpecialPoint]:
 
 
 def locus_to(frequency: float, point: SpecialPoint, force: float) -> Locus:
-    """Follow a bifurcation as far as a frequency."""
+    """Return the locus of a bifurcation up to a frequency."""
     bounds = sorted((frequency, point.at.value))
     reach = FollowSettings(bounds[0] - (bounds[0] != frequency), bounds[1] + (bounds[1] != frequency), 0.03)
     return LocusFollower(oscillator, reach, FollowSettings(0.01, 3.0)).locus(point, (point.at.value, force))

@@ -77,13 +77,13 @@ def test_impacts_of_s_graze_next_and_grazes_lead_to_w(
                 side="upper" if direction > 0.0 else "lower",
             )
             assert met is not None
-            # the start beside the stop may be told as a contact at once
+            # a start next to the stop may count as a contact at once
             if met.time > 1e-3:
                 assert met.velocity == pytest.approx(speed, rel=1e-4, abs=1e-5)
                 assert math.remainder(graze + w * met.time - after, math.tau) == pytest.approx(0.0, abs=1e-4)
         before, first = found.before_phase[place], found.before_velocity[place]
         if np.isfinite(first) and first > 1e-2:
-            # from the impact to the graze: there the body is at the stop and has no speed
+            # from the impact to the graze: there the body is at the stop without speed
             length = math.remainder(graze - before, math.tau) % math.tau / w
             ends = []
             for turns in range(41):
@@ -131,7 +131,7 @@ def test_every_oscillator_has_numbers_that_an_oscillator_has(damping: float, w: 
     assume(family.map.gamma > 1e-6)
     found = family.map.oscillator
     assert found is not None
-    # the fastest one so forced: others turn more often in a period
+    # the fastest such oscillator: others turn more often in a period
     assert found[1] >= w * (1.0 - 1e-6)
     again = grazing_family(body_of(found[0], w=found[1]), 0.9).map
     assert (again.alpha, again.gamma) == pytest.approx(
@@ -150,10 +150,10 @@ def test_before_the_graze_there_is_one_fixed_point(alpha: float, gamma: float) -
 def test_periods_are_added_one_by_one_towards_the_graze() -> None:
     rho = np.linspace(1e-3, 0.1, 3000)
     found = periods_of(Nordmark(0.65, 0.05).diagram(rho, 120))
-    # 6 is the double of 3, too
+    # 6 is a multiple of 3, too
     middles = [float(rho[found == period].mean()) for period in (3, 4, 5)]
     assert middles == sorted(middles, reverse=True)
-    # the diagram is drawn into itself by the larger eigenvalue squared
+    # the diagram is self-similar with the square of the larger eigenvalue
     larger = 0.5 * (0.65 + math.sqrt(0.65**2 - 4.0 * 0.05))
     assert middles[2] / middles[1] == pytest.approx(larger**2, rel=0.35)
 
@@ -180,7 +180,7 @@ def test_the_three_classes_of_the_square_root_map(slope: float, chaos: bool) -> 
 @given(st.floats(0.05, 0.24), st.floats(1e-6, 1e-2))
 @settings(max_examples=40)
 def test_small_slopes_are_periodic_and_scale_by_their_square(slope: float, offset: float) -> None:
-    # one visit below d in each round: x scales with d, and a round is longer by one where d is slope^2 as large
+    # one visit below d in each round: x scales with d, and a round is one step longer where d is slope^2 times as large
     pair = square_root_diagram(slope, np.array([offset, offset * slope**2]), 200, 5_000)
     found = periods_of(pair, 1e-7)
     assert (found > 0).all()

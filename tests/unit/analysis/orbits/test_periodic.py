@@ -88,7 +88,7 @@ def test_the_flip_of_the_worked_example_has_a_multiplier_of_minus_one() -> None:
 
 
 def test_at_the_fold_of_the_worked_example_two_orbits_meet_and_end() -> None:
-    # equations.md 4.5; multipliers part with the root of the distance from the fold
+    # equations.md 4.5; the multipliers separate with the square root of the distance from the fold
     force = 0.180607698844102
     assert closed_form(oscillator(force - 1e-9, 1.35)) == ()
     fast, slow = closed_form(oscillator(force + 1e-9, 1.35))
@@ -100,7 +100,7 @@ def test_at_the_fold_of_the_worked_example_two_orbits_meet_and_end() -> None:
 def test_physical_orbits_end_at_the_graze_of_a_maximum_between_impacts(
     frequency: float, physical: bool
 ) -> None:
-    # equations.md 9: the P(1,2) of damping ratio .1 grazes at .83585707234244, and at .839 still misses the stop
+    # equations.md 9: the P(1,2) of damping ratio .1 grazes at .83585707234244, and still misses the stop at .839
     (orbit,) = closed_form(oscillator(0.5, frequency, 0.1, 1.0, 0.7), 2)
     assert orbit.is_physical is physical
     (at_graze,) = closed_form(oscillator(0.5, 0.83585707234244, 0.1, 1.0, 0.7), 2)
@@ -127,7 +127,7 @@ def test_the_chain_of_the_energy_example_penetrates() -> None:
 
 @pytest.mark.parametrize("ratio", [0.05, 1.0, 1.0 + 1e-9, 3.0, 40.0])
 def test_the_motion_between_impacts_ends_where_the_next_impact_is(ratio: float) -> None:
-    # a stiff mode of high damping decays as exp(-2 ratio natural u): a cosh of it would overflow
+    # a stiff mode of high damping decays as exp(-2 ratio natural u); a cosh in its place would overflow
     shape = np.array([1.0, 0.4])
     natural, ratios, force = np.array([1.0, 60.0]), np.array([0.05, ratio]), np.array([0.5, 0.2])
     contact = Contact(shape, 1.0, 0.3, 0.7)

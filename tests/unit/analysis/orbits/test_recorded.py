@@ -1,4 +1,4 @@
-"""The orbit next to recorded impacts: told from transients, from its halves, and from what does not repeat."""
+"""The orbit next to recorded impacts, separated from transients, from its halves, and from motion without a period."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def oscillator(force: float, rate: float) -> ImpactingBody:
 
 
 def recorded(orbit: PeriodicOrbit, rounds: int, begin: float = 1000.0) -> Impacts:
-    """Return what a run records of an orbit: phases within a turn, velocities, and times from somewhere on."""
+    """Return the impacts that a run records of an orbit: phases within a turn, velocities, and times from `begin`."""
     phases = (orbit.phases + TURN * orbit.periods * np.arange(rounds)[:, None]).ravel()
     times = begin + phases / orbit.body.angular_frequency
     contacts = np.tile(orbit.contacts, rounds).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Recordings come back from a file as they were, and what contradicts the schema is refused."""
+"""Recordings come back from a file unchanged, and contradictions of the schema are refused."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 
 def example() -> Recording:
-    """Two axes of different triggers, an uneven one among them, a train, a value."""
+    """Return a recording of two axes with different triggers, one of them uneven, an event train, and a value."""
     even = TimeAxis(0.1 * np.arange(6), 0.1, 0.033, "wf_increment", "one.lvm")
     uneven = TimeAxis(np.array([0.0, 0.2, 0.25]), None, source="column 1", trigger="two.lvm")
     quality = np.array([0, 1, 0, 2, 8, 0], np.uint8)
@@ -75,7 +75,7 @@ def test_a_recording_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 def test_good_samples_are_those_that_are_there_and_within_range() -> None:
     board = example().channels["board"]
-    # a doubtful time does not make a value bad; a clipped or missing one is
+    # a doubtful time does not make a value bad; a clipped or missing value is bad
     assert board.good.tolist() == [True, False, True, False, True, True]
     np.testing.assert_allclose(board.si()[:3], 9.80665 * np.array([1.0, 5.0, 2.0]))
 

@@ -1,4 +1,4 @@
-"""Signals as xarray's arrays: what an analysis makes of them, and what it refuses."""
+"""Signals as xarray's arrays: their use in analyses, and their refusals."""
 
 from __future__ import annotations
 

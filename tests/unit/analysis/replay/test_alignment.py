@@ -37,7 +37,7 @@ def test_stated_error_of_the_lag_is_that_of_many_noisy_records() -> None:
     results = [found(measured(0.05, seed)) for seed in range(40)]
     scatter = np.sqrt(np.mean([(result.lag - LAG) ** 2 for result in results]))
     stated = np.mean([result.lag_error for result in results])
-    # it also holds the difference to the first half of the window, and so is on the safe side
+    # it also contains the difference to the first half of the window, so it is on the safe side
     assert 0.4 * stated < scatter < stated
 
 
@@ -71,7 +71,7 @@ def test_a_model_of_wrong_frequency_cannot_hide_in_the_lag() -> None:
     assert comparison.variance < 60.0
     # it shifts by about the share of 2 % times the distance from onset to the centre of the window
     assert 0.0 < comparison.alignment.lag - LAG < 0.02 * 3.0 / FREQUENCY
-    # and its stated error tells that the halves of the window disagree
+    # and its stated error shows that the halves of the window disagree
     assert comparison.alignment.lag_error > 0.1 * (comparison.alignment.lag - LAG)
 
 

@@ -1,4 +1,4 @@
-"""The dataset, the table and the figure of comparisons. References: what the comparisons themselves hold."""
+"""The dataset, the table and the figure of comparisons. References: the attributes of the comparisons."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_scores_are_one_number_for_each_channel(tmp_path: Path) -> None:
     assert dataset["variance_accounted_for"].values.tolist() == [first.variance, second.variance]
     assert dataset["polarity"].values.tolist() == [-1.0, 1.0]
     assert dataset["lag"].values[0] == first.alignment.lag
-    # two windows were asked for of the board, none of the tip
+    # two windows were requested for the board, none for the tip
     assert dataset["window_variance"].values[0].tolist() == first.window_variance.tolist()
     assert np.all(np.isnan(dataset["window_variance"].values[1]))
     assert dataset["board_event_missed"].values.tolist() == [0.07]

@@ -1,5 +1,5 @@
-"""A board shaken through its base, replayed with one mode (pcb_repeated_shock). Reference: the second trial, which the
-parameters were not fitted on."""
+"""A board shaken through its base, replayed with one mode (pcb_repeated_shock). Reference: the second trial, which was
+not used in the fit of the parameters."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Floats = NDArray[np.float64]
 GRAVITY = 9.80665
 #: Least squares on trial a0 alone, lag from the start of its event.
 FREQUENCY, DAMPING_RATIO, GAIN = 802.29, 0.009944, 0.8501
-#: Shape at the middle times participation of the first mode of a clamped-clamped beam.
+#: Shape at the middle, and participation, of the first mode of a clamped-clamped beam.
 PARTICIPATION = 1.5881463 * 0.8308615
-#: The board's accelerometer stops at 546.5 g.
+#: The board's accelerometer clips at 546.5 g.
 LIMIT = 546.4
 MOST_LAG = 0.02
 
 
 def base(trial: str) -> tuple[Floats, Floats]:
-    """Time (s) and acceleration (g) of the base, its offset removed where it has come to rest."""
+    """Return time (s) and acceleration (g) of the base, minus its offset at rest."""
     rows = np.loadtxt(recording_folder("pcb_repeated_shock") / f"acc_base_{trial}.txt")
     return rows[:, 0], rows[:, 1] - np.mean(rows[-500:, 1])
 
@@ -40,7 +40,7 @@ def board(trial: str) -> Channel:
 
 @lru_cache(maxsize=4)
 def replayed(trial: str, frequency: float) -> tuple[Floats, Floats]:
-    """Time (s) and absolute acceleration (m/s^2) at the middle: gain times base plus relative."""
+    """Return time (s) and absolute acceleration (m/s^2) at the middle: gain times base plus relative."""
     time, recorded = base(trial)
     interval = float(np.mean(np.diff(time)))
     count = int(0.105 / interval)
@@ -85,7 +85,7 @@ def test_the_inverted_board_lags_by_its_trigger_in_both_trials() -> None:
     for trial, lag in (("a0", 8.325e-3), ("a1", 8.305e-3)):
         found = compared(trial).alignment
         assert found.polarity == -1
-        # to be within .4 points of the best VAF the lag must be known to 12 us: sqrt(.004) of a radian at 803 Hz
+        # a VAF within .4 points of the best needs the lag to 12 us: sqrt(.004) of a radian at 803 Hz
         assert abs(found.lag - lag) < 12e-6
         assert found.lag_error < 12e-6
         assert found.remarks == ()

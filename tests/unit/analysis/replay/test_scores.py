@@ -1,4 +1,4 @@
-"""Scores of a replay. References: closed forms of sines and rings, stated beside each number."""
+"""Scores of a replay. References: closed forms of sines and rings, stated with each number."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVERY = np.ones(len(TIME), dtype=bool)
 
 
 def between(start: float, stop: float) -> slice:
-    """Rows from `start` (within) to `stop` (not within)."""
+    """Return the rows from `start` (included) to `stop` (excluded)."""
     return slice(*np.searchsorted(TIME, [start, stop]).tolist())
 
 
@@ -225,7 +225,7 @@ def test_a_drive_that_looks_unlike_its_response_predicts_little() -> None:
 
 
 def test_a_linear_replay_of_an_impacting_board_is_not_to_be_trusted() -> None:
-    """Scores of the kind found on smd_repeated_5kg: 73 to 78 % on the fitted record, nothing on the other."""
+    """Scores as found on smd_repeated_5kg: 73 to 78 % on the fitted record, nothing on the other."""
     verdict = trust({"05": 78.0}, {"00": np.nan})
     assert not verdict.trusted
     assert verdict.words.startswith("Do not trust")
@@ -234,7 +234,7 @@ def test_a_linear_replay_of_an_impacting_board_is_not_to_be_trusted() -> None:
 
 
 def test_a_replay_that_predicts_another_trial_is_to_be_trusted() -> None:
-    """Scores of the kind found on pcb_repeated_shock: 98.8 % on a trial not fitted."""
+    """Scores as found on pcb_repeated_shock: 98.8 % on a trial that was not fitted."""
     verdict = trust({"a0": 98.9}, {"a1": 98.8}, {"a1": 4.0})
     assert verdict.trusted
     assert "a1" in verdict.words
@@ -255,7 +255,7 @@ def test_a_fit_that_has_learnt_its_record_is_told() -> None:
     verdict = trust({"a": 99.9}, {"b": 96.0})
     assert verdict.trusted
     assert "learnt its record" in verdict.reasons[0]
-    # one in ten thousand of the variance is no loss, however much less its own record keeps
+    # one in ten thousand of the variance is no loss, however small the residual on its own record is
     assert trust({"a": 99.9999}, {"b": 99.99}).reasons == ()
 
 
@@ -277,11 +277,11 @@ def test_a_replay_holds_to_where_it_gets_out_of_step() -> None:
 def test_what_is_lost_in_noise_neither_holds_nor_fails() -> None:
     drawn = np.random.default_rng(8).normal(0.0, 0.05, len(TIME))
     perfect = compare(TIME, MODEL, channel(MODEL + drawn), lag=0.0, polarity=1)
-    # 100 ms after the hit the ring has fallen to e^(-1.26), with a mean square of 16 times that of the noise
+    # 100 ms after the hit the ring has decayed to e^(-1.26), with a mean square of 16 times that of the noise
     assert perfect.running_variance[-1] < 75.0
     assert perfect.held.broken is None
     assert perfect.held.words == "to 107.8 ms after the onset (noise hides the rest)"
-    # a model that rings on in that noise fails
+    # a model that still rings in that noise fails
     on = compare(TIME, ring(TIME - HIT, damping_ratio=0.004), channel(MODEL + drawn), lag=0.0, polarity=1)
     assert on.held.broken is not None
 

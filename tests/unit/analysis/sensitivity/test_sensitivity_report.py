@@ -1,4 +1,4 @@
-"""Sobol indices of campaigns: real ones, runs that failed, and datasets that have no whole design."""
+"""Sobol indices of campaigns: real campaigns, failed runs, and datasets without a whole design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sobol indices from arrays: closed forms, scipy's estimator, intervals, and values that are not there."""
+"""Sobol indices from arrays: closed forms, scipy's estimator, intervals, and missing values."""
 
 from __future__ import annotations
 
@@ -84,9 +84,9 @@ def test_intervals_hold_the_closed_forms(function, keys, exact):  # type: ignore
     for seed in range(10):
         found = estimated(*values_of(function, 8, keys, seed))
         for interval, truth in zip((found.first_interval[0], found.total_interval[0]), exact, strict=True):
-            # the total of a key that does nothing is 0 to rounding, and so is its interval
+            # the total index of a key without effect is 0 to rounding, and so is its interval
             held.append((interval[:, 0] <= truth + 1e-12) & (truth - 1e-12 <= interval[:, 1]))
-    # 95 %, and more of points that are more even than random ones
+    # 95 %, and more for points that are more even than random points
     assert np.mean(held) > 0.9
 
 

@@ -1,4 +1,4 @@
-"""Spikes in signals whose spikes are known; the signals are made in `spike_signals.py`."""
+"""Spikes in signals with known spikes; `spike_signals.py` makes the signals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vibroimpact.analysis.spikes.report import unobserved
 from vibroimpact.fmus.core.measuring import LoadCell
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
-# A half-sine of the load cell: peak 2.5, .8 ms long, every 50 ms, read at 40 kHz, threshold .3.
+# A half-sine of the load cell: peak 2.5, .8 ms long, every 50 ms, sampled at 40 kHz, threshold .3.
 PEAK, LENGTH, PERIOD, RATE, THRESHOLD = 2.5, 0.8e-3, 0.05, 40_000.0, 0.3
 COUNT = 41
 
@@ -44,7 +44,7 @@ def test_half_sines_have_the_contact_time_impulse_and_peak_of_their_formulas() -
     assert data["spike_impulse"].values == pytest.approx(1.27324e-3, rel=2e-3)
     assert data.attrs["waveform"] == "half_sine"
     assert data.sel(waveform="half_sine")["spike_fit_length"].values == pytest.approx(LENGTH, rel=2e-3)
-    # a part sqrt(1 - (H/A)^2) = .992774 of the impulse is above the threshold's two crossings
+    # the share sqrt(1 - (H/A)^2) = .992774 of the impulse is between the two crossings of the threshold
     assert data["spike_impulse_above"].values == pytest.approx(0.992774 * 1.27324e-3, rel=2e-3)
 
 
@@ -97,8 +97,8 @@ def noise(kind: str, rng: np.random.Generator, length: int) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["white", "pink", "laplace", "student"])
 def test_noise_alone_has_no_spikes_and_no_cycle(kind: str) -> None:
-    # 25 records with .1 false alarms stated in each: 2.5 are expected from a law that is met exactly; the four
-    # samples that a spike needs take nearly all of them away
+    # 25 records with .1 false alarms each: 2.5 are expected for an exact law. The four samples that a spike needs
+    # exclude nearly all of them.
     rng = np.random.default_rng(5)
     settings = SpikeSettings(false_alarms=0.1)
     alarms = 0
@@ -111,8 +111,8 @@ def test_noise_alone_has_no_spikes_and_no_cycle(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["white", "laplace", "student"])
 def test_single_samples_of_noise_pass_the_threshold_as_often_as_stated(kind: str) -> None:
-    # with one sample enough for a spike, 60 records at .1 false alarms have 6 at most in expectation;
-    # 12 would be exceeded once in a hundred times by a Poisson law of mean 6
+    # one sample is enough for a spike: 60 records at .1 false alarms have at most 6 in expectation. A Poisson law of
+    # mean 6 exceeds 12 once in a hundred times.
     rng = np.random.default_rng(6)
     settings = SpikeSettings(method="threshold", minimum_samples=1, false_alarms=0.1)
     alarms = sum(len(identify(channel(noise(kind, rng, 2000), 1e-3), settings).groups) for _ in range(60))
@@ -165,7 +165,7 @@ def test_a_spike_and_its_ringing_are_one_spike_and_a_second_impact_is_another() 
     ring = np.zeros(len(time))
     for start, peak in ((0.01, 1000.0), (0.06, 300.0)):
         later = np.maximum(time - start, 0.0)
-        # first a half-sine of .2 ms, then ringing at 8 kHz that dies out within 5 ms
+        # first a half-sine of .2 ms, then ringing at 8 kHz that decays within 5 ms
         ring += pulses(time, np.array([start]), np.array([peak]), 2e-4)
         ring += (later > 2e-4) * 0.3 * peak * np.exp(-later / 1e-3) * np.sin(2.0 * np.pi * 8e3 * later)
     noisy = ring + 0.5 * np.random.default_rng(11).standard_normal(len(time))
@@ -178,7 +178,7 @@ def test_a_spike_and_its_ringing_are_one_spike_and_a_second_impact_is_another() 
 
 
 def test_contacts_of_like_strength_in_quick_succession_are_so_many_spikes() -> None:
-    # 5 lengths apart, with nothing between: no ringing, which would be weaker
+    # 5 lengths apart, with nothing in between: no ringing, which would be weaker
     time = np.arange(8000) / RATE
     starts = 0.05 + 5.0 * LENGTH * np.arange(6)
     signal = pulses(time, starts, np.array([2.0, 1.5, 1.8, 2.5, 1.6, 2.0]), LENGTH)
@@ -243,7 +243,7 @@ def test_missing_samples_are_bridged_and_their_spike_is_marked() -> None:
     report = spike_report(channel(values, 1.0 / RATE))
     data = report.dataset
     assert data.sizes["spike"] == COUNT
-    # a spike could hide in the longer one only
+    # only the longer pause could hide a spike
     assert np.array(unobserved(report)) == pytest.approx(np.array([[0.09, 0.1]]), abs=2.0 / RATE)
     assert np.flatnonzero(data["spike_clipped"].values).tolist() == [1]
 
@@ -323,7 +323,7 @@ def test_time_above_a_threshold_is_that_of_the_half_sine_at_any_threshold() -> N
 
 
 def test_a_load_cell_that_rings_after_each_of_many_impacts_keeps_its_threshold_near_its_noise() -> None:
-    # the ring is everything from noise to a twentieth of the peak: no gap tells it from the tail of the noise
+    # the ring ranges from the noise to a twentieth of the peak: no gap separates it from the tail of the noise
     time = np.arange(160_000) / 20_000.0
     starts, impulses = 0.02430 + 0.10667 * np.arange(75), np.tile([0.05, 0.0375, 0.0116], 25)
     cell = LoadCell(1.0, natural_frequency=8e3, damping_ratio=0.05, contact_duration=1.5e-3)

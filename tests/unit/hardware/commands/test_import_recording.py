@@ -1,4 +1,4 @@
-"""`vibroimpact import` as a person uses it, and the settings files it reads."""
+"""`vibroimpact import` on the command line, and the settings files it reads."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def command(*arguments: str | Path) -> int:
 
 @pytest.fixture
 def pair(tmp_path: Path) -> tuple[Path, Path]:
-    """Two files of one test: the base clipped at 3, the board with an overrange."""
+    """Two files of one test: the base, clipped at 3, and the board, with an overrange."""
     time = np.arange(400) * 1e-3
     ring = np.round(5.0 * np.exp(-5.0 * time) * np.sin(200.0 * time), 4)
     base, board = tmp_path / "base.txt", tmp_path / "board.txt"

@@ -1,4 +1,4 @@
-"""`vibroimpact rig`: served in a process of its own, listed, recorded from; what is refused ends with exit code 2."""
+"""`vibroimpact rig`: served in a separate process, listed, recorded from; refusals end with exit code 2."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_served_rig_is_driven_and_recorded_by_two_programs(address: str, tmp_p
     tip, loop = recording.channel("tip"), recording.channel("loop")
     assert (tip.unit, len(tip.values), tip.axis.rate) == ("V", 8000, 2000.0)
     np.testing.assert_allclose(loop.values, 1.0, atol=2e-4)
-    # 0.1 N on 100 N/m comes to rest at 1 mm: 1 V
+    # 0.1 N on 100 N/m settles at 1 mm: 1 V
     assert truth["displacement"] == pytest.approx(1e-3, rel=1e-3)
     assert tip.values[-1] == pytest.approx(1.0, abs=2e-3)
     assert "rig record of" in in_this_process("describe", tmp_path / "held.nc").stdout

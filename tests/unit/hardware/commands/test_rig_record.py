@@ -1,4 +1,5 @@
-"""`vibroimpact rig record` in a process that is interrupted, killed, or has no disk left: nothing measured is lost."""
+"""`vibroimpact rig record` in a process that is interrupted, killed, or has a full disk: no measured sample is
+lost."""
 
 from __future__ import annotations
 
@@ -77,7 +78,7 @@ def test_a_recording_that_is_killed_is_recovered_with_all_that_reached_its_journ
     assert len(found.channel("tip").values) == samples
     np.testing.assert_allclose(found.channel("back").values, 1.0, atol=1e-3)
     assert found.channel("back").attrs["role"] == "loopback"
-    # the journal is still there, so that the next recording does not take its name
+    # the journal still exists, so that the next recording does not take its name
     again = in_this_process(*words(address, "--duration", "1", "-o"), tmp_path / "tip.nc", "--force")
     assert again.returncode == 2
     assert "tip.journal: expected no journal of an earlier measurement, got one" in again.stderr
@@ -122,13 +123,13 @@ def test_a_disk_that_takes_no_more_is_said_and_what_is_there_is_kept(address: st
     done = warm.run(limit + ENTRY, *words(address, "-o", "tip.nc", "--duration", "60"), cwd=tmp_path)
     assert done.returncode == 1, done.stderr
     assert "ended early: the journal cannot be written: File too large" in done.stderr
-    # zeros and ones are compressed well, so that the recording fits
+    # zeros and ones compress well, so that the recording fits
     assert len(open_recording(tmp_path / "tip.nc").channel("tip").values) * 16 >= 400_000
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of the size of files")
 def test_a_recording_that_cannot_be_written_is_still_in_its_journal(address: str, tmp_path: Path) -> None:
-    # the journal of a second of one input has 170 kB; the disk takes files of that size, then smaller ones only
+    # the journal of 1 s of one input has 170 kB; the disk takes one such file, then only smaller ones
     limit = FULL.format(limit=10_000_000) + (
         "import vibroimpact.hardware.programs.measuring as m\n"
         "write = m.write_and_show\n"

@@ -1,4 +1,4 @@
-"""Recordings that were cut off: a last sample that may be wrong is missing, or it is said."""
+"""Truncated recordings: a last sample that may be wrong is missing or reported."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LABVIEW = (
 
 
 def rows(form: str, newline: str = "\n") -> str:
-    """Return the table with each row in this form."""
+    """Return the table with each row in the given form."""
     return "".join(form.format(t, a, b) + newline for t, a, b in zip(TIME, BASE, BOARD, strict=True))
 
 
@@ -86,7 +86,7 @@ def test_up_to_90_bytes_cut_off_are_never_wrong_and_silent(text: str, tmp_path: 
 def test_a_last_number_that_lacks_digits_is_missing_and_said(name: str, tmp_path: Path) -> None:
     text = WRITERS[name].rstrip()
     whole = imported(tmp_path, text.encode())
-    assert not is_told(whole)  # of as many digits as all others: a writer without a last line break
+    assert not is_told(whole)  # as many digits as in all others: a writer without a final line break
     for cut in (1, 2, 3, 5):
         board = imported(tmp_path, text[:-cut].encode()).channels["board"]
         assert len(board.values) == ROWS
@@ -111,7 +111,7 @@ def test_a_row_cut_within_its_instant_is_left_out(tmp_path: Path) -> None:
 
 
 def test_a_row_cut_within_an_instant_of_all_digits_is_no_row_in_the_wrong_place(tmp_path: Path) -> None:
-    """`0.58` is left of `0.5861328125`: earlier than the rows above, and shorter than none of all their instants."""
+    """`0.58` remains of `0.5861328125`: earlier than the rows above, and no shorter than their shortest instant."""
     instants = [f"{place / 512.0!r},{value:.6f},{value:.6f}\n" for place, value in enumerate(BASE)]
     recording = imported(tmp_path, ("t,base,board\n" + "".join(instants) + "0.07").encode())
     assert len(recording.channels["base"].values) == ROWS

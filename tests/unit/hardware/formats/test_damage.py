@@ -1,4 +1,4 @@
-"""Files that are damaged or lie: a recording or one clear refusal, never another error, and no file left behind."""
+"""Damaged or inconsistent files give a recording or one clear refusal, never another error or a stray file."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ INSERTED = (
 
 @st.composite
 def damaged(draw: st.DrawFn) -> tuple[str, bytes]:
-    """Return a file with some bytes changed, put in, taken out, or its end cut off."""
+    """Return a file with some bytes changed, inserted or removed, or with its end cut off."""
     ending = draw(st.sampled_from(["csv", "lvm", "nc", "tdms"]))
     content = bytearray(WHOLE[ending])
     for _ in range(draw(st.integers(1, 4))):
@@ -109,7 +109,7 @@ def damaged(draw: st.DrawFn) -> tuple[str, bytes]:
 
 
 def imported(path: Path) -> tuple[Recording | None, str]:
-    """Return the recording, or the refusal; any other error comes out."""
+    """Return the recording or the refusal; any other error is raised."""
     try:
         return import_recording([path]), ""
     except (DatasetError, UsageError) as refusal:
@@ -117,7 +117,7 @@ def imported(path: Path) -> tuple[Recording | None, str]:
 
 
 def import_or_refuse(ending: str, content: bytes) -> str | None:
-    """Return the refusal; None where a recording was made, which is then written."""
+    """Return the refusal; None if a recording was made, which is then written."""
     with TemporaryDirectory() as folder:
         path, output = Path(folder) / f"record.{ending}", Path(folder) / "record_imported.nc"
         path.write_bytes(content)
@@ -126,7 +126,7 @@ def import_or_refuse(ending: str, content: bytes) -> str | None:
             write_recording(recording, output)
             return None
         assert said.startswith(str(path))
-        assert "Report it" not in said  # an error that no reader foresaw
+        assert "Report it" not in said  # an error that no reader anticipated
         return said
 
 
@@ -179,7 +179,7 @@ def test_a_name_that_flags_use_is_refused_by_the_writer(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("place", [136, 152, 176, 184, 190, 400, len(WHOLE["mat"]) - 60])
 def test_a_damaged_matlab_file_cannot_take_the_program_with_it(place: int) -> None:
-    """scipy's reader crashes on some."""
+    """scipy's reader crashes on some of them."""
     content = bytearray(WHOLE["mat"])
     content[place] ^= 0xFF
     refusal = import_or_refuse("mat", bytes(content))

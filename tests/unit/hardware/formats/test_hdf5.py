@@ -1,4 +1,4 @@
-"""HDF5 files and MATLAB files of version 7.3, written here with h5py, hostile ones too."""
+"""HDF5 files and MATLAB files of version 7.3, written here with h5py, including malicious ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ACC = np.sin(TIME * 40.0)
 
 
 def matlab73(path: Path) -> Path:
-    """Write a file as MATLAB does: dimensions the other way round, structures as groups, a block before it all."""
+    """Write a file as MATLAB does: dimensions in reverse order, structures as groups, a leading user block."""
     with h5py.File(path, "w", userblock_size=512) as file:
         arrays = {"t": TIME[None, :], "acc": np.stack([ACC, -ACC]), "run/force": ACC[None, :] * 3.0}
         for name, values in arrays.items():
@@ -166,7 +166,7 @@ def test_attributes_of_unusual_kinds_and_circles_of_groups_do_no_harm(tmp_path: 
 def test_a_file_of_another_program_is_not_shown_to_the_netcdf_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The NetCDF library follows every link, also in a circle: it took 20 s and 4 GB for 5 kB."""
+    """The NetCDF library follows every link, even in a circle: 20 s and 4 GB for 5 kB."""
     path = tmp_path / "circle.h5"
     with h5py.File(path, "w") as file:
         file["time"], file["acc"] = TIME, ACC

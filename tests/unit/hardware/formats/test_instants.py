@@ -81,7 +81,7 @@ def test_day_or_month_first_is_asked_about_where_both_fit_and_differ(form: str, 
         read(tmp_path, daily)
     order = "month-first" if form.startswith("%m") else "day-first"
     assert read(tmp_path, daily, dates=order).channels["force"].axis.interval == pytest.approx(86_400.0)
-    # a rate makes the question needless
+    # a given rate makes the question unnecessary
     assert read(tmp_path, daily, rate=2.0).channels["force"].axis.rate == pytest.approx(2.0)
 
 

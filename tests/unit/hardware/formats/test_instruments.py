@@ -1,4 +1,4 @@
-"""Exports of instruments, written by `support.instrument_files` with drawn content, are read as what they are."""
+"""Exports of instruments, written by `support.instrument_files` with drawn content, are recognized and read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LabVIEW measurement files, written here as National Instruments' specification of the format says."""
+"""LabVIEW measurement files, written here according to National Instruments' specification of the format."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_with_a_column_of_instants_for_each_channel_each_has_its_own_axis(tmp_pa
 
 @pytest.mark.parametrize("first", [0, 30])
 def test_a_segment_that_goes_on_later_is_joined_and_its_gap_is_missing(tmp_path: Path, first: int) -> None:
-    """The instants of the second segment begin again, or run on: .3 s after the start in both cases."""
+    """The instants of the second segment restart or continue: 0.3 s after the start in both cases."""
     labels = "X_Value\tbase\tboard\tComment"
     later = segment(two_channels(20, first), labels, begins="20:00:00.8")
     recording = imported(

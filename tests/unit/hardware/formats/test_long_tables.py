@@ -1,4 +1,4 @@
-"""Long tables are parsed in pieces, and read as the same text is read by lines."""
+"""Long tables are parsed in pieces, with the same result as line by line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibroimpact.hardware.formats.text import read_text
 
 VALUES = np.round(np.random.default_rng(5).normal(size=(3, 900)), 6)
 MOST_MEMORY = 1_000_000_000
-"""Bytes that an import of 10^7 rows may take in all its processes; lines of text took 2.2 GB."""
+"""Maximum memory of an import of 10^7 rows, bytes in all its processes; lines of text took 2.2 GB."""
 
 
 def table(mark: str, decimal: str, end: str = "\n") -> str:
@@ -74,7 +74,7 @@ def test_a_table_in_pieces_is_the_table_by_lines(kind: str, monkeypatch: pytest.
 def test_a_table_of_plain_numbers_is_read_in_pieces(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(text, "LONG", 1000)
     monkeypatch.setattr(long_tables, "_PIECE", 8000)
-    monkeypatch.setattr(text, "_rows", None)  # what reads a table by lines
+    monkeypatch.setattr(text, "_rows", None)  # the reader by lines
     assert len(read_text(TEXTS[kind]).tables[0].columns) == 3
 
 

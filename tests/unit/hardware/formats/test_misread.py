@@ -1,4 +1,4 @@
-"""Tables that were read as something else without a word: pairs of columns, headings that look like units, clocks."""
+"""Tables that were silently misread: pairs of columns, headings that look like units, clocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formats that are not read here are named, with a package that reads them; headers are those of their documents."""
+"""Unsupported formats are named, with a package that reads them; headers follow their documentation."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ AS_EVENTS = "the columns hold 0 and 1 only: an event train each"
 
 
 def trials(*runs: Any) -> Any:
-    """Return a raster, shape (trial, sample), with ones at these samples."""
+    """Return a raster, shape (trial, sample), with ones at the given samples."""
     found = np.zeros((len(runs), 200))
     for row, places in zip(found, runs, strict=True):
         row[list(places)] = 1.0

@@ -1,4 +1,4 @@
-"""Files are read in a process of their own: the same numbers as here, and no file that holds it up."""
+"""Files are read in a separate process: with the same numbers as here, and within bounded time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vibroimpact.hardware.formats.reading import read_file
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
 from vibroimpact.hardware.recordings import import_recording
 
-FIELDS = ("label", "unit", "interval", "start", "group", "rails", "attrs", "dated", "doubt")
+FIELDS = ("label", "unit", "interval", "start", "group", "rails", "attrs", "dated", "ambiguity")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def server_of_all() -> Iterator[ReaderServer]:
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch, server_of_all: ReaderServer) -> ReaderServer:
-    """Return the server of the tests of this file, in place of that of the process."""
+    """Return the server of the tests of this file, in place of the process's own."""
     monkeypatch.setattr(reader_process, "_server", server_of_all)
     return server_of_all
 
@@ -98,7 +98,7 @@ def test_an_error_that_no_reader_foresaw_is_a_refusal_with_the_name_of_the_file(
 def test_no_python_is_started_anew_to_read_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: bool
 ) -> None:
-    """Python, numpy and pint took 1.3 s of processor time, a fork takes 0.02 s."""
+    """A new Python with numpy and pint takes 1.3 s of processor time, a fork 0.02 s."""
     server = ReaderServer()
     monkeypatch.setattr(reader_process, "_server", server)
     path = tmp_path / "record.tdms"
@@ -123,7 +123,7 @@ def test_what_is_one_column_or_array_stays_one_on_its_way() -> None:
     same_files(copy, raw)
     assert copy.tables[0].time is copy.tables[1].time is copy.tables[0].columns[1]
     assert len(buffers) == 3
-    copy.tables[0].columns[0].values[0] = 5.0  # as any array
+    copy.tables[0].columns[0].values[0] = 5.0  # writable, as any array
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_facts_that_lie_are_refused(change: Mapping[str, Any]) -> None:
 
 
 def nested(levels: int) -> dict[str, Any]:
-    """Return scales each of which adds the one before to itself: npTDMS computes the first 2^levels times."""
+    """Return scales each of which adds the previous one to itself: npTDMS computes the first 2^levels times."""
     known: dict[str, Any] = {"NI_Number_Of_Scales": np.uint32(levels), "wf_increment": 0.01}
     for at in range(levels):
         inputs = np.uint32(at - 1 if at else 0xFFFFFFFF)
@@ -172,7 +172,7 @@ def test_a_file_whose_reading_does_not_end_is_given_up_and_named(
 def test_a_file_that_takes_more_memory_than_its_size_allows_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What other files left of the memory of this process is the fork's too: it is asked for far more."""
+    """The fork inherits the memory that other files left in this process: the request is far larger."""
     monkeypatch.setattr(reading, "MEMORY", 1 << 20)
     monkeypatch.setattr(reading_child, "read_raw", lambda path, **options: np.ones(1 << 25))
     path = tmp_path / "record.csv"

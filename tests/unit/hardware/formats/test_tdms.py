@@ -167,7 +167,7 @@ def test_groups_that_began_at_the_same_instant_have_one_trigger(tmp_path: Path, 
 def test_more_scales_than_a_program_writes_are_refused_before_the_data(
     tmp_path: Path, known: dict[str, Any], said: str, place: str
 ) -> None:
-    """The number is the length of a loop in npTDMS: a file of 243 bytes took half an hour, one of 6 kB 4.8 GB."""
+    """npTDMS loops over that number: a file of 243 bytes took half an hour, one of 6 kB 4.8 GB."""
     own = known if place == "channel" else {}
     objects = [
         RootObject(known if place == "file" else {}),

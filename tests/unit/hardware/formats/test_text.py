@@ -1,4 +1,4 @@
-"""Tables of text; the references are the numbers that each test writes."""
+"""Tables of text; the references are the numbers written by each test."""
 
 from __future__ import annotations
 
@@ -367,7 +367,7 @@ def test_days_beside_clocks_give_them_their_dates_where_rows_differ_in_width() -
 def test_one_column_whose_lines_end_in_a_delimiter_keeps_its_unit(
     tmp_path: Path, mark: str, bom: str
 ) -> None:
-    """Behind a tab the heading was taken for two: the unit of the only channel was lost."""
+    """After a tab the heading counted as two: the unit of the only channel was lost."""
     path = tmp_path / "record.txt"
     rows = "".join(f"{value}{mark}\n" for value in (2.5, -1.25, 0.6, 0.8, 0.9))
     path.write_text(f"{bom}base (m/s^2){mark}\n{rows}", encoding="utf-8")

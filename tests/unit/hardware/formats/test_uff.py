@@ -56,7 +56,7 @@ def written(folder: Path, *datasets: dict[str, Any]) -> Path:
     return path
 
 
-# pyuff leaves its file open when it writes binary samples
+# pyuff leaves its file open after writing binary samples
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("binary", [0, 1])
 def test_functions_over_time_are_channels_on_one_axis(tmp_path: Path, binary: int) -> None:
@@ -65,7 +65,7 @@ def test_functions_over_time_are_channels_on_one_axis(tmp_path: Path, binary: in
     acc = recording.channels["acc"]
     np.testing.assert_allclose(acc.values, BASE, rtol=1e-11, atol=1e-11)
     assert acc.axis is recording.channels["force"].axis
-    assert acc.axis.rate == pytest.approx(256.0, rel=1e-5)  # the increment is written with six digits
+    assert acc.axis.rate == pytest.approx(256.0, rel=1e-5)  # the increment has six digits in the file
     assert (acc.unit, recording.channels["force"].unit) == ("m s-2", "N")
 
 
@@ -150,7 +150,7 @@ def test_a_package_that_is_missing_is_named_with_how_to_get_it(
 
 
 def test_a_function_that_ends_before_its_samples_is_refused_by_name(tmp_path: Path) -> None:
-    """pyuff then has no samples at all, which was a KeyError here."""
+    """pyuff then has no samples at all, which once led to a KeyError."""
     path = tmp_path / "record.uff"
     axes = (
         "        17    0    0    0 Time                 s\n"

@@ -1,4 +1,4 @@
-"""A virtual rig in lockstep, which no loaded machine disturbs."""
+"""A virtual rig in lockstep, unaffected by the load of the machine."""
 
 from __future__ import annotations
 

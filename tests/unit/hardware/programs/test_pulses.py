@@ -1,4 +1,4 @@
-"""Every pulse of a stream is kept once, with all of its presamples, however the stream is cut into blocks."""
+"""Every pulse of a stream is kept once, with all of its presamples, for any division into blocks."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def stream(cell: np.ndarray, first: int = 0) -> np.ndarray:
 
 
 def kept(finder: PulseFinder, volts: np.ndarray, cuts: list[int]) -> tuple[list[int], np.ndarray]:
-    """Feed a stream in blocks; return the numbers of the samples that are kept, and the samples."""
+    """Feed a stream in blocks; return the kept samples and their numbers."""
     edges = sorted({0, volts.shape[1], *(cut % (volts.shape[1] + 1) for cut in cuts)})
     pieces = []
     for begin, end in pairwise(edges):
@@ -52,7 +52,7 @@ def kept(finder: PulseFinder, volts: np.ndarray, cuts: list[int]) -> tuple[list[
 
 
 def sample_by_sample(cell: np.ndarray, rule: PulseRule) -> tuple[list[int], set[int]]:
-    """Return starts of pulses and what is to be kept, by the rule in its plainest form."""
+    """Return the starts of pulses and the samples to keep, by the rule in its simplest form."""
     starts, keep, up, last = [], set(), False, -(10**9)
     for number, value in enumerate(np.sign(rule.threshold) * cell):
         before = up

@@ -1,4 +1,4 @@
-"""What is recorded is what the plant does; what goes wrong leaves a recording of what came before."""
+"""A recording equals the motion of the plant; a failure leaves a recording of all samples before it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ when = "2026-03-01"
 
 @contextmanager
 def driven(rig: Rig, volts: float, frequency: float, rate: int = 10_000) -> Iterator[None]:
-    """Drive the rig with whole cycles that go round."""
+    """Drive the rig with whole cycles that repeat."""
     with daqmx.nidaqmx.Task(grpc_options=rig.options()) as task:
         task.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-10, max_val=10)
         task.timing.cfg_samp_clk_timing(rate, sample_mode=daqmx.constants.AcquisitionType.CONTINUOUS)
@@ -52,7 +52,7 @@ def test_the_recorded_amplitude_is_that_of_the_plant_within_a_thousandth(
     rig: Rig, control: RigControl
 ) -> None:
     with driven(rig, 1.0, 10.0):
-        control.advance(20.0)  # what a transient leaves is below 1e-6 then
+        control.advance(20.0)  # the remaining transient is below 1e-6 then
         tip = record(rig, ["tip=Dev1/ai0,2"], 5000.0, 1.0).channel("tip")
         motion = []
         for _ in range(400):
@@ -79,7 +79,7 @@ def test_a_calibrated_channel_is_in_its_unit_and_its_volts_can_be_had_again(rig:
     )
     np.testing.assert_allclose(volts, 1.0, atol=1e-3)  # 0.1 N on 100 N/m, 1 V/mm
     steps = volts / (2.0 / 2**15)
-    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)  # as the converter gave them
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)  # as output by the converter
 
 
 def test_a_calibration_of_another_channel_is_refused_before_the_rig_is_opened(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`vibroimpact rig sine` comes to rest whatever happens to it; an input that is wired to the output saw every sample.
+"""`vibroimpact rig sine` comes to rest in every case; an input that is wired to the output saw every sample.
 
 Ctrl-C and SIGKILL at random moments are in `tests/soak/drives.py`.
 """
@@ -45,7 +45,7 @@ def bench(served_bench: Bench) -> Iterator[Bench]:
 
 @pytest.fixture
 def live(bench: Bench) -> Bench:
-    """In time of its own, as a board is; at half the speed of life, so that other tests beside it starve no output."""
+    """In its own time, as a board, at half real speed, so that concurrent tests starve no output."""
     bench.control.pace(lockstep=False, speed=0.5)
     return bench
 
@@ -56,7 +56,7 @@ def sine(bench: Bench, *more: str, output: str = "Dev1/ao0") -> subprocess.Compl
 
 
 def guardians() -> list[int]:
-    """Return the guardians that this process has started and that run; a zombie, of another test say, has ended."""
+    """Return the running guardians started by this process; a zombie, such as another test's, has ended."""
     running = [child for child in psutil.Process().children() if child.status() != psutil.STATUS_ZOMBIE]
     return [child.pid for child in running if "guardian" in " ".join(child.cmdline())]
 
@@ -265,7 +265,7 @@ with opened_rig("grpc://" + sys.argv[1]) as rig:
 
 @pytest.mark.parametrize("hanging", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, hanging: bool) -> None:
-    # as with a driver in the program; the end of the task, which the driver does there, the test does here
+    # as with a driver in the program; there the driver ends the task, here the test does
     with warm.start(WITHOUT_ATTACHING, live.server.address) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "driving\n"

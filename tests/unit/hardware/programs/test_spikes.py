@@ -1,4 +1,4 @@
-"""Pulses of a load cell, recorded piece by piece, tell what the impacts of the plant were."""
+"""Pulses of a load cell, recorded piece by piece, reproduce the impacts of the plant."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ when = "2026-03-01"
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    """An oscillator that hits its stop once a period, in its steady motion, in lockstep."""
+    """An oscillator that hits its stop once per period, in its steady motion, in lockstep."""
     folder = tmp_path_factory.mktemp("rig")
     (folder / "scene.toml").write_text(SCENE + "[record]\nrecorded_time = 1.0\n")
     (folder / "rig.toml").write_text(RIG)
@@ -100,7 +100,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 @pytest.fixture(scope="module")
 def velocities(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
-    """Return the velocities before impact of the same scene, simulated; one a period."""
+    """Return the velocities before impact of the same scene, simulated; one per period."""
     scene = tmp_path_factory.mktemp("scene") / "scene.toml"
     scene.write_text(SCENE + FORCING)
     return np.asarray(run(scene).vibroimpact.impacts().impact_velocity.values)
@@ -115,7 +115,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def hits(driven: Rig, cell: Path, tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    """Return 30 pulses in N, and where their journal is."""
+    """Return 30 pulses in N, and the path of their journal."""
     journal = tmp_path_factory.mktemp("hits") / "hits.journal"
     words = (["cell=Dev1/ai1,5", "tip=Dev1/ai0,10"], RATE, 2.0)
     return record_spikes(driven, *words, pulses=30, calibration=[cell], journal=journal)

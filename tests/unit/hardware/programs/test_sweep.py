@@ -1,4 +1,4 @@
-"""A whole sweep on the virtual rig: it is the simulated one, nothing of it is lost, and it never drives unseen."""
+"""A whole sweep on the virtual rig: it equals the simulated one, keeps all samples, and never drives unobserved."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def bench() -> Iterator[Bench]:
 
 @pytest.fixture(scope="module")
 def measured(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of an unbroken sweep."""
+    """Return the folder of an uninterrupted sweep."""
     folder = tmp_path_factory.mktemp("unbroken") / "sweep"
     report = sweep(bench, folder)
     assert (report.steps, report.before, report.stopped) == (16, 0, False)
@@ -78,7 +78,7 @@ def measured(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def simulated() -> xr.Dataset:
-    """Return the same sweep of the scene of the rig."""
+    """Return the same sweep of the rig's scene."""
     plant = tomllib.loads((OSCILLATOR.parent / "oscillator_scene.toml").read_text(encoding="utf-8"))
     tables = {name: plant[name] for name in ("scene", "body", "stop")}
     axis = {"start": 6.0, "stop": 7.75, "points": 8, "path": "up-down"}
@@ -105,7 +105,7 @@ def jump_of(dataset: xr.Dataset, way: str) -> float:
 
 
 def output_of(bench: Bench) -> float:
-    """Return what the output puts out, V."""
+    """Return the present output voltage, V."""
     return float(bench.control.truth()["outputs"][0])
 
 
@@ -355,7 +355,7 @@ def test_a_sweep_without_a_rig_takes_none_unasked(tmp_path: Path) -> None:
 
 
 class started:  # reads as a sentence
-    """A sweep in a process of its own, for as long as the block lasts."""
+    """A sweep in a separate process, for the duration of the block."""
 
     def __init__(self, bench: Bench, home: Path, folder: Path) -> None:
         (home / "sweep.toml").write_text(TEXT)
@@ -375,11 +375,11 @@ class started:  # reads as a sentence
 
 
 def wait_for_steps(folder: Path, count: int, process: warm.Program) -> None:
-    """Wait until so many steps are stored."""
+    """Wait until `count` steps are stored."""
     end = time.monotonic() + 90.0
     while time.monotonic() < end:
         assert process.poll() is None, process.communicate()
-        with suppress(DatasetError):  # it may be written anew while it is opened
+        with suppress(DatasetError):  # it may be rewritten while it is opened
             if read_flat(folder / "dataset.nc").sizes["run"] >= count:
                 return
         time.sleep(0.01)
@@ -387,7 +387,7 @@ def wait_for_steps(folder: Path, count: int, process: warm.Program) -> None:
 
 
 def wait_until_free(bench: Bench) -> None:
-    """Wait until nothing drives the rig any more."""
+    """Wait until no task drives the rig."""
     end = time.monotonic() + 30.0
     while any(name.startswith("vibroimpact-output") for name in bench.control.state()["tasks"]):
         assert time.monotonic() < end

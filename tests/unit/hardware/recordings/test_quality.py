@@ -1,4 +1,4 @@
-"""Clipping, and event trains: what is found in signals that the tests make, and what must not be found."""
+"""Clipping, and event trains: found in generated signals that have them, and only there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When samples were taken: references are the clocks that each test makes."""
+"""Instants of samples, against the clocks that each test makes."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_rows_without_an_instant_are_counted_on() -> None:
 
 
 def test_the_uncertainty_of_contradicting_intervals_is_their_whole_spread() -> None:
-    """The shaker's numbers: .000606 and .000586 s in the header, .000605 s in the column."""
+    """Values of the shaker's file: .000606 and .000586 s in the header, .000605 s in the column."""
     values = np.zeros(2000)
     time = Column("time", np.arange(2000) * 0.000605)
     columns = [Column("command", values, interval=0.000606), Column("base", values[:1900], interval=0.000586)]
@@ -112,7 +112,7 @@ def test_the_rate_of_the_user_is_used_and_what_contradicts_it_is_told() -> None:
 @pytest.mark.parametrize("lost", [1, 200])
 @pytest.mark.parametrize("digits", [4, 6, 12])
 def test_a_gap_stays_a_gap_under_the_rate_of_the_user(digits: int, lost: int) -> None:
-    """With four digits at 5120 Hz an instant is rounded to half an interval."""
+    """With four digits at 5120 Hz the rounding of an instant reaches half an interval."""
     whole = 2.0 + np.arange(3000) / 5120.0
     kept = np.delete(np.arange(3000), np.arange(900, 900 + lost))
     placement = placed(np.round(whole[kept], digits), rate=5120.0)
@@ -134,7 +134,7 @@ def test_a_gap_in_instants_that_a_rate_contradicts_stays_a_gap_too() -> None:
 
 
 def test_a_gap_of_thousands_of_samples_between_rounded_instants_is_counted_exactly() -> None:
-    """1.8 s at 5120 Hz with six digits: one step of .000195 s tells the count to 15 samples only."""
+    """1.8 s at 5120 Hz with six digits: one step of .000195 s determines the count only to 15 samples."""
     kept = np.append(np.arange(1000), np.arange(10240, 11240))
     for rate in (None, 5120.0):
         placement = placed(np.round(kept / 5120.0, 6), rate=rate)
@@ -166,7 +166,7 @@ def test_a_clock_without_gaps_says_nothing_of_gaps_under_its_own_rate(step: floa
 
 
 def test_instants_since_1970_are_even_within_their_digits() -> None:
-    """Six decimals of some 1.8e9 s at 5120 Hz; in binary a quarter of the last one is lost."""
+    """Six decimals of some 1.8e9 s at 5120 Hz; the binary number loses a quarter of the last one."""
     placement = placed(np.round(1795255200.0 + np.arange(4000) / 5120.0, 6))
     assert placement.axis.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
 

@@ -1,4 +1,4 @@
-"""An acquisition on the virtual rig: all samples once, in order; what is lost is known; what fails is raised last."""
+"""An acquisition on the virtual rig: all samples once, in order; losses are known; a failure is raised last."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LOOP = Input("loop", "Dev1/ai2", 10.0)
 
 
 class Bench:
-    """A rig in lockstep, and what changes it."""
+    """A rig in lockstep, with its control."""
 
     def __init__(self, server: RigServer, channel: Any) -> None:
         self.server, self.rig, self.control = server, Rig("grpc://test", channel), RigControl(channel)
@@ -47,7 +47,7 @@ def all_of(acquired: Acquisition) -> list[Block]:
 
 
 def take(acquired: Acquisition, taken: list[Block], then: Callable[[], None]) -> None:
-    """Take all blocks; after 500 samples do something."""
+    """Take all blocks; call `then` after 500 samples."""
     for block in acquired.blocks():
         taken.append(block)
         if block.end > 500:
@@ -78,7 +78,7 @@ def test_an_acquisition_on_the_trigger_of_an_output_counts_as_the_output_does(be
         acquired.start()
         drive.start()
         volts = np.concatenate([block.volts for block in acquired.blocks()], axis=1)[0]
-    # an edge of a shared clock samples what was put out before it
+    # an edge of a shared clock samples the output value before that edge
     np.testing.assert_allclose(volts[1:], wave[:-1], atol=4e-4)
 
 
@@ -108,7 +108,7 @@ def test_a_program_that_takes_too_slowly_knows_what_it_lost(
     monkeypatch.setattr(acquisition, "LONGEST_BLOCK", 0.05)
     with Acquisition(bench.rig, [TIP], 1000.0, count=20_000) as acquired:
         acquired.start()
-        while not acquired.gaps:  # the rig goes on, the program does not take
+        while not acquired.gaps:  # the rig continues, the program does not take blocks
             bench.control.advance(1.0)
         blocks = list(acquired.blocks())
     lost = [
@@ -123,7 +123,7 @@ def test_a_program_that_takes_too_slowly_knows_what_it_lost(
 
 
 class Overrun:
-    """A reader of which one read comes too late."""
+    """A reader with one read that comes too late."""
 
     def __init__(self, reader: Any, number: int) -> None:
         self._reader, self._left = reader, number
@@ -205,7 +205,7 @@ def test_inputs_of_a_program_that_died_are_freed_and_those_of_one_that_lives_are
 ) -> None:
     monkeypatch.setattr(sessions, "LOOK_SECONDS", 0.4)
     dead = Acquisition(bench.rig, [TIP], 1000.0).__enter__()
-    dead._task.start()  # and never reads
+    dead._task.start()  # and is never read
     bench.control.advance(0.1)
     with Acquisition(bench.rig, [TIP], 1000.0) as living:
         living.start()

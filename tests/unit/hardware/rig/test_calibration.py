@@ -1,4 +1,4 @@
-"""Calibrations: volts become units and back; what is of another channel is refused."""
+"""Calibrations: volts become units and back; a calibration of another channel is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes out, from the first sample to rest: no waveform, however bad, takes the output beyond its limits."""
+"""The output course from the first sample to rest: no waveform exceeds the limits of the output."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Table:
 
 
 def driven(waveform: Waveform, limits: Limits, stop_at: int, piece: int) -> tuple[Course, Floats]:
-    """Return all that goes out until rest, stopped at the first block from a number on."""
+    """Return the whole output until rest, stopped at the first block at or after a sample number."""
     course, blocks = Course(waveform, limits, RATE), []
     while course.rest is None:
         if course.next >= stop_at:

@@ -1,4 +1,4 @@
-"""A journal that somebody made to harm ends soon, in one line, and what was measured before the harm is there."""
+"""A malicious journal ends soon, in one line, and the samples before the damage are recovered."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vibroimpact.hardware.rig.acquisition import Block
 from vibroimpact.hardware.rig.journal import TITLE, Journal, read_journal
 
 MOST_SECONDS, MOST_MEMORY = 10.0, 500e6
-"""Processor time, s, and memory, bytes, within which a command ends."""
+"""Maximum processor time, s, and memory, bytes, of a command."""
 HEADER = {
     "program": "record",
     "rig": "virtual",
@@ -37,7 +37,7 @@ SAMPLES = np.arange(10.0).reshape(1, 10) / 10.0
 
 
 def begun(path: Path) -> Path:
-    """Write a journal of ten sound samples."""
+    """Write a journal of ten valid samples."""
     with Journal(path, HEADER) as journal:
         journal.note(started_at="now")
         journal.append(Block(0, SAMPLES))
@@ -49,7 +49,7 @@ def head(kind: bytes, length: int, first: int = 0, checksum: int = 0) -> bytes:
 
 
 def record(kind: bytes, content: bytes, first: int = 0) -> bytes:
-    """Return a record whose checksum is right."""
+    """Return a record with a correct checksum."""
     start = head(kind, len(content), first)[:-4]
     return start + zlib.crc32(content, zlib.crc32(start)).to_bytes(4, "little") + content
 
@@ -103,7 +103,7 @@ def test_the_bytes_that_are_looked_at_are_bounded_not_the_places(
 ) -> None:
     path = begun(tmp_path / "a.journal")
     with path.open("ab") as file:
-        file.write(b"SAMP" * 20_000)  # more places than were once tried
+        file.write(b"SAMP" * 20_000)  # more places than the former limit of attempts
         file.write(record(b"SAMP", SAMPLES.tobytes(), 50))
     assert [block.first for block in read_journal(path).blocks] == [0, 50]
     summed: list[int] = []

@@ -1,4 +1,4 @@
-"""A journal that is cut anywhere, or damaged, gives back each record that is whole."""
+"""A journal that is cut anywhere, or damaged, yields every intact record."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEADER = {"inputs": ["tip", "loop"], "rate": 1000.0}
 
 
 def written(path: Path, blocks: list[Block], notes: dict[int, Any] | None = None) -> list[int]:
-    """Write a journal; return where each record of samples ends."""
+    """Write a journal; return the end of each record of samples."""
     path.unlink(missing_ok=True)
     ends = []
     with Journal(path, HEADER) as journal:
@@ -33,7 +33,7 @@ def written(path: Path, blocks: list[Block], notes: dict[int, Any] | None = None
 
 
 def end_of_header(content: bytes | bytearray) -> int:
-    """Return where the second copy of the header ends."""
+    """Return the end of the second copy of the header."""
     text = json.dumps(HEADER).encode()
     return content.rindex(text) + len(text)
 
@@ -75,7 +75,7 @@ def test_a_journal_that_is_cut_at_any_byte_gives_each_whole_record(
     whole = path.read_bytes()
     start = end_of_header(whole)
     cut = start + round(part * (len(whole) - start))
-    path.write_bytes(whole[:cut] + garbage)  # what a file system left behind the cut
+    path.write_bytes(whole[:cut] + garbage)  # remains that a file system leaves after the cut
     assert same(read_journal(path), [block for block, end in zip(blocks, ends, strict=True) if end <= cut])
 
 

@@ -1,4 +1,4 @@
-"""Limits of an output: nothing beyond them passes, and each voltage comes down within them."""
+"""Limits of an output: no voltage exceeds them, and each voltage returns to 0 within them."""
 
 from __future__ import annotations
 

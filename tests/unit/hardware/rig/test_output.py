@@ -1,4 +1,4 @@
-"""An output follows its waveform sample by sample and comes to rest, seen by an input that is wired to it."""
+"""An output follows its waveform sample by sample and comes to rest, as measured by an input wired to it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def outputs(bench: Bench) -> list[float]:
 
 @dataclass
 class Interrupted:
-    """A sine that does something at a sample."""
+    """A sine that calls a function at a sample."""
 
     at: int
     act: object
@@ -68,7 +68,7 @@ def test_each_sample_of_the_waveform_goes_out_in_its_turn(bench: Bench) -> None:
     with output_of(bench, sine) as output, Observer(rig_of(bench), RATE, output.trigger) as seen:
         output.start()
         output.wait()
-    # an input sees the voltage that its edge is just replacing
+    # an input samples the voltage before its own edge
     np.testing.assert_allclose(seen.volts[1:12_001], sine.volts(0, 12_000), atol=1.1 * STEP)
     assert not seen.volts[12_001:].any()
     assert output.generated >= 12_000
@@ -84,7 +84,7 @@ def test_a_stop_at_any_moment_comes_to_rest_within_the_slew(bench: Bench, at: in
         output.wait()
     assert np.abs(seen.volts).max() > 1.0
     assert seen.volts[-1] == 0.0
-    assert seen.steepest < 100.0  # a sine of 5.3 Hz that fades in .2 s; nothing jumps
+    assert seen.steepest < 100.0  # a sine of 5.3 Hz that fades in 0.2 s; nothing jumps
     assert outputs(bench)[0] == 0.0
 
 

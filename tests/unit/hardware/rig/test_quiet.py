@@ -1,4 +1,4 @@
-"""A channel is within its noise where it shows nothing else, and only there."""
+"""A channel counts as quiet if it shows noise alone, and only then."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sine is exact after days, and the same whichever way its samples are cut into blocks."""
+"""A sine is exact after days, and the same for any division into blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rig of the table of conformance: the virtual rig in lockstep, or with `--real-rig` a board."""
+"""The rig of the conformance tests: the virtual rig in lockstep, or with `--real-rig` a board."""
 
 from __future__ import annotations
 

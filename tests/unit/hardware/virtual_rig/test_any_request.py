@@ -1,4 +1,4 @@
-"""Any request of NI's protocol gets an answer or an error of NI's: no field ends the server or holds it up."""
+"""Any request of NI's protocol gets an answer or an error of NI's: no field stops or blocks the server."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from vibroimpact.hardware.virtual_rig.calls import Calls
 from vibroimpact.hardware.virtual_rig.serving import THREADS
 
 DEADLINE = 10.0
-"""s; far more than any request takes."""
+"""Maximum time of a request, s; far more than any takes."""
 CALLS = 25
-"""Of one example."""
+"""Maximum time of one example, s."""
 ANSWERED = [name for name in METHODS if Calls(None).answer(name) is not None]  # type: ignore[arg-type]  # no call is made
 ANSWERED += ["RegisterEveryNSamplesEvent", "RegisterDoneEvent"]
 RUNNING = (
@@ -33,7 +33,7 @@ RUNNING = (
     "SetBuffer",
 )
 OFTEN = [name for name in ANSWERED if name.startswith(RUNNING)]
-"""Calls without which nothing moves."""
+"""Calls without which time stands still."""
 ENDS = ("ClearTask", "ResetDevice", "CreateTask")
 TASKS = ["in"] * 6 + ["out"] * 5 + ["none", ""]
 TEXTS = [
@@ -107,12 +107,12 @@ def _value(field: Any, dice: random.Random) -> Any:
 
 
 def filled(message: Any, dice: random.Random, depth: int = 0) -> Any:
-    """Return a message with any values in most of its fields."""
+    """Return a message with random values in most of its fields."""
     for field in message.DESCRIPTOR.fields:
         inside = field.cpp_type == field.CPPTYPE_MESSAGE
         listed = field.is_repeated if hasattr(field, "is_repeated") else field.label == field.LABEL_REPEATED
         if field.containing_oneof and field.name != "name" and not field.name.endswith("_raw"):
-            continue  # of several ways to say the same, one
+            continue  # one of several fields with the same meaning
         if inside and (depth > 2 or field.message_type.GetOptions().map_entry):
             continue
         if field.name not in ("task", "name", "attribute_raw") and dice.random() < 0.1:
@@ -132,7 +132,7 @@ def filled(message: Any, dice: random.Random, depth: int = 0) -> Any:
 
 
 def drawn(dice: random.Random) -> tuple[str, Any]:
-    """Return a method and a request; of writes many with as many values as they say."""
+    """Return a method and a request; many writes get as many values as they declare."""
     name = dice.choice(dice.choice([ANSWERED, OFTEN]))
     if name in ENDS and dice.random() < 0.9:
         name = "StartTask"
@@ -144,13 +144,13 @@ def drawn(dice: random.Random) -> tuple[str, Any]:
 
 
 def may_wait(request: Any) -> bool:
-    """Say whether a request may wait for longer than a second."""
+    """Return whether a request may wait for longer than a second."""
     timeouts = [getattr(request, field) for field in ("timeout", "time_to_wait") if hasattr(request, field)]
     return any(timeout == -1.0 or timeout > 1.0 for timeout in timeouts)
 
 
 def asked(name: str, **fields: Any) -> Any:
-    """Return a request; `task` is the name of one."""
+    """Return a request; `task` is given by its name."""
     request = message_class(METHODS[name].input_type)()
     for key, value in fields.items():
         setattr(request.task if key == "task" else request, "name" if key == "task" else key, value)
@@ -164,7 +164,7 @@ def rig() -> Iterator[Bench]:
 
 
 def outcome_of(bench: Bench, name: str, request: Any) -> tuple[Any, int]:
-    """Return how a call has ended: gRPC's code and NI's."""
+    """Return the outcome of a call: gRPC's code and NI's."""
     streams = METHODS[name].server_streaming
     kind = bench.channel.unary_stream if streams else bench.channel.unary_unary
     call = kind(f"/nidaqmx_grpc.NiDAQmx/{name}")
@@ -180,7 +180,7 @@ def outcome_of(bench: Bench, name: str, request: Any) -> tuple[Any, int]:
 
 
 def prepare(bench: Bench, timed: bool) -> None:
-    """Make a task of inputs and one of an output, with or without clocks."""
+    """Make an input task and an output task, with or without clocks."""
     bench.clear()
     wide = {"min_val": -5.0, "max_val": 5.0, "units_raw": constants.VoltageUnits.VOLTS.value}
     anyhow = {"terminal_config_raw": constants.TerminalConfiguration.DEFAULT.value}
@@ -219,7 +219,7 @@ def test_calls_whose_programs_are_gone_hold_no_thread(rig: Bench) -> None:
         task.start()
         request = asked("WaitUntilTaskDone", task=task.name, time_to_wait=-1.0)
         call = rig.channel.unary_unary("/nidaqmx_grpc.NiDAQmx/WaitUntilTaskDone")
-        # more than the server has threads; each is being answered, or waits for a thread, when its program gives up
+        # more than the server has threads; each is being answered or waits for a thread when its program gives up
         waiting = [call.future(request.SerializeToString(), timeout=0.3) for _ in range(THREADS + 10)]
         assert {each.code() for each in waiting} == {grpc.StatusCode.DEADLINE_EXCEEDED}
         assert outcome_of(rig, "IsTaskDone", asked("IsTaskDone", task=task.name)) == (grpc.StatusCode.OK, 0)

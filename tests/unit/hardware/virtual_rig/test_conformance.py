@@ -1,6 +1,7 @@
-"""The unmodified client of NI on a rig: what a voltage program does, and what it must be refused.
+"""The unmodified client of NI on a rig: normal use of voltage tasks, and the required refusals.
 
-On the virtual rig in lockstep, or with `--real-rig` on a board: then what needs the plant or its control is skipped.
+On the virtual rig in lockstep, or with `--real-rig` on a board; a board skips tests that need the plant or its
+control.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def test_a_channel_has_the_smallest_range_that_holds_what_was_asked_for(bench: B
         channel = task.ai_channels.add_ai_voltage_chan(terminal, "tip", min_val=-1.5, max_val=0.3)
         smallest = min(edge for edge in ranges if edge >= 1.5)
         assert (channel.name, channel.ai_rng_high) == ("tip", smallest)
-        assert channel.ai_max >= smallest  # widened to what the device measures
+        assert channel.ai_max >= smallest  # widened to a range of the device
         channel.ai_rng_high = max(ranges)
         assert channel.ai_rng_low == -max(ranges)
         assert task.channel_names == ["tip"]
@@ -123,7 +124,7 @@ def test_a_loop_from_output_to_input_gives_back_what_was_written(bench: Bench) -
         task.start()
         drive.start()
         seen = np.array(task.read(500))
-    # an edge samples what was put out before it
+    # an edge samples the output value before it
     np.testing.assert_allclose(seen[1:], np.tile(wave, 3)[:499], atol=bench.tolerance)
     assert abs(bench.output(0)) > 0.05  # an output holds its last value
 
@@ -231,7 +232,7 @@ def test_an_input_may_wait_for_an_edge_and_for_the_clock_of_an_output(bench: Ben
         assert task.in_stream.avail_samp_per_chan == 0
         control.pulse("/Dev1/PFI3")
         seen = task.read(9)
-    # 99 edges are over: the next is the fourth of its round
+    # 99 edges have passed: the next is the fourth of its round
     np.testing.assert_allclose(seen, [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 1.0, 2.0, 3.0], atol=bench.tolerance)
 
 

@@ -1,4 +1,4 @@
-"""What the unmodified client of NI is refused on a rig, and by which code; also on a board, see `test_conformance`."""
+"""Refusals that the unmodified client of NI meets on a rig, by code; also on a board, see `test_conformance`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_what_the_device_does_not_have_is_refused_by_its_code(bench: Bench) -> N
 def test_a_clock_that_the_device_lacks_is_refused_when_the_task_is_verified(
     bench: Bench, code: int, timing: dict[str, Any]
 ) -> None:
-    # NI's driver takes any clock, and says at the first look at it what is wrong
+    # NI's driver accepts any clock, and reports the error when the clock is first used
     with bench.inputs() as task:
         source = bench.named(timing.get("source", ""))
         task.timing.cfg_samp_clk_timing(**(timing | {"source": source}))
@@ -120,7 +120,7 @@ def test_a_resource_belongs_to_one_task(bench: Bench) -> None:
         first.start()
         with refused(-50103):
             second.start()
-        # a continuous task is stopped by a person alone: no warning
+        # only a person stops a continuous task: no warning
         first.stop()
         second.start()
 

@@ -1,4 +1,4 @@
-"""Faults that the control service gives a rig, as an unmodified program of NI's client meets them."""
+"""Faults set by the control service, as an unmodified program of NI's client meets them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_an_output_that_regenerates_does_not_run_empty(bench: Bench) -> None:
 
 
 def looped(bench: Bench, wave: Floats, count: int) -> Floats:
-    """Return what the looped input sees of an output that goes round."""
+    """Return the samples of a looped input for an output that repeats."""
     with (
         bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
         bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=count + 1) as task,
@@ -110,7 +110,7 @@ def test_a_server_that_is_gone_ends_the_read_that_waits() -> None:
 
 
 def drift_of_clock(bench: Bench, rate: float, count: int) -> float:
-    """Return by how much the input clock is too fast, ppm, from the phase of a looped sine against its sample index."""
+    """Return the error of the input clock, ppm, from the phase of a looped sine over its sample index; > 0: fast."""
     cycles = 1.0 / 50.0
     wave = 5.0 * np.sin(2.0 * np.pi * cycles * np.arange(50))
     with (
@@ -145,7 +145,7 @@ def test_a_clock_that_goes_wrong_while_it_runs_loses_no_sample_and_makes_no_jump
         assert task.in_stream.total_samp_per_chan_acquired == 10_000
         bench.control.advance(10.0)
         assert task.in_stream.total_samp_per_chan_acquired == pytest.approx(20_050, abs=1)
-        assert task.timing.samp_clk_rate == 1000.0  # what it says of itself
+        assert task.timing.samp_clk_rate == 1000.0  # its own reported rate
 
 
 def test_inputs_on_the_clock_of_the_output_have_no_error(bench: Bench) -> None:

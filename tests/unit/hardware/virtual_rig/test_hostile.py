@@ -1,4 +1,4 @@
-"""A rig that is treated badly: odd rig files and messages, clients that die, several at once."""
+"""A rig under misuse: odd rig files and messages, clients that die, several clients at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rig that is faster than life waits for its programs, and not for ever for one that is dead."""
+"""A rig faster than real time waits for its programs, but not for ever for a dead one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECOND = 10**9
 
 
 class Wall:
-    """A clock on the wall that a test sets."""
+    """A wall clock that a test sets."""
 
     now = 0.0
 
@@ -35,7 +35,7 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
 
 
 def endless_input(name: str = "a", buffer: int = 10) -> Task:
-    """Return an input at 10 Hz that runs, whose program has read nothing."""
+    """Return a running input at 10 Hz whose program has read nothing."""
     task = Task(name, "Dev1", PROFILES["xseries"])
     task.add(INPUT, [Channel("Dev1/ai0", 0, -1.0, 1.0, 1.0)])
     task.set_clock(Clock(10.0, CONTINUOUS.value, 2))
@@ -62,7 +62,7 @@ def test_faster_time_waits_where_a_buffer_is_full_and_goes_on_from_there(wall: W
     assert time.due(SECOND - 1, [task]) == 1.5 * SECOND - 1
     wall.now = 4.01
     task.position = 100
-    # the waiting is not made up for
+    # the wait is not made up
     assert time.due(int(1.5 * SECOND) - 1, [task]) == pytest.approx(1.7 * SECOND, abs=2)
     assert time.waits_for == ""
 

@@ -1,4 +1,4 @@
-"""A recording as the plant: what was measured once is on the inputs again, as if it were live."""
+"""A recording as the plant: its channels are on the inputs again, as in the measurement."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.hardware.virtual_rig.scene_plant import opened_plant
 from vibroimpact.hardware.virtual_rig.settings import read_rig
 
 STEP = 10.0 / 2**15
-"""V of a code of the widest range."""
+"""V per code of the widest range."""
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_inputs_see_the_recording_from_the_start_of_the_task_on_and_its_end_for_
     wires = 'ai0 = "tip"\nai1 = { signal = "pull", amplification = 0.5 }'
     with opened_bench(rig(tip, wires)) as bench:
         bench.control.pace(lockstep=True)
-        for _ in range(2):  # each task plays it anew
+        for _ in range(2):  # each task restarts the recording
             with bench.task() as task:
                 task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
                 task.timing.cfg_samp_clk_timing(2000.0, samps_per_chan=3000)
@@ -113,6 +113,6 @@ def test_a_shock_that_a_laboratory_measured_is_on_an_input_as_if_it_were_live(tm
     delay = float(channel.time[0]) - min(float(each.time[0]) for each in board.channels.values())
     at = np.arange(51_200) / rate + float(channel.time[0]) - delay
     played = volts_per * np.interp(at, channel.time, channel.values)
-    # instants of a rig are whole nanoseconds: a steep flank is that much away
+    # instants of a rig are whole nanoseconds: a steep flank is off by as much
     np.testing.assert_allclose(seen, played, atol=0.51 * STEP + 1e-3)
     assert np.max(np.abs(seen)) > 8.0, "the peak of the shock, between two samples now"

@@ -1,4 +1,4 @@
-"""The table of conformance takes a board: tried on a virtual rig that is used as one, and not controlled."""
+"""The conformance tests run on a board: tried on a virtual rig that is treated as one, without control."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vibroimpact.hardware.virtual_rig.settings import read_rig
 
 FOLDER = "tests/unit/hardware/virtual_rig"
 TABLE = [f"{FOLDER}/test_conformance.py", f"{FOLDER}/test_conformance_refusals.py"]
-# a rig that is faster than life waits for programs, whatever the machine does meanwhile: nothing is too late on it
+# a rig faster than real time waits for programs on any machine: nothing is too late on it
 TOO_LATE = "not are_late and not too_late and not runs_empty and not written_over"
 
 

@@ -1,4 +1,4 @@
-"""The file of a rig: all of its problems at once, each with what to do."""
+"""The file of a rig: all of its errors at once, each with a remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program of NI's client sweeps the virtual rig up and down: what it measures is what the scene does."""
+"""A program of NI's client sweeps the virtual rig up and down, and measures the motion of the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibroimpact.hardware.virtual_rig.settings import read_rig
 from vibroimpact.simulation import run
 
 RATE, STEP = 2000, 8
-"""Samples per second, and seconds of a step, of which the last two are measured."""
+"""Samples per second, and seconds of a step; the last two seconds are measured."""
 VOLTS = 1.5
 UP = np.arange(6.0, 7.8, 0.25)
 Ranges = tuple[Floats, Floats]

@@ -1,4 +1,4 @@
-"""What only the virtual rig has: its plant, its numbers, a device that is gone, all calls of the protocol."""
+"""Properties of the virtual rig alone: its plant, its numbers, a lost device, all calls of the protocol."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_an_attribute_that_is_not_modelled_is_refused(bench: Bench) -> None:
 
 
 def test_recorded_samples_are_those_of_the_exact_motion_to_half_a_bit(bench: Bench) -> None:
-    # reference: the exact flow of examples/rig/oscillator_scene.toml from where the plant is
+    # reference: the exact flow of examples/rig/oscillator_scene.toml from the present state of the plant
     before = bench.control.truth()
     with bench.outputs() as drive, bench.inputs("Dev1/ai0:1", 5000.0, samps_per_chan=400) as task:
         drive.write(1.0)
@@ -92,7 +92,7 @@ def test_one_name_for_several_channels_is_numbered(bench: Bench) -> None:
             task.ai_channels.add_ai_voltage_chan("Dev1/ai3:5", "a, b")
         with refused(-200489):
             task.ai_channels.add_ai_voltage_chan("Dev1/ai3:4", "new, tip0")
-        assert len(task.channel_names) == 3  # all of a list or none
+        assert len(task.channel_names) == 3  # all channels of a list or none
 
 
 def test_an_input_has_no_more_samples_than_the_clock_of_a_finite_output_has_edges(bench: Bench) -> None:
@@ -206,7 +206,7 @@ def test_a_device_that_is_gone_ends_the_read_that_waits_and_is_said_from_then_on
 
 
 def test_every_call_of_the_protocol_is_answered_or_refused_in_words(bench: Bench) -> None:
-    # no call may end in UNIMPLEMENTED (the client then speaks of an upgrade) or in an exception of the server
+    # no call may end in UNIMPLEMENTED (the client then suggests an upgrade) or in an exception of the server
     metadata = {}
     for name, method in METHODS.items():
         call = bench.channel.unary_stream if method.server_streaming else bench.channel.unary_unary
@@ -269,7 +269,7 @@ def test_reset_device_ends_tasks_that_have_failed_without_saying_so_again(bench:
         assert bench.control.starve() == 1
         System.remote(bench.options()).devices["Dev1"].reset_device()
         assert bench.control.truth()["outputs"][0] == 0.0
-        # nothing holds the inputs any more
+        # no task holds the inputs any more
         with bench.inputs("Dev1/ai1", 1000.0, samps_per_chan=10) as other:
             assert len(other.read(10)) == 10
 

@@ -1,4 +1,4 @@
-"""Waveform reads and writes, of the clients that have them."""
+"""Waveform reads and writes, for clients that have them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`vibroimpact check`: what a scene would run and cost, from one computed point."""
+"""`vibroimpact check`: the engine and the cost of a scene, from one computed point."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_components_call_for_the_effects_that_the_short_form_calls_for() -> None
     )
     assert called_for(scene_of(nothing)) == named - {"forcing", "stops"}
     short = set(effects(scene_of(BODY + RECORD)))
-    assert short <= set(effects(scene_of(COMPONENTS)))  # what is not called for is listed as well
+    assert short <= set(effects(scene_of(COMPONENTS)))  # absent effects are listed as well
 
 
 def test_an_effect_that_is_swept_is_called_for_where_one_point_has_it() -> None:

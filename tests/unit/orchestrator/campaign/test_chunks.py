@@ -38,7 +38,7 @@ def work_in(folder: Path, text: str, runner: str = BUSY) -> Work:
 
 
 def run_all(work: Work, chunks: list[tuple[int, int]], branch_length: int) -> list[Path]:
-    """Run chunks one after the other, each from the state that the one before handed on."""
+    """Run chunks one after the other, each from the state that the chunk before handed on."""
     carried, paths = None, []
     for first, stop in chunks:
         result = run_chunk(work, Chunk(first // branch_length, first, stop, carried))

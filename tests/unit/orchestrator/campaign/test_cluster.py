@@ -1,4 +1,4 @@
-"""The pool of workers: those that die are replaced, and what cannot work is said once."""
+"""The pool of workers: dead workers are replaced, and a fatal problem is reported once."""
 
 from __future__ import annotations
 
@@ -60,46 +60,46 @@ def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 1.0)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(same, 1)
         assert pool.next_finished().result == 1
-        # What Dask's sender is left with when the clock goes back 20 minutes just after a message.
+        # the state of Dask's sender when the clock goes back 20 minutes just after a message
         pool._client.scheduler_comm.next_deadline = time.time() + 1200.0
         ticket = pool.submit(same, 2)
         finished = pool.next_finished()
         assert (finished.ticket, finished.result) == (ticket, 2)
-    assert len(said.notes) == 1
-    assert "clock that was set back" in said.notes[0]
+    assert len(noted.notes) == 1
+    assert "clock that was set back" in noted.notes[0]
 
 
 def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.1)
     monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.1)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(time.sleep, 2.0)
         assert pool.next_finished().error is None
-    assert not said.notes
+    assert not noted.notes
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sleep of the C library")
 def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # a machine with 15 processes on 2 cores: a campaign ended with the error of a clock that was set back
+    # with 15 processes on 2 cores, a campaign ended with the error of a clock that was set back
     monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.5)
     monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.2)
-    said = Said()
-    with open_workers(workers=1, progress=said) as pool:
+    noted = Notes()
+    with open_workers(workers=1, progress=noted) as pool:
         assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
-    assert not said.notes
+    assert not noted.notes
 
 
 def test_an_answer_to_another_call_of_dask_is_not_taken_for_workers_that_are_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # Dask's own asks for none of the workers; under load it came between: two workers lost that lived
+    # Dask's own call asks for no workers; under load its answer came between, and two living workers counted as lost
     monkeypatch.setitem(cluster.QUIET, "distributed.client.scheduler-info-interval", "1ms")
     with open_workers(workers=1) as pool:
         looks = {pool.worker_addresses() for _ in range(200)}
@@ -110,7 +110,7 @@ def test_an_answer_to_another_call_of_dask_is_not_taken_for_workers_that_are_los
 def test_the_time_in_which_a_campaign_was_suspended_is_not_waited_for_workers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # after minutes of Ctrl-Z Dask takes the workers for dead, and starts them again
+    # after minutes of Ctrl-Z Dask considers the workers dead, and starts them again
     monkeypatch.setattr(pool_module, "WORKERLESS_SECONDS", 1.0)
     with open_workers(workers=1) as pool:
         (worker,) = pool.worker_addresses()
@@ -132,12 +132,12 @@ def test_a_worker_that_does_not_answer_any_more_is_replaced(
 ) -> None:
     for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
         monkeypatch.setattr(pool_module, name, seconds)
-    said = Said()
+    noted = Notes()
     (tmp_path / "wish").touch()
-    with open_workers(workers=1, progress=said) as pool:
+    with open_workers(workers=1, progress=noted) as pool:
         pool.submit(freeze_once, str(tmp_path / "wish"))
         assert pool.next_finished().result == "thawed"
-    assert len(said.notes) == 1
+    assert len(noted.notes) == 1
 
 
 def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
@@ -153,8 +153,8 @@ def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
     assert not [one for one in recwarn if "never awaited" in str(one.message)]
 
 
-class Said(Progress):
-    """Keeps what it is told."""
+class Notes(Progress):
+    """Keeps its notes."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -165,7 +165,7 @@ class Said(Progress):
 
 
 def _strangers() -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield how somebody without the key may try to connect."""
+    """Yield the ways in which a stranger without the key may try to connect."""
     yield "tcp", {}
     yield "tls", Security.temporary().get_connection_args("client")
     trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -174,7 +174,7 @@ def _strangers() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _answers(address: str, options: dict[str, Any]) -> bool:
-    """Return whether the Dask server at an address takes an order."""
+    """Return whether the Dask server at an address executes a call."""
 
     async def ask() -> bool:
         comm = await connect(address, timeout=2.0, **options)
@@ -201,7 +201,7 @@ def test_nobody_without_the_key_of_a_campaign_reaches_its_processes() -> None:
 
 
 def test_the_key_of_a_campaign_lies_where_only_its_user_reads_and_the_next_command_sweeps() -> None:
-    # one in memory would be written to a folder of its own for each connection, and stay there after kill -9
+    # Dask would write a key in memory to a new folder for each connection, which stays after kill -9
     with open_workers(workers=1) as pool:
         security = pool._client.security
         for role in ("client", "scheduler", "worker"):
@@ -218,7 +218,7 @@ def test_a_machine_without_cryptography_is_told_what_to_install(monkeypatch: pyt
 
 
 class _Stillborn:
-    """Stands in for a cluster of which a worker dies while it starts."""
+    """Stands in for a cluster with a worker that dies during its start."""
 
     def __init__(self, starts: list[int], failures: int) -> None:
         self._starts, self._failures = starts, failures

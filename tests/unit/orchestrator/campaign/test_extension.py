@@ -1,4 +1,4 @@
-"""A campaign goes on with another sweep: it keeps every point whose values are equal, and is as if it were new."""
+"""A campaign goes on with another sweep: it keeps every point with equal values, and equals a new campaign."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ GROWN = {
 
 
 def assert_as_if_new(extended: Path, fresh: Path) -> None:
-    """Assert that two datasets are bit-identical with all attributes, but for their timing."""
+    """Assert that two datasets and all attributes are bit-identical, except for their timing."""
     assert_same_rows(extended, fresh)
     one, other = (read_flat(path).drop_vars(TIMING) for path in (extended, fresh))
     xr.testing.assert_identical(one, other)
@@ -111,8 +111,8 @@ def test_a_finished_campaign_is_extended_as_if_it_were_new(
     assert not (tmp_path / "campaign" / "parts").exists()
 
 
-def begun(monkeypatch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int) -> None:
-    """Leave a campaign after so many chunks of two or three points."""
+def interrupted(monkeypatch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int) -> None:
+    """Interrupt a campaign after a number of chunks of two or three points."""
     with monkeypatch.context() as patch:
         patch.setattr(schedule, "FIRST_POINTS", 2)
         patch.setattr(schedule, "MOST_POINTS", 3)
@@ -125,7 +125,7 @@ def test_a_half_done_campaign_is_extended_as_if_it_were_new(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old, new, _ = GROWN[name]
-    begun(monkeypatch, old, tmp_path / "campaign", chunks=1)
+    interrupted(monkeypatch, old, tmp_path / "campaign", chunks=1)
     with suppress(CampaignInterrupted):
         campaign_here(monkeypatch, new, tmp_path / "campaign", most_chunks=1)
     report = campaign_here(monkeypatch, new, tmp_path / "campaign")
@@ -149,7 +149,7 @@ def test_points_that_the_new_sweep_does_not_have_are_not_thrown_away(
 
 
 @pytest.mark.parametrize(
-    ("new", "told"),
+    ("new", "message"),
     [
         (sweep(frequency(21), restitution=0.8), "stop[1].restitution was 0.7, is 0.8"),
         (
@@ -161,13 +161,13 @@ def test_points_that_the_new_sweep_does_not_have_are_not_thrown_away(
     ],
 )
 def test_what_has_no_equal_point_is_refused_and_nothing_is_touched(
-    new: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    new: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     campaign_here(monkeypatch, sweep(frequency(11)), tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     with pytest.raises(UsageError) as refused:
         campaign_here(monkeypatch, new, tmp_path)
-    assert told in str(refused.value)
+    assert message in str(refused.value)
     assert "\n" not in str(refused.value)
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
@@ -176,7 +176,7 @@ def test_a_changed_title_keeps_every_point_and_is_that_of_the_dataset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "campaign"
-    begun(monkeypatch, sweep(frequency(101)), folder, chunks=1)
+    interrupted(monkeypatch, sweep(frequency(101)), folder, chunks=1)
     renamed = sweep(frequency(101), title="another title")
     assert campaign_here(monkeypatch, renamed, folder).resumed > 0
     campaign_here(monkeypatch, renamed, tmp_path / "new")
@@ -191,15 +191,15 @@ def test_a_changed_title_keeps_every_point_and_is_that_of_the_dataset(
 def test_a_campaign_that_dies_at_any_step_of_an_extension_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every change of a file is one step: after any number of them the command finds a folder it can go on with."""
+    """Each change of a file is a step: after any number of steps the command can go on with the folder."""
     replace, unlink = os.replace, Path.unlink
     old, new = sweep(THREE, frequency(5)), sweep(frequency(9))
     campaign_here(monkeypatch, new, tmp_path / "new")
-    begun(monkeypatch, old, tmp_path / "begun", chunks=3)
+    interrupted(monkeypatch, old, tmp_path / "interrupted", chunks=3)
     steps = 0
     while True:
         folder = tmp_path / str(steps)
-        shutil.copytree(tmp_path / "begun", folder)
+        shutil.copytree(tmp_path / "interrupted", folder)
         left = [steps]
 
         def counted(change: Callable[..., Any], left: list[int] = left) -> Callable[..., Any]:

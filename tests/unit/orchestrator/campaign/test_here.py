@@ -1,4 +1,4 @@
-"""A campaign that begins in this process: the same parts and bits, and workers where much is left."""
+"""A campaign that begins in this process: the same parts and bits as workers, who take over long campaigns."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ macro_step = 1.0
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Let workers be this very process, and return a list of those that were opened."""
+    """Replace workers by this process, and return the list of opened workers."""
     pools: list[str] = []
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""Campaigns whose points run in lanes: cut anywhere they have the same bits, and no two engines are mixed."""
+"""Campaigns in lanes: any cut into chunks gives the same bits, and two engines are never mixed."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lane
     text = BODY + restitution + frequency(path, points)
     whole = campaign_here(monkeypatch, text, tmp_path / "whole", runner=DEFAULT_RUNNER)
     rests = read_flat(whole.dataset).stick_count.values > 0
-    assert 0 < np.count_nonzero(rests) < rests.size  # the lanes leave points that rest
+    assert 0 < np.count_nonzero(rests) < rests.size  # lanes leave out points that rest
     (tmp_path / "scene.toml").write_text(text)
     command = (tmp_path / "scene.toml", tmp_path / "killed", "--workers", "2")
     killed = CampaignProcess(*command, runner="unhurried_lanes")
@@ -93,7 +93,7 @@ def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lane
     assert not (tmp_path / "killed" / "dataset.nc").exists()
     code, out, err = CampaignProcess(*command, runner="unhurried_lanes").end()
     assert code == 0, err
-    assert "by 2 workers, " in out  # both had points to compute, others were there
+    assert "by 2 workers, " in out  # both computed points, besides the stored points
     assert_same_rows(whole.dataset, tmp_path / "killed" / "dataset.nc")
 
 

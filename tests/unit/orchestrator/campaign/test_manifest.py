@@ -41,7 +41,7 @@ def test_layout_and_comments_do_not_make_another_scene() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         ("restitution = 0.7", "restitution = 0.8", "stop[1].restitution was 0.7, is 0.8"),
         ("mass = 1.0", "mass = 2.0", "body.mass was 1.0, is 2.0"),
@@ -50,13 +50,13 @@ def test_layout_and_comments_do_not_make_another_scene() -> None:
         ("[record]", f"{LOWER_STOP}[record]", "stop[2].position was absent, is -1.0"),
     ],
 )
-def test_a_changed_scene_is_refused_with_the_key(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_a_changed_scene_is_refused_with_the_key(tmp_path: Path, old: str, new: str, message: str) -> None:
     manifest = written(tmp_path)
     assert old in TEXT
     different = differences(manifest.scene, flat_scene(scene_of(TEXT.replace(old, new))))
     with pytest.raises(UsageError) as caught:
         refuse_other_scene(tmp_path / "campaign.json", different)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
     assert str(tmp_path) in str(caught.value)
 
 
@@ -66,18 +66,18 @@ def test_the_same_scene_is_not_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("other", "told"),
+    ("other", "message"),
     [
         (RunnerIdentity("batch", "x86_64", IDENTITY.fmu_hashes), 'execution was "fused", is "batch"'),
         (RunnerIdentity("fused", "arm64", IDENTITY.fmu_hashes), 'instruction_set was "x86_64", is "arm64"'),
         (RunnerIdentity("fused", "x86_64", {"body": "b" * 64}), "fmu_hashes.body was"),
     ],
 )
-def test_results_of_two_kinds_are_never_mixed(tmp_path: Path, other: RunnerIdentity, told: str) -> None:
+def test_results_of_two_kinds_are_never_mixed(tmp_path: Path, other: RunnerIdentity, message: str) -> None:
     different = runner_differences(written(tmp_path), other)
     with pytest.raises(UsageError) as caught:
         refuse_other_runner(tmp_path / "campaign.json", different)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_a_build_that_is_added_is_known_and_the_manifest_sound(tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_builds_of_another_shape_are_damage(tmp_path: Path, builds: object) -> N
     path = tmp_path / "campaign.json"
     scene = scene_of(TEXT)
     identity = RunnerIdentity("fused", "x86_64", {"body": "0"})
-    write_manifest(path, scene, identity, 1, builds)  # type: ignore[arg-type]  # as a stranger would write it
+    write_manifest(path, scene, identity, 1, builds)  # type: ignore[arg-type]  # as another program might write it
     with pytest.raises(UsageError, match="got a damaged file"):
         read_manifest(path)
 
@@ -142,7 +142,7 @@ def test_a_folder_is_locked_once_and_free_again_afterwards(tmp_path: Path) -> No
 
 
 class Pool:
-    """Workers of which one sees another folder."""
+    """Workers, one of which sees another folder."""
 
     def __init__(self, elsewhere: Path) -> None:
         self.elsewhere = elsewhere

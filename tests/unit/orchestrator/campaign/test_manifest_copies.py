@@ -1,4 +1,4 @@
-"""`campaign.json` is no single point of loss: the parts, and the dataset, carry what is needed to make it again."""
+"""A lost `campaign.json` is no loss: the parts and the dataset have all data to make it again."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ IDENTITY = RunnerIdentity("fused", "x86_64", {"body": "a" * 64})
 
 
 def interrupt(patch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int = 4) -> None:
-    """Begin a campaign, or go on with it, in chunks of five points, and stop after some of them."""
+    """Begin or resume a campaign in chunks of five points, and stop it after some chunks."""
     with patch.context() as inner:
         inner.setattr(schedule, "FIRST_POINTS", 5)
         inner.setattr(schedule, "MOST_POINTS", 5)
@@ -48,7 +48,7 @@ def interrupt(patch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int = 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with campaigns that nothing has damaged: half done, finished, and of another restitution."""
+    """Return a folder with sound campaigns: half done, finished, and with another restitution."""
     home = tmp_path_factory.mktemp("campaigns")
     with pytest.MonkeyPatch.context() as patch:
         interrupt(patch, TEXT, home / "half")
@@ -111,7 +111,7 @@ def test_one_part_of_the_campaign_is_enough(
 ) -> None:
     half, notes = copied(folders, "half", tmp_path), Notes()
     first, cut, *older = parts_of(half)
-    for path in older:  # as version 0.2 wrote them
+    for path in older:  # the form of version 0.2
         write_dataset(read_flat(path).assign_attrs({MANIFEST: ""}), path)
     cut.write_bytes(cut.read_bytes()[:1000])
     (half / "campaign.json").unlink()
@@ -158,7 +158,7 @@ def test_the_dataset_of_a_finished_campaign_tells_its_manifest(
 
 
 class Killed(BaseException):
-    """The end of a process in the middle of what it did."""
+    """The end of a process in the middle of its work."""
 
 
 def killed(*_: Any) -> None:

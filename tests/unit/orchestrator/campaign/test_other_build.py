@@ -1,4 +1,4 @@
-"""A campaign goes on with components of another build where its points, computed again, are equal bit for bit."""
+"""A campaign goes on with another build of its components if points computed again are equal bit for bit."""
 
 from __future__ import annotations
 
@@ -68,15 +68,15 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(schedule, "MOST_POINTS", 3)
 
 
-def begun(patch: pytest.MonkeyPatch, text: str, folder: Path, runner: str = BEGAN) -> list[Path]:
-    """Leave a campaign after two chunks of two or three points; return its parts."""
+def interrupted(patch: pytest.MonkeyPatch, text: str, folder: Path, runner: str = BEGAN) -> list[Path]:
+    """Interrupt a campaign after two chunks of two or three points; return its parts."""
     with pytest.raises(CampaignInterrupted):
         campaign_here(patch, text, folder, runner=runner, most_chunks=2)
     return sorted((folder / "parts").glob("branch-*.nc"))
 
 
 def change(part: Path, name: str, value: float) -> None:
-    """Change the last value of a variable of a part, which is sound after it."""
+    """Change the last value of a variable of a part, which stays a sound file."""
     rows = read_flat(part)
     rows[name].values.reshape(-1)[-1] = value
     write_dataset(rows, part)
@@ -88,7 +88,7 @@ def test_a_build_that_computes_the_same_goes_on_and_both_are_in_the_dataset(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes = Notes()
-    begun(monkeypatch, text, tmp_path / "campaign")
+    interrupted(monkeypatch, text, tmp_path / "campaign")
     campaign_here(monkeypatch, text, tmp_path / "campaign", runner=OTHER, notes=notes)
     campaign_here(monkeypatch, text, tmp_path / "new", runner=BEGAN)
     assert_same_rows(tmp_path / "campaign" / "dataset.nc", tmp_path / "new" / "dataset.nc")
@@ -107,7 +107,7 @@ def test_a_build_that_computes_the_same_goes_on_and_both_are_in_the_dataset(
 @pytest.mark.usefixtures("small_chunks")
 def test_a_build_that_went_on_once_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     notes = Notes()
-    begun(monkeypatch, UP, tmp_path)
+    interrupted(monkeypatch, UP, tmp_path)
     with pytest.raises(CampaignInterrupted):
         campaign_here(monkeypatch, UP, tmp_path, runner=OTHER, notes=notes, most_chunks=8)
     for runner in (OTHER, BEGAN):
@@ -134,7 +134,7 @@ def test_an_extended_campaign_asks_the_points_that_it_keeps(
 @pytest.mark.usefixtures("small_chunks")
 @pytest.mark.parametrize("text", [INDEPENDENT, UP])
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "difference"),
     [
         ("final_velocity", "final_velocity of point"),
         ("impact_velocity", "impact_velocity of point"),
@@ -142,9 +142,9 @@ def test_an_extended_campaign_asks_the_points_that_it_keeps(
     ],
 )
 def test_a_build_that_computes_other_values_is_refused_with_the_first_and_nothing_is_touched(
-    name: str, told: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, difference: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    part = begun(monkeypatch, text, tmp_path)[-1]
+    part = interrupted(monkeypatch, text, tmp_path)[-1]
     stored = read_flat(part)[name].values.reshape(-1)[-1]
     last = int(read_flat(part).run_index[-1])
     change(part, name, np.nextafter(stored, 10.0))
@@ -152,7 +152,7 @@ def test_a_build_that_computes_other_values_is_refused_with_the_first_and_nothin
     with pytest.raises(UsageError, match="expected the components and machine") as refused:
         campaign_here(monkeypatch, text, tmp_path, runner=OTHER)
     message = str(refused.value)
-    assert f"{told} {last} (angular_frequency = " in message
+    assert f"{difference} {last} (angular_frequency = " in message
     assert f"is stored as {np.nextafter(stored, 10.0)}, computed again as {stored}" in message
     assert "choose another folder, or go on with" in message
     assert "\n" not in message
@@ -163,15 +163,15 @@ def test_a_build_that_computes_other_values_is_refused_with_the_first_and_nothin
 def test_a_campaign_without_a_point_to_compare_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun_with = begun(monkeypatch, INDEPENDENT, tmp_path)
-    for part in begun_with:
+    stored = interrupted(monkeypatch, INDEPENDENT, tmp_path)
+    for part in stored:
         rows = read_flat(part)
         rows.outcome.values[:] = Outcome.crash
         write_dataset(rows, part)
     for _ in range(2):
         with pytest.raises(UsageError, match="no point that could be computed again"):
             campaign_here(monkeypatch, INDEPENDENT, tmp_path, runner=OTHER)
-        for part in begun_with:
+        for part in stored:
             part.unlink(missing_ok=True)
 
 
@@ -181,7 +181,7 @@ def test_points_that_take_long_are_computed_again_once_at_least(
 ) -> None:
     monkeypatch.setattr(other_build, "MOST_SECONDS", 1e-9)
     notes = Notes()
-    begun(monkeypatch, INDEPENDENT, tmp_path)
+    interrupted(monkeypatch, INDEPENDENT, tmp_path)
     campaign_here(monkeypatch, INDEPENDENT, tmp_path, runner=OTHER, notes=notes)
     assert notes.lines[0].endswith("; 1 of its points computed again are equal bit for bit.")
 
@@ -192,7 +192,7 @@ def test_fmus_of_which_only_the_recorded_hash_differs_go_on(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes = Notes()
-    begun(monkeypatch, text, tmp_path, DEFAULT_RUNNER)
+    interrupted(monkeypatch, text, tmp_path, DEFAULT_RUNNER)
     path = tmp_path / "campaign.json"
     manifest = read_manifest(path)
     assert manifest is not None

@@ -1,4 +1,4 @@
-"""Parts that were damaged are named and computed again; what lies beside them is left alone."""
+"""Damaged parts are named and computed again; other files in the folder are left alone."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_a_part_whose_values_do_not_fit_is_no_dead_end(
     if hashed:
         write_dataset(rows.assign(final_phase=rows.final_phase.assign_attrs(units="m")), other)
     else:
-        # A part of version 0.1 in which bits were flipped: times go backwards.
+        # flipped bits in a part of version 0.1: times go backwards
         times = rows.impact_time.values
         content = other.read_bytes()[:-LINE_LENGTH]
         assert content.count(times.tobytes()) == 1

@@ -1,4 +1,4 @@
-"""Points go where a response jumps, down to the tolerance and not below, whatever the response."""
+"""Points are added where a response jumps, down to the tolerance and not below, for any response."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def known(values: NDArray[np.float64], response: Response) -> Known:
 def refined(
     start: NDArray[np.float64], response: Response, step: Callable[[Known], Refined]
 ) -> tuple[Known, Refined]:
-    """Return all points once no more come, and the last round."""
+    """Return all points of the finished refinement, and the last round."""
     points = known(start, response)
     while len((more := step(points)).values):
         points = known(np.concatenate([points.values, more.values]), response)
@@ -69,9 +69,9 @@ def test_a_steep_slope_is_no_jump_once_its_points_are_near_enough(place: float, 
 def test_no_more_points_come_than_there_is_room_for(places: list[float], room: int) -> None:
     points = known(np.linspace(0.0, 1.0, 7)[:, None], steps_at(places))
     more = halved_intervals(points, 0, 1e-6, 1.0, room)
-    wanted = halved_intervals(points, 0, 1e-6, 1.0, 10**6)
-    assert len(more.values) == min(room, len(wanted.values))
-    assert more.left == len(wanted.values) - len(more.values)
+    unlimited = halved_intervals(points, 0, 1e-6, 1.0, 10**6)
+    assert len(more.values) == min(room, len(unlimited.values))
+    assert more.left == len(unlimited.values) - len(more.values)
 
 
 @given(st.permutations(range(12)), places_of_steps)
@@ -103,7 +103,7 @@ def test_the_border_of_a_region_lies_in_cells_no_larger_than_the_tolerance(
     tolerance = (1.0 / 64.0, 1.0 / 32.0)
     start = np.array([(a, b) for a in axis for b in axis])
     found, last = refined(start, inside, lambda k: cut_cells(k, (axis, axis), tolerance, 1.0, 10**6))
-    # between two classes on a line of the finest lattice no gap is wider than the tolerance
+    # on each line of the finest lattice, gaps between two classes are at most as wide as the tolerance
     for line in axis:
         along = found.values[:, 1] == line
         order = np.argsort(found.values[along, 0])

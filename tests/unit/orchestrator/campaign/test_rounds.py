@@ -82,7 +82,7 @@ def test_the_fold_of_the_impacting_motion_is_bracketed_along_the_path(
     jumps = jumps_of(open_dataset(report.dataset))
     fold = jumps.isel(jump=((jumps.direction == "up") & (jumps.below > 1.4)).values)
     assert fold.sizes["jump"] == 1
-    # the transient of 100 periods is over when the motion has left the fold by a little more than the tolerance
+    # the transient of 100 periods decays only at a distance from the fold of a little more than the tolerance
     assert fold.below.item() == pytest.approx(EXACT_FOLD, abs=6e-3)
     assert 0.0 < fold.above.item() - fold.below.item() <= 5e-3
     assert fold.impacts.values.tolist() == [[1, 0]]

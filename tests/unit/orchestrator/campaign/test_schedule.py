@@ -87,10 +87,10 @@ def test_short_branches_share_a_chunk() -> None:
 
 def test_a_chunk_that_takes_too_long_ends_early_and_its_rest_is_handed_out_again() -> None:
     schedule = ChunkSchedule(branches(FIRST_POINTS), [], workers=2)
-    asked = next_chunk(schedule)
+    planned = next_chunk(schedule)
     assert schedule.next_chunk() is None
     done = Chunk(0, 0, 10)
-    schedule.finished(asked, ended(done, 0.2))
+    schedule.finished(planned, ended(done, 0.2))
     assert next_chunk(schedule).first == 10
 
 

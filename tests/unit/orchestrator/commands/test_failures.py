@@ -1,4 +1,5 @@
-"""Points that failed are listed with their values and messages; a single one is said once, with exit code 1."""
+"""Failed points are listed with their values and messages; a single failed run prints its message once, exit code
+1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What FMUs declare: every flag of the schemas is heeded or refused, and an FMU punishes each neglect."""
+"""Declarations of FMUs: every flag of the schemas is heeded or refused, and an FMU punishes each neglect."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def exact(samples: np.ndarray) -> np.ndarray:
 
 
 def described(folder: Path, source: str, *replacements: tuple[str, str]) -> str:
-    """Return the name of an FMU of the folder with another description."""
+    """Return the name of an FMU of the folder with a changed description."""
     count = sum(1 for _ in folder.glob("described*.fmu"))
     return redescribed(folder / source, folder / f"described{count}.fmu", *replacements).name
 
@@ -134,7 +134,7 @@ def test_every_flag_of_the_schema_stands_in_the_table_and_nothing_else_does(vers
         for owner, name in flags_of_schema(version)
         if owner in (*INTERFACES, "variable", "clock")
     }
-    # the attributes of the interfaces are found as those of their elements too
+    # the attributes of an interface include those of its elements
     interfaces = {name for owner, name in of_schema if owner in INTERFACES}
     of_schema = {(o, n) for o, n in of_schema if o != "variable" or n not in interfaces}
     in_table = {(flag.owner, flag.name) for flag in FLAGS if version in flag.versions.split(", ")}
@@ -161,7 +161,7 @@ def test_every_heeded_flag_has_an_fmu_that_punishes_its_neglect() -> None:
 @pytest.mark.parametrize("states", [True, False])
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_no_step_is_said_to_be_taken_back(folder: Path, fmi: str, states: bool, steps_in_c: bool) -> None:
-    # where it is, the FMU begins the step before again
+    # an FMU that is told otherwise repeats the previous step
     name = "Mass" if states else "StatelessMass"
     importer = Importer([part("m", folder / f"{name}.fmi{fmi[0]}.fmu", v=1.0, k=4.0)], macro_step=0.01)
     importer.steps_in_c = steps_in_c
@@ -188,7 +188,7 @@ def test_an_fmu_that_is_told_otherwise_begins_its_last_step_again(
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_no_state_is_set_of_before_a_point_that_was_passed_for_good(folder: Path, fmi: str) -> None:
-    # samples, a contact with a foreign stop and its trial steps go back often, and the FMU refuses what is too far
+    # samples, a contact with a foreign stop and its trial steps go back often; the FMU refuses to go too far
     mass = part("m", folder / f"Mass.fmi{fmi[0]}.fmu", v=1.0, k=4.0)
     stop = part("s", fmu_factory.buffer(folder, fmi), k=1e3, gap=0.1)
     contact = StopContactSpec("m", "x", "v", "f", "s", None, "d", "u", "push", "upper")
@@ -218,7 +218,7 @@ def test_steps_of_one_size_are_kept_and_read_where_they_end(
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu(folder: Path, fmi: str) -> None:
-    # it says that its steps may have any size
+    # the FMU declares steps of any size
     samples = mass_samples(folder, f"Mass.fmi{fmi[0]}.fmu", 300.0, 0.01, ", scheme = 5.0")
     assert np.max(np.abs(samples[:, 1:] - exact(samples))) > 1e-3
 
@@ -270,7 +270,7 @@ def test_an_fmu_without_states_is_asked_for_none(folder: Path, fmi: str) -> None
 
 
 def bounces(fmu: Path) -> list[float]:
-    """Return the first bounces of a ball, to the end of the step in which it is at rest after them, s."""
+    """Return the first bounces of a ball, to the end of the step in which it comes to rest, s."""
     found: list[float] = []
     importer = Importer([part("ball", fmu)], macro_step=0.01)
     importer.on_event = lambda event: found.append(event.time)
@@ -286,7 +286,7 @@ def test_event_mode_is_entered_where_it_is_declared_alone(folder: Path) -> None:
     found = bounces(ball)
     assert len(found) >= 1
     assert found[0] == pytest.approx(0.453, abs=1e-9)
-    assert bounces(without) == []  # its bounces are inside steps, and nobody hears of them
+    assert bounces(without) == []  # its bounces lie inside steps, unseen
     # an FMU without event mode makes no instance with it
     with pytest.raises(ComponentError, match="InstantiateCoSimulation made no instance"):
         Instance3(unpack(folder / "Mass.fmi3.fmu"), "m", event_mode=True)
@@ -405,7 +405,7 @@ def test_what_is_offered_and_not_needed_is_not_called(folder: Path, fmi: str, fl
     instance = (Instance2 if fmi == "2.0" else Instance3)(unpack(folder / fmu), "m")
     size = ctypes.c_size_t()
     answer = instance._function(OFFERED[fmi, flag])(instance.pointer, None, ctypes.byref(size))
-    assert answer == 3  # an importer that calls it is told so
+    assert answer == 3  # this FMU's answer to an importer that calls it
     instance.free()
 
 
@@ -482,7 +482,7 @@ def test_input_clocks_tick_at_their_instants(
     text = CLOCKED.format(fmu="Clocked.fmi3.fmu", macro_step=macro_step, major=major, exchange=exchange)
     samples = samples_of(run(text, folder))
     time, y, ticks, late, total = samples.T
-    # a sample at a tick is that of before it, but for the first
+    # a sample at a tick has the value before the tick, except the first
     count = np.where(time == 0.0, 1.0, np.ceil(np.round(time / 0.2, 9)))
     late_count = np.ceil(np.round((time - 0.125) / 0.25, 9)).clip(0.0)
     np.testing.assert_array_equal(ticks, count)
@@ -501,13 +501,13 @@ def test_a_clock_that_nobody_ticks_counts_nothing(folder: Path, monkeypatch: pyt
 
 
 def test_the_interval_of_a_clock_may_be_a_fraction(folder: Path) -> None:
-    # the functions for fractions that it offers answer error
+    # its functions for fractions return an error
     fraction = 'supportsFraction="true" canBeDeactivated="true" resolution="3" intervalCounter="1"'
     fmu = described(folder, "Clocked.fmi3.fmu", ('intervalDecimal="0.2"', fraction))
     ticks = samples_of(run(CLOCKED.format(fmu=fmu, macro_step=0.1, major="3", exchange="jacobi"), folder))[
         :, 2
     ]
-    assert ticks[-1] == 3.0  # at 0, 1/3, 2/3; the one at 1 comes after the last sample
+    assert ticks[-1] == 3.0  # at 0, 1/3, 2/3; the tick at 1 comes after the last sample
     assert int(np.argmax(ticks == 2.0)) == 334
 
 
@@ -527,9 +527,9 @@ def test_clocked_components_feed_each_other_at_one_tick(folder: Path) -> None:
     outputs = [importer.components[name].group("Float64", ["y"]) for name in "ab"]
     importer.begin()
     importer.advance(0.5)
-    assert [group.get()[0] for group in outputs] == [30.0, 60.0]  # of the tick at .4: 10 ticks, and a.y
+    assert [group.get()[0] for group in outputs] == [30.0, 60.0]  # at the tick at .4: 10 ticks, and a.y
     with pytest.raises(ComponentError, match=r"a: fmi3GetFloat64 returned error"):
-        values(importer, "a", "y")  # nobody has kept what was never asked for
+        values(importer, "a", "y")  # a value without a reader is not kept
     importer.free()
 
 
@@ -538,7 +538,7 @@ PUNISHED: dict[Flag, Punished] = {}
 
 
 def _punished_by(test: Punished, *names: str) -> None:
-    """Note which test has the FMU that punishes the neglect of heeded flags."""
+    """Register the test whose FMU punishes the neglect of these flags."""
     for flag in FLAGS:
         if flag.name in names and flag.treatment is Treatment.heeded:
             PUNISHED[flag] = test

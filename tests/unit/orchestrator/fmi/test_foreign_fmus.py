@@ -1,4 +1,4 @@
-"""FMUs of other people: when a step has ended, who asks for the end, who is watched, what is not for this importer."""
+"""Foreign FMUs: ends of steps, requests for the end, watched variables, and FMUs that this importer refuses."""
 
 import shutil
 import zipfile
@@ -69,7 +69,7 @@ def test_every_bounce_inside_a_step_of_the_example_is_found_at_its_instant(
             assert record.events is not None
             expected = bounces_of_the_rule(restitution, 3.0)
             assert len(expected) > 3
-            # the solver's step is nearer than 1e-5 s to the communication point at which the FMU makes it
+            # the solver's step is less than 1e-5 s from the communication point at which the FMU makes it
             np.testing.assert_allclose(record.events[:, 0], expected, rtol=0, atol=1.1e-5)
     finally:
         runner.close()
@@ -94,7 +94,7 @@ macro_step = 0.01
 def test_an_fmu_that_refuses_the_event_mode_it_declares_runs_without_and_says_so(
     folder: Path, tmp_path: Path
 ) -> None:
-    # Roberts of the Reference-FMUs does it
+    # Roberts of the Reference-FMUs refuses it
     declared = tmp_path / "Declared.fmu"
     with zipfile.ZipFile(folder / "BouncingBall.fmi3.fmu") as archive, zipfile.ZipFile(declared, "w") as copy:
         for member in archive.namelist():
@@ -197,7 +197,7 @@ def test_a_step_that_lies_about_its_end_is_an_error_that_names_what_was_said(
 ) -> None:
     text = LIES.format(major=fmi[0], fault=fault, early=early, record="")
     if fault == "says_start" and (fmi == "2.0" or early):
-        # FMI 2.0: no lie, the run ends there; FMI 3.0: it has gone on, and refuses to do so from where it said it was
+        # FMI 2.0: no lie, the run ends there; FMI 3.0: the FMU has gone on, and refuses to step from the reported time
         if fmi == "2.0":
             assert run(text, folder).message.startswith("a component asked for the end at time 0.3")
         else:
@@ -230,7 +230,7 @@ def test_a_component_that_asks_for_the_end_inside_a_step_ends_the_run_there(
 
 
 def test_a_component_that_ends_a_repeated_step_early_is_an_error_and_no_wrong_sample(folder: Path) -> None:
-    # it counts its calls in the process, not in its state: sampled inside a step, it ended short of the sample
+    # it counts calls in the process, not in its state: sampled inside a step, it would end short of the sample
     text = LIES.format(major="3", fault="end_short", early=0, record='variables = ["culprit.y"]\nrate = 100')
     text = text.replace("says_early = 0", "fault_after = 1").replace(
         "macro_step = 0.1", "macro_step = 0.1\nguard = true"
@@ -251,7 +251,7 @@ def test_two_components_end_together_where_the_second_asks_for_the_end(folder: P
     ).replace('fmu = "Gain.fmi2.fmu"', 'fmu = "Faulty.fmi2.fmu"')
     found = run(text, folder)
     assert found.message.startswith("a component asked for the end at time 0.34999999999999998")
-    assert "others" not in found.message  # it went back to there
+    assert "others" not in found.message  # the other component went back to that time
     assert found.samples is not None
     np.testing.assert_allclose(found.samples[:, 2], found.samples[:, 0], rtol=0, atol=1e-12)
     found = run(text.replace('variables = ["culprit.y", "before.y"]\nrate = 100', ""), folder)

@@ -1,4 +1,4 @@
-"""Points that are announced are run in batches, and are what they are one by one."""
+"""Announced points run in batches, and equal the same points run one by one."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def alone(scene: Scene) -> Iterator[Callable[[float], RunRecord]]:
 
 @pytest.fixture
 def batches(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the numbers of points that a child was given at a time, as they come."""
+    """Return the list of batch sizes, which grows with each batch given to a child."""
     sizes: list[int] = []
     say = PointProcess.say
 
@@ -85,7 +85,7 @@ def test_the_points_of_a_chunk_are_those_of_a_runner_without_a_guard(
     batches: list[int],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # it is given more than it has the time for, and is given the rest again
+    # the child gets more points than fit its time, and gets the rest again
     monkeypatch.setattr(guarded, "BATCH_TIME", 10.0)
     stiffnesses = [1.0 + k for k in range(40)]
     points = independent_points({SWEPT: np.array(stiffnesses)}, len(stiffnesses))
@@ -104,7 +104,7 @@ def test_points_that_were_run_ahead_and_are_not_asked_for_are_forgotten(
     runner.announce(announced)
     for values, start in announced[:3]:
         assert_same(runner.run(values, start), alone(values[SWEPT]))
-    # equal to one that is there already, and yet another point
+    # equal to an announced point, but another object
     for stiffness in (4.0, 20.0, 4.0):
         assert_same(runner.run({SWEPT: stiffness}), alone(stiffness))
     runner.announce(announced[4:])

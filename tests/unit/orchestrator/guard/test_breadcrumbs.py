@@ -1,4 +1,4 @@
-"""Notes of the FMI call under way, as the process reads them that outlives the one which made the call."""
+"""Notes of the FMI call under way, as read by the process that outlives the caller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a guard and its child say to each other arrives whole, or not at all."""
+"""Messages between a guard and its child arrive whole, or not at all."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_message_that_was_cut_off_is_none(kept: int) -> None:
 
 
 def record_of(rows: int) -> RunRecord:
-    """Return a record whose arrays are of all kinds."""
+    """Return a record with arrays of all kinds."""
     table = np.arange(4.0 * rows).reshape(rows, 4)
     return RunRecord(
         Outcome.stuck,
@@ -87,7 +87,7 @@ def memory() -> Iterator[int]:
 
 
 def through(memory: int, writer: Memory, *records: RunRecord) -> tuple[list[RunRecord | None], int]:
-    """Send records and receive them; also return how many bytes went through the pipe."""
+    """Send and receive records; return them, and the number of bytes through the pipe."""
     pipe = io.BytesIO(b"".join(bytes(row) for record in records for row in packed(record, writer)))
     size = len(pipe.getvalue())
     return [receive(pipe, memory) for _ in records], size
@@ -96,7 +96,7 @@ def through(memory: int, writer: Memory, *records: RunRecord) -> tuple[list[RunR
 def test_large_arrays_arrive_by_memory_and_all_others_by_the_pipe(memory: int) -> None:
     records = [record_of(rows) for rows in (3, 2000, 5, 3000)]
     writer = Memory(memory)
-    for _ in range(3):  # the batches after the first find the memory as that has left it
+    for _ in range(3):  # later batches find the memory as the first has left it
         received, size = through(memory, writer, *records)
         assert size < 2000
         for record, expected in zip(received, records, strict=True):

@@ -1,4 +1,4 @@
-"""The closed forms and series that hard cases are compared with, against 40 digits."""
+"""The closed forms and series of the hard cases, against 40 digits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.hard_cases.flights import (
 
 
 def way(load: mp.mpf, slope: mp.mpf, angle: mp.mpf) -> mp.mpf:
-    """Return the way that the load a cos(u) + b sin(u) gives a mass at rest."""
+    """Return the displacement that the load a cos(u) + b sin(u) gives a mass at rest."""
     return load * (1 - mp.cos(angle)) + slope * (angle - mp.sin(angle))
 
 

@@ -1,4 +1,4 @@
-"""Hard cases: a missed bound is told, what cannot run is told, names are names; tests/hard_cases measures them."""
+"""Hard cases: missed bounds and failures are reported, names are unique; tests/hard_cases measures them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_names_that_are_none_are_refused(
 
 @pytest.fixture
 def missed(monkeypatch: pytest.MonkeyPatch) -> HardCase:
-    """Return a case whose bound nothing meets, the only one of the list."""
+    """Return a case with an unreachable bound, the only one of the list."""
     case = replace(CASES[0], name="never", bound=1e-30)
     monkeypatch.setattr("vibroimpact.orchestrator.hard_cases.measuring.CASES", (case,))
     return case
@@ -59,7 +59,7 @@ def test_a_bound_that_is_missed_is_in_the_dataset_and_in_the_figure(missed: Hard
 
 
 def let_nothing_run(patch: pytest.MonkeyPatch) -> None:
-    """Let each hard case be an error."""
+    """Make each hard case an error."""
 
     def measure(case: HardCase, clock: Callable[[], float]) -> Measured:
         raise AssertionError("a case has run")

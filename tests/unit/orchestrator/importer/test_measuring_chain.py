@@ -94,7 +94,7 @@ def test_an_analog_input_samples_a_moving_body_at_its_own_edges(version: str, ma
     numbers = gaussian(9, 4, 0, 60)[np.floor(edges * rate + 1e-4).astype(int)]
     analog = volts + rms * numbers
     step = 10.0 / 2**14
-    # rounding of the motion may take a voltage over the middle between two levels
+    # rounding of the motion may move a voltage over the middle between two levels
     assert np.abs(found["volts"][chosen] - analog).max() <= 0.5 * step + 1e-12
     assert np.count_nonzero(found["volts"][chosen] != digitised(analog, 5.0, 14)) <= 1
 
@@ -192,7 +192,8 @@ def test_a_body_that_touches_its_exciter_ends_the_run_with_a_reason() -> None:
 
 
 def test_a_summed_chatter_is_in_the_total_impulse_at_once() -> None:
-    # a ball that falls on a stop until it rests: weight times time is all that the stop gave, but for what it holds
+    # a ball that falls on a stop until it rests: the stop's impulse is weight times time, less what it holds at the
+    # end
     oscillator = {"mass": 2.0, "stiffness": 0.0, "forcing.amplitude": -2.0 * 9.81, "displacement_start": 0.1}
     stop = {"law": RESTITUTION, "position": 0.0, "side": 2, "restitution": 0.5}
     parts = [body("body", oscillator | {f"contact[1].{name}": value for name, value in stop.items()})]

@@ -1,4 +1,4 @@
-"""Plain steps in C beside the same, step by step, in Python: to the bit."""
+"""Plain steps in C and the same steps in Python agree to the bit."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_a_component_that_misbehaves_is_met_as_step_by_step(
 
 @pytest.mark.parametrize("place", ["get", "set", "save", "restore", "event"])
 def test_a_call_that_fails_is_told_as_step_by_step(folder: Path, place: str) -> None:
-    # the faults of a process are counted: both runs make as many calls, or the second one ends elsewhere
+    # the faults of a process are counted: both runs must make equally many calls, or the second run ends elsewhere
     good, failures = 7, []
     links = [*contact("a", "s"), link("a.displacement", "f.u"), link("f.y", "a.force", 0.01)]
     for in_c, before in ((True, 0), (False, good + 1)):

@@ -1,4 +1,4 @@
-"""Bodies of two FMUs at rest on each other: how far they overlap or part is said where it is more than rounding."""
+"""Bodies of two FMUs at rest on each other: a remark reports an overlap or an opening that is more than rounding."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_overlap_of_bodies_at_rest_is_said_with_its_size(macro_step: float, 
     assert said is not None
     overlap, opening = (float(number) for number in said.groups())
     assert 1e-9 < max(overlap, opening) < most
-    assert -distance.min() <= 1.06 * overlap + 1e-12  # it is said to two digits
+    assert -distance.min() <= 1.06 * overlap + 1e-12  # the remark has two digits
     assert distance.max() <= 1.06 * opening + 1e-12
 
 

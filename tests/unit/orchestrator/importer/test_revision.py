@@ -13,7 +13,7 @@ PRECISION = 2e-13
 
 
 class Counted:
-    """A function that counts its calls, and where beyond its root it may be anything."""
+    """A function that counts its calls; beyond its root its values may be meaningless."""
 
     def __init__(
         self, function: Callable[[float], float], root: float, beyond: Callable[[float], float]
@@ -56,9 +56,7 @@ def test_a_root_is_located_whatever_lies_beyond_it(name: str, beyond: str, end: 
     value = Counted(FUNCTIONS[name], 1.0, BEYOND[beyond])
     found = refine(Bracket(0.0, FUNCTIONS[name](0.0), end), value, PRECISION)
     # the far end: at or just past the root, never before it by more than the rounding of its values
-    slack = (
-        1e-15 if name != "very flat root" else 1e-11
-    )  # where (1 - u)^9 is below the smallest number told apart
+    slack = 1e-15 if name != "very flat root" else 1e-11  # (1 - u)^9 is flat near its root
     assert 1.0 - slack <= found <= 1.0 + PRECISION + 1e-15
     assert value.calls <= MOST_EVALUATIONS
 

@@ -1,4 +1,4 @@
-"""Tunable parameters that are connected. References: FMPy sets them by hand, or a body whose force does the same."""
+"""Connected tunable parameters. References: FMPy sets them by hand, or a body has the same force."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 
-#: A free oscillator whose displacement is the amplitude of the force on another, whose spring is weak.
+#: A free oscillator; its displacement is the amplitude of the force on another oscillator, whose spring is weak.
 GIVING = {"displacement_start": 1.0, "stiffness": 2.0}
 TAKING = {"stiffness": 0.25, "forcing.angular_frequency": 1.3, "forcing.amplitude": 9.0}
 GIVEN = [link("giving.displacement", "taking.forcing.amplitude", 0.5)]
@@ -80,7 +80,7 @@ def test_a_parameter_that_its_own_component_feeds_is_given_too(made: list[Import
 def test_what_feeds_a_parameter_answers_the_event_that_has_just_been(
     made: list[Importer], tmp_path: Path
 ) -> None:
-    # the speed of the last impact, through a component in between, is the amplitude from the impact on
+    # from the impact on its speed is the amplitude, through a component in between
     struck = {"displacement_start": -1.0, "contact[1].law": "external", "forcing.angular_frequency": 1.0}
     specs = [
         body("ball", struck),

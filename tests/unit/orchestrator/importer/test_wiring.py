@@ -184,7 +184,7 @@ def test_two_separate_loops_are_told_apart(made: list[Importer], gain: Path) -> 
 def test_a_mass_added_through_a_loop_slows_an_oscillator(
     made: list[Importer], gain: Path, version: str, gain_factor: float
 ) -> None:
-    # force = k acceleration: the mass is 1 - k. What hangs on the loop sees its solution, not a guess
+    # force = k acceleration: the mass is 1 - k. Components behind the loop see its solution, not a guess
     errors = []
     for macro_step in (0.02, 0.01):
         importer = begun(
@@ -242,7 +242,7 @@ def test_gains_multiply_and_conversions_keep_them(made: list[Importer], gain: Pa
     ("source", "target"), [("3.0", "2.0"), ("2.0", "3.0"), ("2.0", "2.0"), ("3.0", "3.0")]
 )
 def test_truth_values_cross_versions(made: list[Importer], source: str, target: str) -> None:
-    # record.impacts is an input that is true or false; so is contact[1].stuck, as an output
+    # record.impacts is a boolean input, and contact[1].stuck a boolean output
     stuck: dict[str, Value] = {"contact[1].law": "restitution", "contact[1].side": "upper", "force": 1.0}
     importer = begun(
         made,
@@ -303,7 +303,7 @@ def test_start_values_reach_the_end_of_a_chain_before_the_first_step(
 
 
 def test_a_start_value_is_the_first_thing_a_force_knows(made: list[Importer]) -> None:
-    # a is still; what moves it from the first instant on is the start displacement of b
+    # a is still; the start displacement of b moves it from the first instant on
     importer = begun(
         made,
         [body("a", {}), body("b", {"displacement_start": 2.0})],
@@ -430,7 +430,7 @@ def test_the_error_of_an_exchange_falls_with_its_order(
 def test_a_component_without_states_is_stepped_once_in_an_iterated_exchange(
     made: list[Importer], gain: Path
 ) -> None:
-    # a spring 1 - .1 through a gain FMU that no step can be repeated with
+    # a spring 1 - .1 through a gain FMU whose step cannot be repeated
     steps = 0
 
     def wrap(name: str) -> Wrapper:

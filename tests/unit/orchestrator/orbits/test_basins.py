@@ -1,4 +1,4 @@
-"""Basins of scenes. References: single runs that are classified, unstable orbits, mirrored scenes."""
+"""Basins of scenes. References: single runs with their class, unstable orbits, mirrored scenes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def scene(path: Path = SCENE, **changes: Any) -> vi.Scene:
 
 
 def agrees_with_single_runs(found: xr.Dataset, of: vi.Scene, keys: tuple[str, str], count: int) -> None:
-    """Run some starts one by one: each is what its cell says, and ends on the attractor of its cell."""
+    """Run some starts one by one: each has the class of its cell, and ends on the attractor of its cell."""
     draw = np.random.default_rng(2)
     for x, y in draw.random((count, 2)):
         at = found.isel(
@@ -88,7 +88,7 @@ def test_an_attractor_is_in_its_own_basin_and_the_unstable_orbit_on_the_border()
         )
         assert int(cell) == number
     (unstable,) = (orbit for orbit in vi.find_orbits(of, 1, 1) if not orbit.is_stable)
-    turns = np.array([2.0 * np.pi])  # of the force: a phase 0 after the impact
+    turns = np.array([2.0 * np.pi])  # turns of the force: a phase 0 after the impact
     x, v = unstable.at(turns)
     cells = found.basin.sel(
         displacement_start=slice(x[0] - 0.03, x[0] + 0.03), velocity_start=slice(v[0] - 0.05, v[0] + 0.05)
@@ -122,7 +122,7 @@ TWO_CHAOTIC = [
 
 @pytest.fixture
 def brief_transients(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let long runs of chaotic starts settle for fewer periods: those of these scenes are settled by then."""
+    """Shorten the transients of long runs of chaotic starts: the runs of these scenes settle in fewer periods."""
     monkeypatch.setattr(plane_of_starts, "TRANSIENT_OF_CHAOS", 300)
 
 

@@ -1,4 +1,4 @@
-"""Followed orbits beside runs of the FMUs: on either side of bifurcations, along P(2,2), on stops that yield."""
+"""Followed orbits against runs of the FMUs: on both sides of bifurcations, along P(2,2), on yielding stops."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.study.ways.equal_restitution import laws_of_equal_
 FREQUENCY = "forcing.angular_frequency"
 LONG = {
     "transient_periods": 4000,
-    "recorded_periods": 256,  # beside a fold chaos stays near the lost orbit for some tens
+    "recorded_periods": 256,  # near a fold, chaos stays close to the lost orbit for some tens of periods
     "impacts": True,
     "extrema": True,
     "strobe": True,
@@ -43,7 +43,7 @@ def chain() -> Followed:
 
 
 def run_from(orbit: PeriodicOrbit, frequency: float) -> tuple[str, Any]:
-    """Run the chain from next to an orbit, at a frequency near to it; return what it is in the end, and its speeds."""
+    """Run the chain from a start next to an orbit, at a nearby frequency; return the final class and the speeds."""
     shapes = chain_modes([1.0, 1.0], [1.0, 1.0, 0.0], [0.1, 0.1, 0.0]).shapes
     displacements, velocities = shapes @ orbit.states[0][:2], shapes @ orbit.states[0][2:]
     start = {
@@ -113,7 +113,7 @@ def test_a_chain_of_one_mass_has_the_points_of_the_oscillator() -> None:
 
 @pytest.mark.parametrize("frequency", [1.0, 1.1, 1.2])
 def test_orbits_on_a_stiff_stop_come_to_the_followed_one_as_the_contact_shortens(frequency: float) -> None:
-    # a Kelvin-Voigt stop of the same restitution: what is left is proportional to the time of contact
+    # a Kelvin-Voigt stop of the same restitution: the difference is proportional to the time of contact
     of = scene(OSCILLATOR, forcing__angular_frequency=frequency)
     orbit = next(each for each in vi.find_orbits(of, 1, 1) if each.is_stable)
     speed = float(orbit.velocities[0])
@@ -125,5 +125,5 @@ def test_orbits_on_a_stiff_stop_come_to_the_followed_one_as_the_contact_shortens
         away.append((run.impact_velocity.values[-1] - speed, run.impact_phase.values[-1] - orbit.phases[0]))
     ratios = np.array(away[:-1]) / np.array(away[1:])
     assert ratios == pytest.approx(2.0, abs=5e-3)
-    # extrapolated to no duration it is the orbit
+    # extrapolated to a contact of no duration, the speed is the orbit's
     assert 2.0 * np.array(away[2]) - np.array(away[1]) == pytest.approx(0.0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Orbits that are kept by coupled FMUs. References: the orbits of `find_orbits`, thesis 3.5.2, runs without control."""
+"""Orbits kept by coupled FMUs. References: the orbits of `find_orbits`, thesis 3.5.2, runs without control."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_the_unstable_orbit_is_kept_nearer_to_its_graze_than_in_the_thesis(found
 
 
 def test_what_was_kept_is_the_orbit(found: xr.Dataset) -> None:
-    # at the last frequency of the plan there are impacts enough to come to it
+    # at the last frequency of the plan there are enough impacts to reach the orbit
     last = found.isel(impact=found.impact_orbit == found.sizes["orbit"] - 1).isel(impact=slice(-5, None))
     orbit = vi.find_orbits(scene().with_values({"forcing.angular_frequency": found.attrs["kept_to"]}), 1, 1)
     assert last.impact_velocity.values == pytest.approx(float(orbit[0].velocities[0]), rel=1e-9)

@@ -1,4 +1,4 @@
-"""What `vibroimpact orbit` refuses, and what it finds from what it is given."""
+"""Refusals of `vibroimpact orbit`, and the orbits that it finds from counts, seeds and runs."""
 
 from __future__ import annotations
 

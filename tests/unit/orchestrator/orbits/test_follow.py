@@ -1,4 +1,4 @@
-"""Orbits found and followed from scenes: the commands, what they write, and what they refuse."""
+"""Orbits found and followed from scenes: the commands, their files, and their refusals."""
 
 from __future__ import annotations
 
@@ -299,7 +299,7 @@ CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
 
 
 def few_starts(patch: pytest.MonkeyPatch) -> None:
-    """Look for orbits at 2 values of the parameter instead of 25, from 64 trains of impacts instead of 256."""
+    """Search orbits at 2 values of the parameter instead of 25, from 64 trains of impacts instead of 256."""
     patch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 2)
     patch.setitem(orbits_of.__kwdefaults__, "starts", 64)
 
@@ -436,7 +436,7 @@ def test_an_orbit_that_passes_through_its_stop_is_not_followed() -> None:
 
 
 def swept_scene(**forcing: float) -> dict[str, object]:
-    """Return a two-sided oscillator that sweeps its frequency, which it does not give."""
+    """Return a two-sided oscillator whose frequency comes only from its sweep."""
     stop = {"position": 1.0, "restitution": 0.7}
     return {
         "scene": {"units": "nondimensional"},
@@ -543,7 +543,7 @@ def test_what_runs_end_on_and_no_branch_holds_is_said(tmp_path: Path) -> None:
         said[0],
     )
     _, out, _ = in_this_process([*command, "--impacts", "1"])
-    assert "not followed here" not in out  # it was asked for these alone
+    assert "not followed here" not in out  # only this kind was requested
 
 
 @pytest.mark.parametrize("variable", ["displacement_max", "strobe_displacement", "impact_phase"])

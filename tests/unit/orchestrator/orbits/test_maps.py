@@ -1,4 +1,4 @@
-"""What `vibroimpact maps` shows of a scene, and what it refuses."""
+"""Results of `vibroimpact maps` for scenes, and its refusals."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_nordmarks_map_of_a_scene_begins_at_its_graze() -> None:
     ("rho", "name"), [(5e-5, "P(1,9)"), (2e-4, "P(1,8)"), (5e-4, "P(1,7)"), (2e-3, "P(1,6)")]
 )
 def test_an_overdamped_oscillator_moves_as_its_nordmark_map_near_the_graze(rho: float, name: str) -> None:
-    # thesis figure 2.18: alpha is beyond what an underdamped oscillator has
+    # thesis figure 2.18: alpha is beyond the range of an underdamped oscillator
     of = scene(EXAMPLES / "thesis" / "figure_2_18.toml")
     found = vi.maps(of, "nordmark", span=(rho * 0.999, rho * 1.001), points=10)
     assert (found.attrs["alpha"], found.attrs["gamma"]) == pytest.approx((0.65, 0.05), rel=1e-12)

@@ -1,4 +1,4 @@
-"""Energies and resonances of scenes, campaigns and datasets: by the commands and in Python, and what has none."""
+"""Energies and resonances of scenes, campaigns and datasets: by the commands and in Python, and refusals."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_energies_of_a_chain_are_those_that_its_fmu_has_at_the_impacts() -> 
     for mode in (1, 2):
         sampled = run[f"modal_energy_{mode}"].values
         exact = float(found.energy_before[0, mode - 1]), float(found.energy_after[0, mode - 1])
-        # a sample is 1/20000 s off, during which less than 5e-5 is exchanged
+        # a sample is 1/20000 s off; in that time less than 5e-5 is exchanged
         assert (sampled[place - 1], sampled[place]) == pytest.approx(exact, abs=5e-5)
 
 
@@ -90,7 +90,7 @@ def test_a_campaign_has_energies_along_its_sweep_and_a_reason_where_it_has_none(
     assert (one.impacts, one.periods) == (1, 1)
     assert str(at.sel(angular_frequency=0.2, method="nearest").reason.item()).startswith("sticking")
     assert at.sel(angular_frequency=2.3, method="nearest").reason.item() == "no impacts"
-    # what a mode gets from force and damping is what impacts take from it
+    # the gain of a mode from force and damping is its loss at impacts
     np.testing.assert_allclose(found.residual_energy, -found.impact_change, atol=1e-13)
 
 

@@ -1,4 +1,4 @@
-"""Transients: starts come together as the multipliers of the orbit say, or end elsewhere and it is said."""
+"""Transients: starts come together at the rate of the orbit's multipliers, or end elsewhere, which is reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fits of a replay that begin at, or end beside, a bound of a number, or where a number has no effect."""
+"""Fits of a replay that start at, or end near, a bound of a number, or where a number has no effect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_GAIN = BOARD.replace("gain = 0.9", "gain = 0.0")
 
 
 def recorded(folder: Path, truth: dict[str, float]) -> Path:
-    """Write what the board of the scene reads with other numbers, and noise: the reference is the scene itself."""
+    """Write readings of the scene's board with other numbers, and noise: the reference is the scene itself."""
     base = channel("base", TIME, pulse(TIME), trigger="one")
     still = channel("board", TIME, np.zeros_like(TIME), trigger="one")
     path = written(folder / "a0.nc", base, still)

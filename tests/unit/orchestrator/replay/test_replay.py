@@ -39,7 +39,7 @@ def scene(text: str = BOARD) -> Scene:
 
 
 def simulated(values: dict[str, float], folder: Path, base: Floats | None = None) -> Floats:
-    """Return what the board of the scene would read, m/s^2."""
+    """Return the readings of the scene's board, m/s^2."""
     drive = pulse(TIME) if base is None else base
     path = written(folder / "drive.nc", channel("base", TIME, drive), channel("board", TIME, pulse(TIME)))
     with opened_replays(scene(BOARD + "drive_offset = 0.0"), [path]) as (replayer,):
@@ -47,7 +47,7 @@ def simulated(values: dict[str, float], folder: Path, base: Floats | None = None
 
 
 def recorded(folder: Path, lag: float = 0.0031, noise: float = 2.0) -> Path:
-    """Write a recording of the board: inverted, later, noisy, in g, of another trigger, with an offset."""
+    """Write a recording of the board: inverted, later, noisy, in g, with another trigger, with an offset."""
     truth = {"body.frequency": 823.0, "body.damping_ratio": 0.017, "sensor.gain": 1.1}
     reading = simulated(truth, folder)
     random = np.random.default_rng(5)
@@ -75,7 +75,7 @@ def test_a_replayed_simulation_gives_back_the_simulation(tmp_path: Path) -> None
 
 
 def test_the_drive_is_followed_exactly_between_its_samples(tmp_path: Path) -> None:
-    # reference: the mode by itself, through the C door, with value and slope of every sample
+    # reference: the mode alone, through the C interface, with value and slope of every sample
     base = pulse(TIME)
     reading = simulated({"sensor.gain": 1.0}, tmp_path, base)
     natural = 2.0 * np.pi * 800.0
@@ -126,7 +126,7 @@ def test_a_fit_far_off_begins_at_the_measured_frequency(tmp_path: Path) -> None:
 
 def test_numbers_that_change_the_motion_alike_are_refused(tmp_path: Path) -> None:
     path = recorded(tmp_path)
-    # frequency is all that stiffness does to a board that is moved by its base
+    # for a board that its base moves, stiffness changes nothing but the frequency
     stiff = scene(BOARD.replace("frequency = 800.0", "flexural_rigidity = 60.0"))
     with opened_replays(stiff, [path]) as replayers, pytest.raises(EstimationError, match="tell apart"):
         fit_replay(replayers, ["body.flexural_rigidity", "body.mass_per_length"])
@@ -249,7 +249,7 @@ def test_the_dataset_of_a_replay_holds_signals_scores_and_the_fit(tmp_path: Path
 
 
 def test_noise_of_the_drive_is_in_the_standard_errors(tmp_path: Path) -> None:
-    # what it excites rings on for hundreds of samples: without it the errors were 16 times too small
+    # the response to noise rings on for hundreds of samples: without it the errors were 16 times too small
     reading = simulated({"body.frequency": 823.0}, tmp_path)
     random = np.random.default_rng(9)
     path = written(
@@ -278,7 +278,7 @@ def _linear(replayer: Replayer, fit: ReplayFit) -> tuple[list[Floats], list[None
 
 
 def test_few_samples_with_all_the_weight_have_honest_errors() -> None:
-    # the mean of 20 of 2,000 white samples: its standard error is 1/sqrt(20), and that of Newey and West about 0
+    # the mean of 20 of 2,000 white samples: its standard error is 1/sqrt(20), and the Newey-West error about 0
     weight = np.zeros((2000, 1))
     weight[:20] = 1.0
     found = []
@@ -316,7 +316,7 @@ def test_a_channel_that_cannot_drive_is_told_with_its_file(tmp_path: Path) -> No
 
 
 def test_a_problem_with_its_file_is_a_new_error(tmp_path: Path) -> None:
-    # raised from itself it would be its own cause, and a worker of a campaign would never get it packed
+    # raised from itself it would be its own cause, and a worker of a campaign could never pickle it
     path = tmp_path / "absent.nc"
     with pytest.raises(DatasetError) as raised, opened_replays(scene(), [path]):
         pass
@@ -326,7 +326,7 @@ def test_a_problem_with_its_file_is_a_new_error(tmp_path: Path) -> None:
 
 
 def test_a_number_that_changes_nothing_is_refused(tmp_path: Path) -> None:
-    # with its frequency given, the length of a board on a moving base is nothing that an accelerometer sees
+    # at a given frequency, an accelerometer cannot see the length of a board on a moving base
     path = recorded(tmp_path)
     with (
         opened_replays(scene(), [path]) as replayers,

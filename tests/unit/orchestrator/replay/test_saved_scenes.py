@@ -1,4 +1,4 @@
-"""Scenes that a fit saves: they run by themselves, and nothing is overwritten by accident."""
+"""Scenes that a fit saves: they run by themselves, and no file is overwritten by accident."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vibroimpact.orchestrator.scene import load_scene, parse_scene
 
 TIME = 2e-5 * np.arange(900)
 FIT = "sensor.gain,sensor.offset"
-#: The gain as in the scene, with a comment of the user, and recordings that the scene names.
+#: The gain as in the scene, with a comment of the user, and the recordings of the scene.
 SCENE = BOARD.replace("gain = 0.9", "gain = 0.9  # by the maker") + 'recordings = ["one.nc"]\n'
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A scene in a folder of its own, and a recording of a board whose sensor reads 1.3 times as much, and 5 more."""
+    """A scene in a folder of its own, and a recording of a board whose sensor reads 1.3 times as much, plus 5."""
     home = tmp_path / "home"
     home.mkdir()
     (home / "board.toml").write_text(SCENE)

@@ -1,4 +1,4 @@
-"""The verdict on a replay as the command prints it: at the head, with and without a fit, and not more than is true."""
+"""The verdict on a replay as the command prints it: at the head, with and without a fit, never too strong."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def board(tmp_path: Path) -> Path:
 def replayed(
     scene: str, recording: Path, capsys: pytest.CaptureFixture[str], *more: str
 ) -> tuple[str, xr.Dataset]:
-    """Replay a scene; return what was printed, and the dataset."""
+    """Replay a scene; return the printed text and the dataset."""
     path, output = recording.with_name("scene.toml"), recording.with_name("out.nc")
     path.write_text(scene)
     with pytest.raises(SystemExit) as left:

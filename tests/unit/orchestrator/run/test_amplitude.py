@@ -1,4 +1,4 @@
-"""Frequency and damping that depend on the amplitude, against the differential equation they stand for."""
+"""Frequency and damping that depend on the amplitude, against their differential equation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def decay(text: str, step: float) -> np.ndarray:
 
 
 def test_short_steps_tend_to_the_motion_whose_numbers_change_all_the_time() -> None:
-    # reference: the same law in solve_ivp, to 1e-9; the step holds the numbers, an error of first order
+    # reference: the same law in solve_ivp, to 1e-9; a step holds the numbers constant, an error of first order
     def motion(_: float, y: np.ndarray) -> list[float]:
         amplitude = np.hypot(y[0], y[1] / NATURAL)
         ratio = 0.002 + 0.004 * amplitude + 0.001 / amplitude
@@ -48,7 +48,7 @@ def test_short_steps_tend_to_the_motion_whose_numbers_change_all_the_time() -> N
 
 
 def test_the_equivalent_mode_is_dry_and_quadratic_damping() -> None:
-    # reference: solve_ivp with friction mu sign(v) and b |v| v; averaging gives their shares of the damping ratio
+    # reference: solve_ivp with friction mu sign(v) and b |v| v; averaging gives the damping ratio of each
     friction, quadratic = 0.001 * np.pi * NATURAL**2 / 2.0, 3.0 * np.pi * 0.004 / 4.0
 
     def motion(_: float, y: np.ndarray) -> list[float]:

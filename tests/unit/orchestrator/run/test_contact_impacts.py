@@ -1,4 +1,4 @@
-"""Impacts of `[[contact]]` are recorded in the order in which they began, with what each amounted to."""
+"""Impacts of `[[contact]]` are recorded in the order of their starts, each with its results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FASTER, SLOWER = "faster", "slower"
 def flying(
     contact: dict[str, Any], speed: float = 2.0, masses: tuple[float, float] = (1.0, 3.0)
 ) -> dict[str, Any]:
-    """Return a scene of two free bodies: one catches up with the other after half a second."""
+    """Return a scene of two free bodies: the first hits the second from behind after half a second."""
     body = {"fmu": "Oscillator"}
     return {
         "scene": {"title": "Two bodies"},
@@ -153,7 +153,7 @@ def test_free_bodies_have_no_class() -> None:
 
 
 def driven(**changes: Any) -> dict[str, Any]:
-    """Return a driven body that hits a heavy one, which stands still."""
+    """Return a scene of a driven body that hits a heavy body at rest."""
     own = {
         "mass": 1.0,
         "stiffness": 1.0,

@@ -1,4 +1,4 @@
-"""Which events a recording has: contacts that are open at its end, rests from before it, what happens at time 0."""
+"""Events at the edges of a recording: contacts open at its end, rests from before it, events at time 0."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ stiffness = 400.0
 [record]
 recorded_periods = 6
 """
-"""A touch-down at 44.346592 s with 1.037083 m/s, .005 s before the end: found by an independent code."""
+"""A touch-down at 44.346592 s with 1.037083 m/s, 0.005 s before the end, computed by an independent code."""
 RESTS = """[body]
 mass = 1.0
 stiffness = {stiffness}
@@ -104,7 +104,7 @@ def test_what_happens_where_the_motion_begins_belongs_to_its_recording(law: str,
 
 
 def test_a_contact_that_begins_at_rest_is_open_before_its_impulse_outgrows_rounding() -> None:
-    # pressed from the surface on by a constant force: after .5 ms the impulse is 1e-18 of what it will be
+    # pressed by a constant force from the surface on: after 0.5 ms the impulse is 1e-18 of its final value
     text = (
         "[body]\nmass = 1.0\nstiffness = 0.0\ndamping = 0.3\ndisplacement_start = 0.3\n"
         "[forcing]\namplitude = 0.3\nangular_frequency = 0.0\n"
@@ -124,7 +124,7 @@ def test_a_contact_that_begins_at_rest_is_open_before_its_impulse_outgrows_round
 
 @pytest.mark.parametrize("how", ["fused", "coupled"])
 def test_a_body_that_turns_inside_its_stop_begins_another_contact(how: str) -> None:
-    # the dashpot would pull on the way out: the force ends inside the stop, and comes back before the body is out
+    # the dashpot would pull on the way out: the force ends inside the stop, and returns before the body is out
     text = (
         '[body]\nkind = "beam"\nlength = 1.0\nmass_per_length = 1.0\nflexural_rigidity = 1.0\nmodes = 5\n'
         "velocity_start = [1.0]\n[forcing]\namplitude = 3.0\nphase = 1.0\nangular_frequency = 0.0\n"
@@ -162,7 +162,7 @@ def test_a_rest_that_lasts_since_before_the_recording_is_no_event_of_it() -> Non
     later = run_of(text.replace("[record]", "[record]\ntransient_time = 1.0"))
     assert later.sticks is not None
     assert len(later.sticks) == 0
-    assert later.outcome is Outcome.stuck  # it rests all the same
+    assert later.outcome is Outcome.stuck  # the body rests, too
 
 
 @pytest.mark.parametrize(("stiffness", "position"), [(0.0, 0.3), (0.0, 0.0), (1.0, 0.0)])

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.scene.keys import dataset_name
 
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_default_run_takes_as_long_as_the_scene_records(tmp_path: Path, fmi: str) -> None:
-    # that it is the scene's own run is tested with other tools, in tests/exchange
+    # tests/exchange compares the run itself with the scene's run, in other tools
     scene = load_scene(EXAMPLES / "single_run.toml")
     path = export_scene(scene, tmp_path / "rig.fmu", fmi=fmi)
     assert check_fmu(path) == ()
@@ -75,9 +75,7 @@ def test_an_export_on_a_shaken_base_has_the_absolute_acceleration_of_its_dataset
     step, last = 1.0 / 128.0, len(ours) - 1
     found = simulate_fmu(str(path), output=names, step_size=step, output_interval=step, stop_time=last * step)
     theirs = np.column_stack([found[name] for name in names])
-    if (
-        kind != "beam"
-    ):  # springs at rest give no force: no mass is accelerated; a few modes of a beam cannot say so
+    if kind != "beam":  # springs at rest accelerate no mass; a few modes of a beam cannot show that
         assert theirs[0] == pytest.approx(np.zeros(len(names)), abs=1e-10)
     assert np.abs(ours).max() > 5.0
     assert theirs == pytest.approx(ours, abs=1e-9 * np.abs(ours).max())

@@ -1,4 +1,4 @@
-"""Contacts that are shorter than the samples of their force: the run says so, and where their largest forces are."""
+"""Contacts with too few samples of their force: a message names the variable with the largest forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which scenes run many points at once."""
+"""Scenes whose points run many at once in lanes, and scenes whose points do not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One table says what lanes, orbits and ways of the studies cannot take: each of its rows is seen in some scene."""
+"""The table of limits of lanes, orbits and ways: each of its rows occurs in some scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs whose scenes have a measuring chain: what is sampled, when, and that nothing else changes."""
+"""Runs of scenes with a measuring chain: samples and their times are right, and nothing else changes."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def column(record: RunRecord, name: str, names: tuple[str, ...] = CHANNELS) -> n
     return record.samples[:, 1 + names.index(name)]
 
 
-# ---- what is sampled ----
+# ---- samples ----
 
 
 def test_without_a_distance_the_motion_is_that_of_the_force() -> None:
@@ -81,7 +81,7 @@ def test_without_a_distance_the_motion_is_that_of_the_force() -> None:
 
 
 def test_a_constant_force_shifts_the_motion_and_nothing_else() -> None:
-    # 0.3 N on 1000 N/m: the motion is that with the stop and the start 0.3 mm lower, seen from 0.3 mm above
+    # 0.3 N on 1000 N/m shift the equilibrium by 0.3 mm: with stop and start 0.3 mm lower, the motion is the same
     shifted = BODY.replace("position = 0.01", "position = 0.0097").replace(
         "damping = 0.5", "damping = 0.5\ndisplacement_start = -0.0003"
     )
@@ -288,10 +288,10 @@ def test_spikes_of_a_simulated_cell_are_forces_by_the_sensitivity_of_its_scene(t
     run_scene(scene(SENSOR, CELL, DAQ, swept, variables=("load_cell",)), tmp_path / "run.nc")
     for run, sensitivity in enumerate((0.004, 0.008)):
         cell = open_signals(tmp_path / "run.nc", run).channels["load_cell"]
-        found, asked = spike_report(cell), spike_report(cell, mechanics=Mechanics(sensitivity=sensitivity))
+        found, given = spike_report(cell), spike_report(cell, mechanics=Mechanics(sensitivity=sensitivity))
         assert found.dataset.spike_peak.attrs["units"] == "N"
         assert found.dataset.sizes["spike"] > 0
-        assert found.dataset.identical(asked.dataset)
+        assert found.dataset.identical(given.dataset)
 
 
 def test_swept_ranges_flag_each_run_by_its_own(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def test_swept_ranges_flag_each_run_by_its_own(tmp_path: Path) -> None:
     assert not wide.quality.any()
 
 
-# ---- what is absent ----
+# ---- absent parts ----
 
 
 def test_an_absent_table_loads_nothing_and_changes_no_bit() -> None:
@@ -345,7 +345,7 @@ def test_a_scene_without_a_chain_loads_none_of_it() -> None:
 
 
 def test_a_deadline_is_heard_within_a_block_of_slow_samples() -> None:
-    # a beam that is pressed on an elastic stop: each sample takes milliseconds, none of them ends early
+    # a beam pressed on an elastic stop: each sample takes milliseconds, and no step ends early
     text = """\
 [body]
 kind = "beam"

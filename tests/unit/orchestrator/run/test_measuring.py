@@ -1,4 +1,4 @@
-"""A measuring chain gives voltages of the motion that its scene has, however its samples are cut into blocks."""
+"""A measuring chain gives the voltages of its scene's motion, for any cut of the samples into blocks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def drive(samples: int) -> Floats:
 def measured(
     given: Scene, cuts: list[int], channels: tuple[str, ...] = CHANNELS
 ) -> tuple[dict[str, Floats], Floats]:
-    """Return channels and impacts of a session that is advanced from cut to cut."""
+    """Return channels and impacts of a session that advances from cut to cut."""
     volts, times = drive(cuts[-1]), np.arange(cuts[-1] + 1) / RATE
     blocks, impacts = [], []
     with MeasuredSession(given, channels) as session:
@@ -109,7 +109,7 @@ def test_a_body_that_rests_on_its_stop_presses_the_load_cell() -> None:
 
 
 def test_the_ring_of_a_cell_behind_a_stop_that_yields_is_that_of_finer_samples() -> None:
-    # the reference: the same cell under a force that is known 200 times as often
+    # reference: the same cell under a force with 200 times as many samples
     cell = CELL.replace("contact_duration = 2e-3\n", "")
     given = scene(YIELDING, EXCITER, cell)
     found, _ = measured(given, [0, 600], ("load_cell",))
@@ -156,7 +156,7 @@ def test_the_distance_of_a_beam_is_where_the_force_acts() -> None:
     with MeasuredSession(given, ["sensor.displacement"]) as session:
         session.begin()
         found = session.advance(np.arange(401) / RATE, drive(400))["sensor.displacement"]
-    # reference: a beam that is observed where it is forced, and the same force given sample by sample
+    # reference: a beam observed at the place of its force, with the same force given sample by sample
     with (
         Session(given.with_values({"sensor.location": 0.4}), ["displacement"]) as session,
         Session(given, ["displacement"]) as tip,
@@ -180,7 +180,7 @@ def test_a_body_that_touches_its_exciter_is_one_clear_error() -> None:
 
 
 def test_chatter_in_a_block_is_counted_to_the_last_impact() -> None:
-    # restitution .999 under a constant push: thousands of impacts in one sample
+    # restitution 0.999 under a constant force: thousands of impacts in one sample
     chatter = scene(
         "[[stop]]\nposition = 0\nrestitution = 0.999\n", "[exciter]\ngain = 1\noffset = 400\n", CELL
     )
@@ -203,7 +203,6 @@ def test_a_long_session_keeps_no_rows() -> None:
         for block in range(20):
             session.advance((np.arange(501) + 500 * block) / RATE, drive(500))
         assert session._driver.rows.blocks == []
-    # so much for the rows; nothing else grows
 
 
 @pytest.mark.parametrize(

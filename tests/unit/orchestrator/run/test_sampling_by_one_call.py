@@ -1,4 +1,4 @@
-"""The samples of a fused run are taken by one call of C: they are those of one step after the other, to the bit."""
+"""One call of C takes the samples of a fused run, bit for bit as one step after the other."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ HERTZ = {"position": 0.4, "law": "hertz", "stiffness": 400.0}
 def scene_of(
     body: str, rate: float, *stops: dict[str, object], periods: int = 15, **execution: object
 ) -> Scene:
-    """Return a scene of a body that samples all that can be sampled of it."""
+    """Return a scene of a body that samples all its variables."""
     numbers, where, amplitude = BODIES[body]
     tables: dict[str, object] = {
         "scene": {"units": "nondimensional"},

@@ -1,4 +1,4 @@
-"""A session steps a scene: what goes in comes out as the exact motion."""
+"""A session steps a scene: its outputs are the exact motion under its inputs."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def square_wave(samples: int) -> Floats:
 
 @pytest.mark.parametrize("scene", [STOPPED, FREE + YIELDING], ids=["rigid", "yielding"])
 def test_a_block_of_samples_is_bit_for_bit_what_single_steps_give(scene: str) -> None:
-    # steps of a power of 2: times are sums of them without rounding
+    # steps of a power of 2 add up without rounding
     step, forces = 2.0**-10, square_wave(3000)
     times = step * np.arange(len(forces) + 1)
     names = ["displacement", "velocity", "contact_force[1]"]
@@ -86,7 +86,7 @@ def test_a_block_of_samples_is_bit_for_bit_what_single_steps_give(scene: str) ->
         rows = np.concatenate(
             [session.hold(times[i : i + 1001], forces[i : i + 1000]) for i in range(0, 3000, 1000)]
         )
-        assert len(session.impacts()) == 0  # or memory would grow for as long as a rig is served
+        assert len(session.impacts()) == 0  # impacts would fill the memory during the service of a rig
         session.begin()
         single = [list(session.advance(step, {"force": (force, 0.0)}).values()) for force in forces]
         assert len(session.impacts()) > 5

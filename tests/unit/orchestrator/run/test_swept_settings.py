@@ -1,4 +1,4 @@
-"""Sweeps over numbers of modes, tolerances and steps: each point is the scene that says so itself."""
+"""Sweeps over numbers of modes, tolerances and steps: each point equals the scene with that setting."""
 
 from __future__ import annotations
 
@@ -130,7 +130,9 @@ def test_a_replay_is_scored_at_each_number_of_modes(tmp_path: Path) -> None:
     swept = run(scene.with_sweep({"body.modes": counts}))
     scores = [run(scene.with_values({"body.modes": n})).variance_accounted_for.values for n in counts]
     np.testing.assert_array_equal(swept.variance_accounted_for.values.ravel(), np.ravel(scores))
-    assert len(set(swept.variance_accounted_for.values.ravel())) == 2  # the second has its node at the sensor
+    assert (
+        len(set(swept.variance_accounted_for.values.ravel())) == 2
+    )  # the second mode has a node at the sensor
 
 
 def test_what_components_are_made_for_is_neither_fitted_nor_changed_in_a_session() -> None:

@@ -1,4 +1,4 @@
-"""What a scene does not ask for costs and changes nothing: absent and switched off are one run, by the same FMUs."""
+"""Effects that a scene does not ask for cost and change nothing: absent or switched off, it is the same run."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ PLAIN = {"execution": {"how": "auto", "impact_limit": 10_000_000}}
 
 
 def changed(tables: Tables, more: Mapping[str, Any]) -> Tables:
-    """Return tables with more keys; those of the first stop are in `stop`."""
+    """Return tables with more keys; the keys of the first stop are in `stop`."""
     found = {name: dict(table) if isinstance(table, dict) else table for name, table in tables.items()}
     for name, keys in more.items():
         if name == "stop":
@@ -116,7 +116,7 @@ def test_absent_and_switched_off_are_one_run_by_the_same_fmus(
 
 @pytest.mark.parametrize("tables", [OSCILLATOR, BEAM, CHAIN])
 def test_what_is_recorded_changes_nothing_of_what_moves(tables: Tables) -> None:
-    # a time series cuts the run into steps, after which rounding differs: it is compared to that
+    # a time series cuts the run into steps, so rounding differs: the comparison is up to rounding
     whole, _ = ran(tables)
     bare, _ = ran(changed(tables, {"record": {"impacts": False}}))
     assert bare.impacts is None

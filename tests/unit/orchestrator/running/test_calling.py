@@ -1,4 +1,4 @@
-"""A scene as a function: its arrays are those of runs and campaigns, and what it cannot take it refuses as they do."""
+"""A scene as a function: its arrays equal those of runs and campaigns, and it refuses the same values."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ SCENES = {
 }
 
 
-def assert_arrays_are_those_of(found: dict[str, Any], wanted: xr.Dataset) -> None:
-    assert set(found) == set(map(str, wanted.data_vars)) - {*NOT_OF_THE_MOTION, *made_when_opened(wanted)}
+def assert_arrays_are_those_of(found: dict[str, Any], expected: xr.Dataset) -> None:
+    assert set(found) == set(map(str, expected.data_vars)) - {*NOT_OF_THE_MOTION, *made_when_opened(expected)}
     for name, array in found.items():
-        values, own = wanted[name].values, np.asarray(array)
+        values, own = expected[name].values, np.asarray(array)
         assert own.shape == values.shape, name
         if name == "message":
             assert own.tolist() == values.tolist()
@@ -106,9 +106,9 @@ def test_one_point_is_the_run_of_its_scene_and_many_are_a_sweep_over_them(name: 
     scene, keys, values = SCENES[name]
     with vi.runner(scene, keys) as motion:
         found, again = motion(values), motion(np.array(values))
-        wanted = vi.run(scene.with_values(dict(zip(keys, values, strict=True))), progress=False)
-        assert_arrays_are_those_of(found, wanted)
-        assert_arrays_are_those_of(again, wanted)
+        expected = vi.run(scene.with_values(dict(zip(keys, values, strict=True))), progress=False)
+        assert_arrays_are_those_of(found, expected)
+        assert_arrays_are_those_of(again, expected)
         points = np.array([values, [scene.value(key) for key in keys]])
         axes = {
             key: {"values": column, "zip": "p"} for key, column in zip(keys, points.T.tolist(), strict=True)
@@ -119,7 +119,7 @@ def test_one_point_is_the_run_of_its_scene_and_many_are_a_sweep_over_them(name: 
 
 
 def in_order_of_runs(sweep: xr.Dataset) -> xr.Dataset:
-    """Return a sweep along one dimension in the order of its runs: one key alone ascends."""
+    """Return a sweep along one dimension in the order of its runs; a file has its single key ascending."""
     return sweep.isel({sweep.run_id.dims[0]: np.argsort(sweep.run_id.values)})
 
 
@@ -156,8 +156,8 @@ def test_a_bad_value_is_refused_as_by_a_sweep_and_the_next_call_goes_on(value: f
         for given in (value, [value], [[0.5], [value]]):
             with pytest.raises(vi.VibroimpactError) as refused:
                 motion(given)
-            wanted = refusal_of_sweep(scene, RESTITUTION, value)
-            assert str(refused.value).replace("values[2]", "values[1]") == wanted
+            expected = refusal_of_sweep(scene, RESTITUTION, value)
+            assert str(refused.value).replace("values[2]", "values[1]") == expected
         assert motion(0.5)["impact_time"].tobytes() == before.tobytes()
 
 
@@ -174,8 +174,8 @@ def test_what_a_body_refuses_is_an_outcome_with_the_message_of_its_run() -> None
     scene = scene_of()
     with vi.runner(scene, FREQUENCY) as motion:
         found = motion(1e-308)
-        wanted = vi.run(scene.with_values({FREQUENCY: 1e-308}), progress=False)
-        assert (found["outcome"], found["message"]) == (3, str(wanted.message.values))
+        expected = vi.run(scene.with_values({FREQUENCY: 1e-308}), progress=False)
+        assert (found["outcome"], found["message"]) == (3, str(expected.message.values))
         assert "expected a period" in found["message"]
         assert motion(0.9)["outcome"] == 0
 
@@ -247,18 +247,18 @@ def test_it_pickles_into_another_process() -> None:
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_fork_opens_its_own() -> None:
     with vi.runner(scene_of(), FREQUENCY) as motion:
-        wanted = motion(1.1)["impact_time"].tobytes()
+        expected = motion(1.1)["impact_time"].tobytes()
         pid = os.fork()
         if pid == 0:
-            os._exit(0 if motion(1.1)["impact_time"].tobytes() == wanted else 1)
+            os._exit(0 if motion(1.1)["impact_time"].tobytes() == expected else 1)
         assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
-        assert motion(1.1)["impact_time"].tobytes() == wanted
+        assert motion(1.1)["impact_time"].tobytes() == expected
 
 
 def test_a_second_thread_in_a_call_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     # a scene with samples runs alone
     scene = scene_of(record={**TABLES["record"], "time_series": SERIES})
-    inside, over, told = threading.Event(), threading.Event(), []
+    inside, over, results = threading.Event(), threading.Event(), []
     run = PointRunner.run
 
     def waiting(runner: PointRunner, *arguments: Any) -> Any:
@@ -268,14 +268,14 @@ def test_a_second_thread_in_a_call_is_refused(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(PointRunner, "run", waiting)
     with vi.runner(scene, FREQUENCY) as motion:
-        thread = threading.Thread(target=lambda: told.append(motion(0.9)))
+        thread = threading.Thread(target=lambda: results.append(motion(0.9)))
         thread.start()
         assert inside.wait(30.0)
         with pytest.raises(vi.VibroimpactError, match="Make one for each thread"):
             motion(0.9)
         over.set()
         thread.join()
-    assert told[0]["outcome"] == 0
+    assert results[0]["outcome"] == 0
 
 
 def test_a_closed_one_is_refused() -> None:
@@ -293,9 +293,9 @@ def test_ctrl_c_in_a_call_leaves_one_that_goes_on(monkeypatch: pytest.MonkeyPatc
         raise KeyboardInterrupt
 
     with vi.runner(scene_of(), FREQUENCY) as motion:
-        wanted = motion(1.1)["impact_time"].tobytes()
+        expected = motion(1.1)["impact_time"].tobytes()
         with monkeypatch.context() as patch:
             patch.setattr(LoopArrays, "call", interrupted)
             with pytest.raises(KeyboardInterrupt):
                 motion(0.9)
-        assert motion(1.1)["impact_time"].tobytes() == wanted
+        assert motion(1.1)["impact_time"].tobytes() == expected

@@ -1,4 +1,4 @@
-"""Scenes that stay open: who runs one again finds it open, and what it was before makes no difference."""
+"""Scenes that stay open: a second run finds the scene open, and earlier runs make no difference."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TEXT = frequency_text(2).partition("[sweep]")[0]
 
 @pytest.fixture(autouse=True)
 def none_kept() -> Iterator[None]:
-    """Begin and end without an open scene."""
+    """Begin and end each test without an open scene."""
     kept._kept.close()
     yield
     kept._kept.close()
@@ -31,7 +31,7 @@ def none_kept() -> Iterator[None]:
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
-    """Return the runners that are opened, as they come."""
+    """Return the list of opened runners, in the order of opening."""
     runners: list[PointRunner] = []
     make = PointRunner.__init__
 
@@ -45,7 +45,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
 
 @pytest.fixture
 def closed(monkeypatch: pytest.MonkeyPatch) -> list[PointRunner]:
-    """Return the runners that are closed, as they go."""
+    """Return the list of closed runners, in the order of closing."""
     runners: list[PointRunner] = []
     close = PointRunner.close
 
@@ -101,12 +101,12 @@ def test_a_scene_in_use_is_not_given_to_another_thread(opened: list[PointRunner]
 
 def test_threads_that_run_one_scene_get_its_results() -> None:
     scene = scene_of(frequency_text(20))
-    wanted = vi.run(scene, progress=False).final_displacement.values.tolist()
+    expected = vi.run(scene, progress=False).final_displacement.values.tolist()
     with ThreadPoolExecutor(4) as threads:
         found = threads.map(
             lambda _: vi.run(scene, progress=False).final_displacement.values.tolist(), range(8)
         )
-    assert all(one == wanted for one in found)
+    assert all(one == expected for one in found)
 
 
 def test_a_run_that_fails_or_is_interrupted_leaves_nothing_open(

@@ -1,4 +1,4 @@
-"""A run in memory is what its file gives: names, order, types, attributes and bits."""
+"""A run in memory equals its file: names, order, types, attributes and bits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.files import atomic
 
 FOREIGN = ("bouncing_ball.toml", "user_contact_law.toml")
-"""Examples whose FMUs are made first."""
+"""Examples whose FMUs must be built first."""
 MANY = "tolerances.toml"
 """An example of 1,536 points."""
 NAMES = sorted(path.name for path in EXAMPLES.glob("*.toml") if path.name not in (*FOREIGN, MANY))

@@ -1,4 +1,4 @@
-"""Scenes run whole in this process: their rows are those of a campaign, with or without a file."""
+"""Scenes run whole in this process: their rows equal those of a campaign, with or without a file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.running import open_scene, run_scene
 
 
 class Counted(Progress):
-    """Keeps how many points were done at a time."""
+    """Keeps the number of points done at a time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,15 +42,15 @@ def test_a_scene_is_opened_as_it_says_in_this_process_or_in_one_of_its_own() -> 
 
 @pytest.mark.parametrize("path", ["independent", "up-down"])
 def test_progress_is_told_of_every_point_of_a_sweep(tmp_path: Path, path: str) -> None:
-    told, scene = Counted(), scene_of(frequency_text(5, path))
-    found = run_scene(scene, tmp_path / "run.nc", progress=told)
-    assert told.totals == [scene.runs]
-    assert sum(told.steps) == scene.runs == found.sizes["run"]
+    progress, scene = Counted(), scene_of(frequency_text(5, path))
+    found = run_scene(scene, tmp_path / "run.nc", progress=progress)
+    assert progress.totals == [scene.runs]
+    assert sum(progress.steps) == scene.runs == found.sizes["run"]
     assert read_flat(tmp_path / "run.nc").run_index.values.tolist() == list(range(scene.runs))
 
 
 def test_progress_is_not_told_of_a_single_run(tmp_path: Path) -> None:
-    told = Counted()
-    run_scene(scene_of(frequency_text(2).partition("[sweep]")[0]), tmp_path / "run.nc", progress=told)
-    assert not told.totals
-    assert not told.steps
+    progress = Counted()
+    run_scene(scene_of(frequency_text(2).partition("[sweep]")[0]), tmp_path / "run.nc", progress=progress)
+    assert not progress.totals
+    assert not progress.steps

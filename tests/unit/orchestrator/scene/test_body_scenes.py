@@ -1,4 +1,4 @@
-"""Scenes of chains, beams and stops that yield: what is read, what is said of mistakes, what their FMUs are told."""
+"""Scenes of chains, beams and compliant stops: reading, messages on mistakes, parameters of their FMUs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.run.points import independent_points
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.models import KelvinVoigtStop
 
-# What is read.
+# Reading.
 
 
 def test_a_number_in_place_of_an_array_of_a_chain_is_the_same_for_all_elements() -> None:
@@ -82,12 +82,12 @@ def test_each_law_tells_the_fmu_its_number_and_its_own_parameters(
 ) -> None:
     scene = scene_of(changed(CHAIN, "restitution = 0.7", law))
     assert integer_parameters(scene)["contact[1].law"] == number
-    told = {
+    given = {
         name.removeprefix("contact[1]."): value
         for name, value in float_parameters(scene, None).items()
         if name.startswith("contact[1].")
     }
-    assert told == {"position": 0.1, **floats}
+    assert given == {"position": 0.1, **floats}
 
 
 def test_two_stops_of_one_side_share_a_place_if_the_nearer_one_yields() -> None:
@@ -113,7 +113,7 @@ def test_a_body_may_start_pressed_into_a_stop_that_yields() -> None:
     assert isinstance(scene_of(text).stops[0], KelvinVoigtStop)
 
 
-# What is said of mistakes.
+# Messages on mistakes.
 
 
 def test_a_stop_of_a_beam_held_at_both_ends_needs_a_location() -> None:
@@ -196,7 +196,7 @@ def test_an_element_that_is_not_there_is_misuse() -> None:
         scene_of(CHAIN).at({"body.masses[4]": 1.0})
 
 
-# The state that a continuation carries.
+# The carried state of a continuation.
 
 
 def test_the_state_of_a_structure_is_all_its_displacements_then_all_its_velocities() -> None:
@@ -226,7 +226,7 @@ def test_a_stop_that_moved_into_a_chain_moves_its_mass_alone() -> None:
 
 
 def test_a_stop_that_moved_into_a_beam_pushes_it_along_the_mobility_of_the_contact() -> None:
-    # reference: the modes' own shapes; the change of every mode is in proportion to its shape at the stop
+    # reference: the shapes of the modes; the change of each mode is proportional to its shape at the stop
     scene = scene_of(BEAM)
     assert isinstance(scene.body, BeamBody)
     state = (0.01, 0.002, -0.001, 0.3, -0.2, 0.1)
@@ -255,7 +255,7 @@ def test_a_part_keeps_the_carried_state_bit_for_bit(state: tuple[float, ...]) ->
     assert carried_state({}) is None
 
 
-# What a dataset says of it.
+# Datasets.
 
 
 def test_swept_parameters_of_stops_and_loads_have_the_units_of_their_law() -> None:

@@ -1,4 +1,4 @@
-"""`--set KEY=VALUE` changes a scene before it is checked; what was run is the text of the changed scene."""
+"""`--set KEY=VALUE` changes a scene before its checks; the dataset has the text of the changed scene."""
 
 from __future__ import annotations
 

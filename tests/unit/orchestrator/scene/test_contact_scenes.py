@@ -1,4 +1,4 @@
-"""Contacts of general scenes: read, swept, run and reported; mistakes in them; stops that are connected plainly."""
+"""Contacts of general scenes: read, swept, run and reported; mistakes in them; stops with plain connections."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ gain = -1
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return a folder with a mass, with states that can be kept and without."""
+    """Return a folder with the FMU of a mass, in one version with states that can be kept and in one without."""
     for states in (True, False):
         fmu_factory.mass(tmp_path, states=states)
     return tmp_path
@@ -72,7 +72,7 @@ def problems_of(folder: Path, text: str) -> list[str]:
     return [problem.removeprefix(f"{folder / 's.toml'}: ") for problem in caught.value.problems]
 
 
-# ---- what is read ----
+# ---- reading ----
 
 
 def test_a_contact_is_what_the_importer_is_asked(folder: Path) -> None:
@@ -189,12 +189,14 @@ def test_a_stop_that_cannot_be_asked_or_says_no_side_is_refused(folder: Path) ->
         'parameters = { law = "kelvin_voigt", stiffness = 1e4, position = 0.1 }\n', ""
     )
     text = text.replace('stop = "stop"', 'stop = "stop"\nstop_displacement = "u"\nstop_force = "y"')
-    told = problems_of(folder, text)
-    assert told[0].startswith("contact[1].stop: expected an FMU whose state can be kept and restored, got")
-    assert told[1].startswith('contact[1].side: expected "upper" or "lower", got nothing.')
+    problems = problems_of(folder, text)
+    assert problems[0].startswith(
+        "contact[1].stop: expected an FMU whose state can be kept and restored, got"
+    )
+    assert problems[1].startswith('contact[1].side: expected "upper" or "lower", got nothing.')
 
 
-# ---- what is run ----
+# ---- running ----
 
 
 def test_a_run_has_the_residual_of_its_contacts_and_check_reports_them(folder: Path) -> None:
@@ -220,7 +222,7 @@ def test_a_stop_that_is_connected_plainly_says_what_it_adds(folder: Path, states
     runner.close()
     assert record.samples is not None
     gained = 0.5 * (record.samples[-1, 2] ** 2 - 1.0)
-    assert 0.05 < gained < 0.2  # of .5 J, at 31 steps
+    assert 0.05 < gained < 0.2  # of 0.5 J, with 31 steps
     assert record.energy_residual == pytest.approx([gained], rel=1e-9)
     assert record.message.startswith(
         "stop.applied_force -> mass.f: the force of a stop by a plain connection has added 0."

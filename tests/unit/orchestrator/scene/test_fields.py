@@ -1,4 +1,4 @@
-"""A field of a scene says everything about itself once: what is read off it agrees with the FMUs and the reference."""
+"""A field of a scene is defined once: all uses of it agree with the FMUs and the reference page."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_the_reference_has_a_table_for_every_model() -> None:
         "TimeSeries",
         "Compared",
         "AdaptiveTable",
-    }  # told in the rows of the table that holds them
+    }  # described in the rows of the tables that have them
     assert (
         set(re.findall(r"<!-- keys of (\w+) -->", "".join(pages)))
         == {model.__name__ for model in MODELS} - within

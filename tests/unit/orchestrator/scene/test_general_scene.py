@@ -1,4 +1,4 @@
-"""General scenes: components of any FMU file, connections, watched events, and what is said of wrong ones."""
+"""General scenes: components of any FMU file, connections, watched events, and messages on mistakes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ recorded_time = 3.0
 def write_fmu(
     path: Path, *, interface: str = "CoSimulation", restorable: bool = True, variables: str = BALL
 ) -> Path:
-    """Write an FMU that has a description only: enough for everything that is said before a run."""
+    """Write an FMU with only a description, which is enough for all messages before a run."""
     outputs = "".join(f'<Output valueReference="{r}"/>' for r in (1, 2, 9))
     steps = ' canHandleVariableCommunicationStepSize="true"' if interface == "CoSimulation" else ""
     description = (
@@ -82,7 +82,7 @@ def write_fmu(
 
 @pytest.fixture
 def ball(tmp_path: Path) -> Callable[[str], Scene]:
-    """Return a reader of scenes in a folder with ball.fmu."""
+    """Return a function that reads scenes in a folder with ball.fmu."""
     write_fmu(tmp_path / "ball.fmu")
     return lambda text: parse_scene(text, str(tmp_path / "s.toml"))
 
@@ -97,7 +97,7 @@ def ball_problems(folder: Path, *lines: str) -> list[str]:
     return problems_of("\n".join([FREE_BALL, *lines]), folder / "s.toml")
 
 
-# What is read.
+# Reading.
 
 
 def test_a_general_scene_is_what_the_importer_is_asked() -> None:
@@ -291,7 +291,7 @@ def test_a_scene_is_the_same_in_another_folder(tmp_path: Path) -> None:
     assert (flat["general.components[1].fmu"], flat["general.connections[1].gain"]) == ("Oscillator.fmu", 0.5)
 
 
-# What is said about a single mistake.
+# Messages on single mistakes.
 
 
 def test_two_connections_cannot_feed_one_input_under_any_of_its_names(tmp_path: Path) -> None:
@@ -377,7 +377,7 @@ def test_an_event_needs_an_fmu_whose_state_can_be_restored(tmp_path: Path) -> No
     assert problem.startswith(f"event[1].watch: expected {expected}, got ball.fmu")
 
 
-# What is said about FMU files.
+# Messages on FMU files.
 
 
 def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
@@ -391,7 +391,7 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     tables.append('[component.c7]\nfmu = "ball.fmu"\nfmi = "3.0"')
     tables.append('[[connection]]\nfrom = "c0.x"\nto = "c1.y"')
     problems = problems_of("\n".join([*tables, "[record]\nrecorded_time = 1"]), tmp_path / "s.toml")
-    told = [
+    starts = [
         f"component.c0.fmu: expected an FMU file, got no file {tmp_path}/bal.fmu. Did you mean ball.fmu?",
         f"component.c1.fmu: expected an FMU file, got no file {tmp_path}/no/x.fmu. "
         f"There is no folder {tmp_path}/no.",
@@ -405,8 +405,8 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         'got fmi = "3.0" beside a file. ',
         "execution.macro_step: ",
     ]
-    assert len(problems) == len(told)
-    for problem, start in zip(problems, told, strict=True):
+    assert len(problems) == len(starts)
+    for problem, start in zip(problems, starts, strict=True):
         assert problem.startswith(start)
         assert "\n" not in problem
 
@@ -441,7 +441,7 @@ def test_a_component_has_a_plain_name(name: str) -> None:
     assert f'expected a name of letters, digits and _, got "{name}".' in problem
 
 
-# What is said about tables.
+# Messages on tables.
 
 
 def test_a_scene_has_one_form() -> None:
@@ -530,7 +530,7 @@ def test_the_mixed_example_joins_two_versions_of_fmi() -> None:
 
 
 def test_a_nondimensional_scene_connects_plain_numbers() -> None:
-    # a displacement feeds a force: both are numbers without a unit, whatever the descriptions of the FMUs say
+    # a displacement feeds a force: both are numbers without a unit, despite the units in the FMU descriptions
     text = COUPLED.replace('gain_unit = "N/m"\n', "")
     with pytest.raises(SceneError, match="the same unit at both ends, got m"):
         parse_scene(text, "c.toml")

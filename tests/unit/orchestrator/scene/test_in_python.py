@@ -1,4 +1,4 @@
-"""Scenes made and changed in Python: checked as files are, refused in the words of files."""
+"""Scenes made and changed in Python: checked like files, refused in the words of files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_values_are_checked_and_written_into_the_text():
     )
     heavy = scene.with_values({"body.mass": np.float64(4.0), "body.damping": 0.2, "record.recorded_time": 7})
     assert (heavy.body.mass, heavy.body.damping, heavy.value("body.stiffness")) == (4.0, 0.2, 4.0)
-    # what other processes read is the text: it says the same
+    # other processes read the text, which gives the same scene
     assert parse_scene(heavy.to_toml(), "s") == heavy
     assert scene.body.mass == 1.0
     assert problem_of(lambda: scene.with_values({"body.mass": -1.0})).startswith(

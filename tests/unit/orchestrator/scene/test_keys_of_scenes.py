@@ -1,4 +1,4 @@
-"""Keys of scenes have the types, units, defaults, limits and words that they had: `keys.txt` has them."""
+"""Keys of scenes keep their types, units, defaults, limits and words: `keys.txt` has them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of a measuring chain: what each accepts, what they need of each other, and that their numbers can be swept."""
+"""Tables of a measuring chain: accepted values, dependencies between tables, and sweeps of their numbers."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_a_scene_of_components_has_components_for_it(table: str) -> None:
 
 
 def test_a_scene_without_these_tables_is_the_same_as_before_there_were_any() -> None:
-    # campaigns from before go on: their scenes have the keys that they had
+    # earlier campaigns go on: their scenes keep the same keys
     from vibroimpact.orchestrator.campaign.manifest import flat_scene
 
     keys = flat_scene(scene(BODY, RECORD, "[sensor]\n"))

@@ -1,4 +1,4 @@
-"""Of one mistake in a scene one clear line is said, whatever the scene is of."""
+"""One mistake in a scene of any kind gives one clear line."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MISTAKES = {FORCED: OF_AN_OSCILLATOR, CHAIN: OF_A_CHAIN, BEAM: OF_A_BEAM, COUPLE
 )
 def test_one_mistake_is_one_clear_line(scene: str, old: str, new: str, problem: str) -> None:
     assert old in scene
-    told = problem_of(scene.replace(old, new))
+    line = problem_of(scene.replace(old, new))
     if problem.endswith("..."):
-        assert told.startswith(problem.removesuffix("..."))
+        assert line.startswith(problem.removesuffix("..."))
     else:
-        assert told == problem
+        assert line == problem
 
 
 WRONG_SWEEPS = [

@@ -1,4 +1,4 @@
-"""`[[contact]]` between two bodies: which ports they take, what a sweep may vary, and what is refused."""
+"""`[[contact]]` between two bodies: their ports, their sweepable numbers, and refused scenes."""
 
 from __future__ import annotations
 

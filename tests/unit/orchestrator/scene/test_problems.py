@@ -1,4 +1,4 @@
-"""What is said about a scene file that is wrong: one clear line for each mistake, all of them at once."""
+"""Messages on a wrong scene file: one clear line for each mistake, all of them at once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from support.scenes import FORCED, SOURCE, changed, problems_of, swept
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import load_scene, parse_scene
 
-# What is said about a single mistake.
+# Messages on single mistakes.
 
 
 def test_corners_of_a_sweep_are_checked_where_the_axes_alone_are_fine() -> None:
@@ -110,7 +110,7 @@ def test_all_problems_are_reported_at_once() -> None:
     )
 
 
-# What is said about a file that is not a scene at all.
+# Messages on a file that is no scene.
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_text_that_is_not_toml_is_reported_with_its_line(text: str, problem: str
 def test_a_key_of_thousands_of_parts_is_refused_with_its_line_before_it_is_parsed(
     text: str, part: str
 ) -> None:
-    # 200,000 of them: the parser would take hours and all memory
+    # with 200,000 parts the parser would take hours and all memory
     (problem,) = problems_of(FORCED + text.format(part * 200_000))
     line = FORCED.count("\n") + text.count("\n") + 1
     assert problem.startswith(

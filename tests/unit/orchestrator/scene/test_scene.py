@@ -1,4 +1,4 @@
-"""Scene files: what is read, and what is said about a file that is wrong."""
+"""Scene files: reading, and messages on a wrong file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLES = [path for path in sorted((ROOT / "examples").glob("*.toml")) if path.
 FREE = "[body]\nmass = 2\nstiffness = 8\n[record]\nrecorded_time = 5\n"
 
 
-# What is read.
+# Reading.
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

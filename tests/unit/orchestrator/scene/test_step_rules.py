@@ -1,4 +1,4 @@
-"""Components whose steps may not be cut anywhere: what would cut them is refused by the name of the attribute."""
+"""Components with restricted steps: settings that would cut their steps are refused by the FMI attribute."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_what_falls_on_the_steps_is_taken(folder: Path) -> None:
     read(folder)
     read(folder, record="recorded_time = 0.3\ntransient_time = 0.1\nrate = 1000")
     read(folder, record="recorded_time = 0.7\nrate = 10", execution="macro_step = 0.1")
-    read(folder, fmu="OneSizeStateless.fmu", record="recorded_time = 0.3\nrate = 300")  # read at steps alone
+    read(folder, fmu="OneSizeStateless.fmu", record="recorded_time = 0.3\nrate = 300")  # interpolated
     read(folder, fmu="Grid.fmu", record="recorded_time = 0.2505\nrate = 250")
 
 
@@ -130,7 +130,7 @@ def test_what_cuts_a_step_is_refused_by_the_attribute(
 
 
 def test_a_step_that_is_off_by_a_rounding_is_told_with_the_digits_that_differ(folder: Path) -> None:
-    # such as a difference of two times: 19.99 s to 20 s
+    # for example a difference of two times
     almost = "0.00099999999999997877"
     grid = refusal(folder, fmu="Grid.fmu", execution=f"macro_step = {almost}")
     only = refusal(folder, record="recorded_time = 0.3000000000001", variables="")
@@ -141,7 +141,7 @@ def test_a_step_that_is_off_by_a_rounding_is_told_with_the_digits_that_differ(fo
 
 
 def test_a_contact_of_others_beside_steps_of_one_size_is_refused_too(folder: Path) -> None:
-    # it ends the steps of all
+    # a contact ends the steps of all components
     parts = CONTACT.replace('"m"', '"other"') + '[component.other]\nfmu = "Mass.fmi2.fmu"\n'
     assert "OneSize.fmu" in refusal(folder, parts=parts)
     read(folder, fmu="Grid.fmu", parts=parts)

@@ -31,7 +31,7 @@ MASS = "body.mass"
 
 @dataclass(frozen=True)
 class Swept:
-    """The part of a scene that a sweep looks at."""
+    """The part of a scene that `expand` reads."""
 
     sweep: tuple[SweepAxis, ...] = ()
 

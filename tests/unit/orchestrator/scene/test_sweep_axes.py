@@ -1,4 +1,4 @@
-"""Axes that move together, that are drawn, and that are refined: their values and their problems."""
+"""Axes that move together, drawn axes and refined axes: their values and their problems."""
 
 from __future__ import annotations
 
@@ -264,9 +264,9 @@ def test_a_log_axis_has_its_ends_one_sign_and_one_ratio(
     start: float, stop: float, points: int, sign: float
 ) -> None:
     ends = f"start = {sign * start}, stop = {sign * stop}, points = {points}"
-    axes, told = read(f'"body.velocity_start" = {{ {ends}, spacing = "log" }}')
-    if told:
-        assert "values that differ from each other" in told[0]
+    axes, refused = read(f'"body.velocity_start" = {{ {ends}, spacing = "log" }}')
+    if refused:
+        assert "values that differ from each other" in refused[0]
         assert start == pytest.approx(stop, rel=1e-12)
         return
     (axis,) = axes
@@ -281,7 +281,7 @@ def test_a_log_axis_has_its_ends_one_sign_and_one_ratio(
     st.sampled_from(["independent", "up-down"]),
 )
 def test_the_points_of_zipped_axes_are_one_of_each_group(groups: list[list[int]], path: str) -> None:
-    """A group is a number of keys that move together; its first number is how many values they have."""
+    """The keys of a group move together, one for each number; its first number plus 1 is their number of values."""
     free = iter(
         ["body.mass", "body.stiffness", "body.damping", "body.displacement_start", "body.velocity_start"]
     )
@@ -318,9 +318,9 @@ def test_any_distribution_gives_sound_values_or_problems(
         f'"body.stiffness" = {{ distribution = "{kind}", low = {low}, high = {high}{moments} }}',
         UNIFORM % (1, 2),
     ]
-    axes, told = read(*lines)
-    if told:
-        assert all(": expected " in problem and ", got " in problem for problem in told)
+    axes, refused = read(*lines)
+    if refused:
+        assert all(": expected " in problem and ", got " in problem for problem in refused)
         return
     first, second = axes
     assert len(first.values) == len(second.values) == 2**power * (4 if design == "saltelli" else 1)

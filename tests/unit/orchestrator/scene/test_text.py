@@ -1,4 +1,4 @@
-"""Scenes with other numbers in them: what is not a number that was asked for stays as it was written."""
+"""Scenes with other numbers: the rest of the text stays as it was written."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.scene.changes import text_with_values
         # dotted keys, quoted keys
         ("body.mass = 1\nx.y = 2\n", {"body.mass": 1e-7}, "body.mass = 1e-07\nx.y = 2\n"),
         ("\"body\".'mass' = 1 # kg\n", {"body.mass": 2.5}, "\"body\".'mass' = 2.5 # kg\n"),
-        # an inline table, and one that gets a key more
+        # an inline table, and an inline table with a new key
         ("body = { mass = 1, stiffness = 4 } # b\n", {"body.mass": 2.5}, "body = { mass = 2.5, stiffness = 4 } # b\n"),
         ("sensor = {gain = 1.0}\n", {"sensor.offset": 2.5}, "sensor = {gain = 1.0,offset = 2.5}\n"),
         # arrays of tables in both notations
@@ -37,19 +37,19 @@ from vibroimpact.orchestrator.scene.changes import text_with_values
             {"body.damping_ratio[2]": 0.25},
             "[body]\ndamping_ratio = [\n  0.1, # first\n  0.25, # second\n]\n",
         ),
-        # a key at its default goes after the last one of its table, before the comment of the next
+        # a new key goes after the last key of its table, before the comment of the next table
         (
             "[sensor]\ngain = 1.0\n\n# what drives\n[replay]\n",
             {"sensor.offset": 2.5},
             "[sensor]\ngain = 1.0\noffset = 2.5\n\n# what drives\n[replay]\n",
         ),
-        # a table that comes in two places
+        # a table in two places
         (
             "[body.rayleigh]\nmass = 1\n[scene]\n[body]\nlength = 2 # m\n",
             {"body.length": 2.5},
             "[body.rayleigh]\nmass = 1\n[scene]\n[body]\nlength = 2.5 # m\n",
         ),
-        # the damping ratio would have the last word
+        # the damping ratio would override the damping
         ("[body]\ndamping_ratio = 0.1\nmass = 1\n", {"body.damping": 2.5}, "[body]\nmass = 1\ndamping = 2.5\n"),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Units of FMUs, scenes and recorded channels: by what they mean, never by how they are called."""
+"""Units of FMUs, scenes and recorded channels are compared by their meaning, never by their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Archives as SSP wants them, of scenes of every kind; what they cannot say is refused."""
+"""Archives of scenes of every kind conform to SSP; scenes that SSP cannot express are refused."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_copies_of_the_swept_set_are_a_sweep_and_one_of_them_is_a_point(system: 
     one = load_system(system, (), sets[-1:]).scene
     assert one.components[1].parameters["mass"] == 5.0
     assert one.connections[0].gain == (0.75 if springs else 0.25)
-    # what the set gives is swept no more; a gain that is no component is in no set
+    # keys in the set are swept no more; a gain that is no component is in no set
     assert [axis.key for axis in one.sweep] == ([] if springs else ["connection[1].gain"])
 
 
@@ -149,7 +149,7 @@ def test_every_component_is_self_contained_with_the_start_of_the_scene(system: P
     assert a.fmiVersion == b.fmiVersion == "2.0"
     starts = {v.name: v.start for v in a.modelVariables}
     assert (starts["masses"], float(starts["displacement_start[1]"])) == ("3", 0.5)
-    # b rests in the scene: an export of its own would be displaced, to show motion
+    # b rests in the scene: an export by itself would start displaced, to show motion
     assert float({v.name: v.start for v in b.modelVariables}["displacement_start"]) == 0.0
     # the importer's own ports are left out
     assert not any(v.name.startswith("record.") for v in b.modelVariables)
@@ -167,7 +167,7 @@ def test_a_gain_as_a_component_has_the_units_of_its_ends(tmp_path: Path) -> None
         "input": "m",
         "output": "N",
     }
-    # of FMI 2.0 always: OMSimulator takes a circle of FMI 3.0 for an algebraic loop, which it cannot solve
+    # always FMI 2.0: for OMSimulator a circle of FMI 3.0 is an algebraic loop, which it cannot solve
     versions = [unpack(tmp_path / "resources" / f"{name}.fmu").fmi_version for name in ("a", "gain_1")]
     assert versions == ["3.0", "2.0"]
 

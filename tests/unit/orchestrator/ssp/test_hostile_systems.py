@@ -1,4 +1,4 @@
-"""Archives that are damaged, hostile, or of what is not available: one line with the way out, and nothing written."""
+"""Archives that are damaged, hostile or unsupported: one line with the remedy, and no file written."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BODY = connector("displacement", "output") + connector("force", "input")
 
 @pytest.fixture(scope="module")
 def body(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """An FMU that nobody says is ours."""
+    """An FMU without a mark of this package."""
     return export_fmu("oscillator", tmp_path_factory.mktemp("fmu") / "body.fmu", fmi="2.0").read_bytes()
 
 
@@ -176,7 +176,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
 
 
 def refused(folder: Path, path: Path) -> str:
-    """Return the one line by which the command line refuses an archive."""
+    """Return the one line with which the command line refuses an archive."""
     before = {file for file in folder.rglob("*") if file != path}
     done = in_this_process("ssp", "import", path, "-o", folder / "scene.toml")
     assert done.returncode == 2, done.stderr

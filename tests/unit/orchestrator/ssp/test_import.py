@@ -1,4 +1,4 @@
-"""Systems of other tools as scenes: nested ones, units, start values, parameter sets."""
+"""Systems of other tools as scenes: nested systems, units, start values, parameter sets."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ GAIN = connector("input", "input") + connector("output", "output")
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """FMUs that nobody says are ours."""
+    """FMUs without a mark of this package."""
     folder = tmp_path_factory.mktemp("fmus")
     units = {"input": MILLIMETRE, "output": MILLIMETRE}
     return {
@@ -124,7 +124,7 @@ def test_a_parameter_is_renamed_converted_and_handed_on_by_a_connector(
     renamed = mapping(entry("m", "mass", factor(2.0)), entry("start", "displacement_start"))
     given = values({"m": real(1.5), "start": real(4.0, "mm"), "stiffness": real(9.0)}, "", renamed, MM)
     general = read(tmp_path, fmus, ssd(body(given)))
-    # with a mapping only what it names is applied
+    # with a mapping only the mapped parameters are applied
     assert dict(general.components[0].parameters) == {"mass": 3.0, "displacement_start": 0.004}
     inner = system(
         "rig",
@@ -173,7 +173,7 @@ def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
     }
     imported = load_system(archive(tmp_path / "my rig.ssp", ssd(body(values(given))), fmus))
     assert dict(imported.scene.components[0].parameters) == {"mass": 4.0, "contact[1].law": 1}
-    # what a run says of the FMU names the system, wherever it lies unpacked
+    # remarks of a run on the FMU name the system, not the folder of its unpacked files
     assert imported.scene.components[0].fmu.parts[-2:] == ("my_rig_fmus", "body.fmu")
     (left_out, recorded) = imported.notes
     assert "body.no such, body.velocity" in left_out
@@ -229,7 +229,7 @@ def test_the_step_is_that_of_the_master_or_the_smallest_that_an_fmu_proposes(
     elements = body() + component("law", "resources/plain.fmu", GAIN)
     joined = connection("body.displacement", "law.input")
     assert read(tmp_path, fmus, ssd(elements, joined, step=0.25)).macro_step == 0.25
-    # an empty name of an element is that of the system, as older versions of OMSimulator write it
+    # an empty element name means the system, as older versions of OMSimulator write it
     oms = 'xmlns:oms="https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"'
     note = f'<ssd:Annotations><ssc:Annotation type="org.openmodelica"><oms:FixedStepMaster {oms} stepSize="0.0625"/>'
     note += "</ssc:Annotation></ssd:Annotations>"

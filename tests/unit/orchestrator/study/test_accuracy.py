@@ -1,4 +1,4 @@
-"""Studies of accuracy: the right reference, ladders that converge at their order, failures that show as such."""
+"""Studies of accuracy: the right reference, settings that converge at their order, failures that show as failures."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ FREE: dict[str, Any] = {
 
 
 COARSE: dict[str, Any] = {"STEPS_A_PERIOD": (23, 61), "REVISED_CONTACT_STEPS": (10.0, 40.0)}
-"""Settings of ways with equal steps, or steps that are made again: finer ones take most of the time of a study."""
+"""Coarse settings of ways with equal or repeated steps: finer settings take most of the time of a study."""
 
 
 def studied_once(scene: Scene, settings: dict[str, Any] = COARSE, **options: Any) -> Comparison:
-    """Comparison a scene in all ways, by some settings of them, without measuring what they cost."""
+    """Return the comparison of all ways of a scene, at some settings, without measured costs."""
     with pytest.MonkeyPatch.context() as patch:
         stop_the_clock(patch)
         for name, values in settings.items():
@@ -146,7 +146,7 @@ def test_step_revision_gives_an_impulse_that_is_small_beside_the_speed_of_the_ot
     scene = studied_scene(load_scene(EXAMPLES / "thesis" / "figure_6_5b.toml"))
     assert scene.period is not None
     end = reference_of(scene).scales.window[1]
-    found = RevisedTrial(scene, 0.2 * scene.period, part=30.5 / end).run()  # there is such an impact at 30.09
+    found = RevisedTrial(scene, 0.2 * scene.period, part=30.5 / end).run()  # after an impact at 30.09
     assert found.failure == ""
 
 
@@ -168,7 +168,7 @@ SOFT: dict[str, Any] = {"law": "kelvin_voigt", "position": 1e-4, "stiffness": 1e
 
 
 def errors_by_step(reference: Reference, trials: dict[float, Trial]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the steps, or steps a contact, of trials with their errors, those of which no impact is missed."""
+    """Return the steps, or steps a contact, and the errors of the trials that miss no impact."""
     errors = {
         step: errors_of(trial.run(), reference.observation, reference.scales)
         for step, trial in trials.items()
@@ -205,7 +205,7 @@ def test_a_structure_on_rigid_stops_is_followed_by_plain_steps_and_by_step_revis
     reference = reference_of(scene)
     found, errors = errors_by_step(reference, {step: PlainStepsTrial(scene, step) for step in steps})
     assert len(found) == 3
-    assert errors[-1] < 0.1 * errors[0]  # of first order: the last step is a twentieth of the first
+    assert errors[-1] < 0.1 * errors[0]  # first order: the last step is a twentieth of the first
     _, errors = errors_by_step(reference, {0.02: RevisedTrial(scene, 0.02 * scene.period)})
     assert errors[0] < 1e-9
 
@@ -317,7 +317,7 @@ def test_a_chain_is_studied_with_fewer_modes_and_with_stops_of_other_laws() -> N
     study = studied_once(Scene.from_dict(tables))
     fused = [one for one in study.measured if one.way.name == "fused"]
     balances = [one.errors.of["energy_balance"] for one in fused]
-    assert balances[0] > 1e-9  # at a contact tolerance of .01
+    assert balances[0] > 1e-9  # at a contact tolerance of 0.01
     assert balances[-1] < 1e-13
     names = {one.way.name for one in study.measured if one.way.model}
     assert names == {
@@ -348,7 +348,9 @@ def test_what_it_costs_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
     study = whole(AccuracyOfScene(short, tolerance=1e-6, budget=20.0)).comparison
     fused, coupled = study.measured[:2]
     able = [one for one in study.measured if not one.way.model and one.error("all") <= 1e-7]
-    assert study.chosen is min(able, key=lambda one: one.cost)  # by what was measured, not by who should win
+    assert study.chosen is min(
+        able, key=lambda one: one.cost
+    )  # by the measured costs, not by an expected winner
     assert fused in able
     assert coupled in able
     assert 0 < fused.calls < coupled.calls
@@ -422,7 +424,7 @@ def test_the_closed_form_is_the_orbit_to_what_the_reference_says_of_itself(frequ
 def test_motions_without_a_closed_form_have_a_reference_all_the_same(
     damping: float, frequency: float
 ) -> None:
-    # a scene that the service was sent: undamped, in resonance, with a tolerance
+    # a scene that the service received: undamped, in resonance, with a tolerance
     scene = Scene.from_dict(
         {
             "body": {"mass": 1.0, "stiffness": 1.0, "damping": damping},
@@ -497,9 +499,9 @@ def test_chaos_of_a_general_scene_is_compared_from_its_start_and_then_by_what_it
     assert study.reference.chaotic
     assert study.scene.record.recorded_time < 100.0
     assert all(one.error("all") < 1e-10 for one in study.measured)
-    told = [one.statistics for one in study.measured if one.statistics is not None]
-    assert len(told) > 10
-    assert all(one.distribution_distance < 3.0 * one.distribution_sampling for one in told)
+    compared = [one.statistics for one in study.measured if one.statistics is not None]
+    assert len(compared) > 10
+    assert all(one.distribution_distance < 3.0 * one.distribution_sampling for one in compared)
     assert "only statistics compare" in advice(study)
 
 

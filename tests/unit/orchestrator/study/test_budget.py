@@ -35,13 +35,13 @@ P11: dict[str, Any] = {
 }
 ROOM = "vibroimpact.orchestrator.study.accuracy"
 STEPS = (23, 61, 127)
-"""Plain steps a period, of the ways of these tests."""
+"""Plain steps a period in the ways of these tests."""
 LOOKS = 2
-"""Looks at the clock in each of them: of the way, and of the driver of the body."""
+"""Readings of the clock in each step: by the way, and by the driver of the body."""
 
 
 def studied(scene: Scene, clock: TickingClock, budget: float = LEAST_BUDGET) -> Comparison:
-    """Comparison a scene by fused runs and plain steps, with the costs that a clock tells."""
+    """Return the comparison of fused runs and plain steps of a scene, with costs by the given clock."""
     with pytest.MonkeyPatch.context() as patch:
         tick_the_clock(patch, clock)
         patch.setattr(all_ways, "STEPS_A_PERIOD", STEPS)
@@ -58,7 +58,7 @@ def plain(study: Comparison) -> list[Measured]:
 
 @pytest.fixture(scope="module")
 def halved() -> Comparison:
-    # 127 steps in each of 8 periods: 10 s, where the runs of the last way may take 3 s
+    # 127 steps in each of 8 periods take 10 s; runs of the last way may take 3 s
     return studied(Scene.from_dict(P11), TickingClock(tick=0.005))
 
 
@@ -103,7 +103,7 @@ def test_memory_is_measured_last_and_only_if_there_is_time() -> None:
 
 
 def test_an_output_without_a_value_over_so_little_leaves_its_cost_in_proportion() -> None:
-    """The last impact of a component has no phase before the first: a study of `mixed_versions` ended in an error."""
+    """Before the first impact, a component has no phase of a last impact: a study of `mixed_versions` failed there."""
 
     class Trial:
         closed = 0
@@ -178,7 +178,7 @@ def test_a_transient_whose_end_is_no_start_is_passed_by_each_way(monkeypatch: py
 
 
 class Slow(DrivenTrial):
-    """A trial of which a transient takes a fiftieth of its time before it is given up."""
+    """A trial that is given up in its transient, after a fiftieth of its time."""
 
     def run(self) -> Observation:
         is_late = self._window[0] > 0.0

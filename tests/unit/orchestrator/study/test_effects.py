@@ -1,4 +1,4 @@
-"""Effects of scenes: each is found, taken away alone, timed in turn; what is kept of a run changes no motion."""
+"""Effects of scenes: each is found, removed alone and timed in turn; the record of a run changes no motion."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_each_thing_that_a_scene_asks_for_is_taken_away_alone() -> None:
     assert found["forcing"].forcing is not None
     assert found["forcing"].forcing.scalar_amplitude == 0.0
     assert found["time series"].record.time_series is None
-    assert found["damping"].record.time_series is None  # what moves is compared without
+    assert found["damping"].record.time_series is None  # motions are compared without a time series
     assert found["record of impacts"].stops
 
 
@@ -65,11 +65,11 @@ def test_a_free_mass_needs_its_forcing() -> None:
 
 def test_what_is_kept_changes_no_motion_and_what_moves_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vibroimpact.orchestrator.study.effects.PAIRS", 2)
-    # 67,000 samples are nearly all of the run, so that no other process changes the order
+    # 67,000 samples take nearly all of the run, so other processes do not change the order
     record = BEAM["record"] | {"time_series": {"rate": 100_000.0}}
     scene = Scene.from_dict(BEAM | {"record": record})
     shares = {share.effect.name: share for share in whole(CostOfEffects(scene)).shares}
-    assert next(iter(shares)) == "time series"  # the dearest
+    assert next(iter(shares)) == "time series"  # the most expensive
     assert shares["time series"].share > 0.5
     assert shares["time series"].change == 0.0
     assert shares["restitution stop"].changes.startswith("loses ")
@@ -89,7 +89,7 @@ def test_where_impacts_are_lost_the_motions_are_told_as_a_whole(monkeypatch: pyt
     stop_the_clock(monkeypatch)
     found = vi.effects(LINEAR)
     (row,) = np.flatnonzero(found["asked_by"].values == "stop[1]")
-    # without the stop the body is linear: x = A sin, its kinetic energy m (A w)^2 / 4 in the mean
+    # without the stop the body is linear: x = A sin(w t), mean kinetic energy m (A w)^2 / 4
     rate = 0.8
     size = 1.0 / (2.0 * np.hypot(1.0 - rate**2, 2.0 * 0.1 * rate))
     assert found["displacement_range"].values[row, 1] == pytest.approx(2.0 * size, rel=1e-6)
@@ -106,7 +106,7 @@ def test_where_impacts_are_lost_the_motions_are_told_as_a_whole(monkeypatch: pyt
     assert np.isnan(found["change"].values[row])
     assert found["changes"].values[row] == "loses 20 of 20 impacts"
     assert found["statistics"].values[row].startswith("P(2,1) to no impacts, displacement range +")
-    # what can be compared impact by impact is
+    # damping is compared impact by impact
     (damping,) = np.flatnonzero(found["name"].values == "damping")
     assert found["changes"].values[damping].startswith("up to ")
     assert found["statistics"].values[damping] == ""
@@ -157,7 +157,7 @@ def test_a_dataset_that_has_no_place_is_refused_before_anything_runs(monkeypatch
     ("name", "tolerance"),
     [
         *((f"record of {what}", 0.0) for what in ("impacts", "extrema", "strobe")),
-        ("time series", 1e-10),  # flights are cut at its samples
+        ("time series", 1e-10),  # samples split the flights
     ],
 )
 def test_motion_is_the_same_whatever_is_kept(name: str, tolerance: float) -> None:
@@ -187,7 +187,7 @@ def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_com
     assert [one.name for one in effect.without.components] == ["a"]
     assert not effect.without.connections
     (share,) = shares_of(scene, [effect])
-    # alone a goes on as cos sqrt(1.1) t; coupled it is half of cos t + cos sqrt(1.2) t
+    # alone, a moves as cos sqrt(1.1) t; coupled, it is half of cos t + cos sqrt(1.2) t
     time, (slow, fast, alone) = np.arange(0.0, 20.0, 0.05), np.sqrt([1.0, 1.2, 1.1])
     coupled = 0.5 * np.array(
         [
@@ -215,7 +215,7 @@ CHAIN = {"sensor", "load cell", "exciter", "force that falls with distance", "no
 
 def test_each_table_of_a_measuring_chain_is_taken_away_alone() -> None:
     found = changes_of(MEASURED)
-    # without [daq] nothing holds a force that falls
+    # without [daq] nothing holds the force of an exciter that falls with the distance
     assert set(found) & CHAIN == CHAIN - {"exciter", "AD conversion"}
     assert found["load cell"].channels == ("sensor.displacement",)
     assert found["load cell"].load_cell is None

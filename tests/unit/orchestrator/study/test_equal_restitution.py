@@ -1,4 +1,4 @@
-"""Laws of equal restitution: each, simulated alone, throws a mass back as asked, and takes the time that was asked."""
+"""Laws of equal restitution: each law, simulated alone, has the requested restitution and contact time."""
 
 from __future__ import annotations
 

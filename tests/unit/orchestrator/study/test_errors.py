@@ -1,4 +1,4 @@
-"""Errors of a way against a reference: which impacts are the same, which are missed, and what edges hide."""
+"""Errors of a way against a reference: equal impacts, missed impacts, and impacts hidden at the edges."""
 
 from __future__ import annotations
 

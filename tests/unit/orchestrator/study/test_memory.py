@@ -1,4 +1,4 @@
-"""Memory of ways: what the FMUs take counts as what Python takes, and no way finds what another left."""
+"""Memory of ways: FMUs count as Python does, and no way profits from the memory of another way."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(not IS_MEASURED, reason="this system does not te
 
 MEGABYTE = 10**6
 OWN_PAGES = 5 * MEGABYTE
-"""Pages of Python's own code that come back into any fork: .5 MB of Python 3.11, 2.4 to 3.4 MB of 3.13."""
+"""Bytes of Python's own pages that come back into any fork: 0.5 MB with Python 3.11, 2.4 to 3.4 MB with 3.13."""
 SAMPLED: dict[str, Any] = {
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
     "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
@@ -26,9 +26,9 @@ SAMPLED: dict[str, Any] = {
 
 
 def test_memory_of_c_counts_though_it_is_free_again() -> None:
-    # as the ways of a study, in forks of a process that has nothing else
+    # in forks of a process without other memory, as the ways of a study
     *of_c, nothing = call_alone(memories_of_c, [50 * MEGABYTE, 50 * MEGABYTE, 0])
-    for found in of_c:  # and no fork finds what another has left
+    for found in of_c:  # no fork uses the memory of another fork
         assert 49.5 * MEGABYTE <= found <= 50 * MEGABYTE + OWN_PAGES
     assert nothing < OWN_PAGES
 

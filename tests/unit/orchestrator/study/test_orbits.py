@@ -1,4 +1,4 @@
-"""Names of orbits in a study of accuracy: those that `classify` gives to the same motion."""
+"""Names of orbits in a study of accuracy are the names that `classify` gives to the same motion."""
 
 from __future__ import annotations
 

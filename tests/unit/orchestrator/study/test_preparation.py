@@ -1,4 +1,4 @@
-"""What is found out about a scene before it runs: modes that meet a tolerance, errors that are estimated."""
+"""Preparation of a scene before it runs: the number of modes that meets a tolerance, and the estimated error."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_what_was_found_is_in_the_dataset_and_the_same_each_time(tmp_path: Path,
         assert first.attrs[name] == again.attrs[name]
     assert first.attrs["estimated_error"] <= 1e-3
     assert first.modes == first.attrs["modes_found"]
-    repeated = vi.run(Scene.from_text(first.attrs["scene"]))  # what ran says how many modes it had
+    repeated = vi.run(Scene.from_text(first.attrs["scene"]))  # the scene that ran names its number of modes
     np.testing.assert_array_equal(first.impact_time, repeated.impact_time)
 
 
@@ -81,7 +81,7 @@ def test_the_point_of_a_sweep_that_takes_most_modes_decides() -> None:
 
 
 def resonance(points: int, stiffness: float = 1e5) -> Scene:
-    """A sweep through the second natural frequency, 1036 rad/s, near which alone the strip reaches its stop."""
+    """Return a sweep through the second natural frequency, 1036 rad/s: the strip reaches its stop only near it."""
     scene = strip(
         **{"body.damping_ratio": 0.005, "record.recorded_periods": 5, "record.impacts": False},
         **{"stop[1].position": 1e-3, "stop[1].stiffness": stiffness, "execution.tolerance": 2e-2},
@@ -100,7 +100,7 @@ def test_a_resonance_between_the_ends_of_a_sweep_decides() -> None:
     errors = {place: error_of(places.scene_at((place,)), found.body.size) for place in range(38, 58, 2)}
     assert max(errors.values()) <= 2e-2
     alone = {place: error_of(places.scene_at((place,)), ends.modes) for place in range(40, 56, 4)}
-    assert max(alone.values()) > 2e-2  # the ends alone would not have done
+    assert max(alone.values()) > 2e-2  # the ends alone need fewer modes
 
 
 def test_the_modes_of_a_sweep_follow_from_the_scene_alone(tmp_path: Path, cluster: str) -> None:
@@ -108,7 +108,7 @@ def test_the_modes_of_a_sweep_follow_from_the_scene_alone(tmp_path: Path, cluste
     assert prepared_scene(small).found == prepared_scene(small).found
     first = vi.campaign(small, tmp_path / "campaign", scheduler=cluster, progress=False)
     again = vi.campaign(small, tmp_path / "campaign", scheduler=cluster, progress=False)
-    assert first.attrs["modes_checked_points"] == 7  # all that there are
+    assert first.attrs["modes_checked_points"] == 7  # all points of the sweep
     assert first.identical(again)
 
 
@@ -283,7 +283,7 @@ def test_a_study_of_accuracy_tells_other_numbers_of_modes_by_the_most(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stop_the_clock(monkeypatch)
-    for slow in ("_coupled", "_revised", "_integrated"):  # which are not asked about
+    for slow in ("_coupled", "_revised", "_integrated"):  # ways without a role here
         monkeypatch.setattr(f"vibroimpact.orchestrator.study.ways.all_ways.{slow}", lambda scene: [])
     monkeypatch.setattr("vibroimpact.orchestrator.study.ways.all_ways.STEPS_A_PERIOD", (23,))
     found = vi.accuracy(strip(**{"record.recorded_periods": 5}), budget=NEVER_LATE)

@@ -1,4 +1,4 @@
-"""Studies of replays: fewer samples and other modes, against the recording of a truth that the tests made."""
+"""Studies of replays: fewer samples and other numbers of modes, against a recording that the tests simulate."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of, t
 
 TIME = 2e-5 * np.arange(1500)
 TRUTH = {"body.modes": 4}
-"""What the recording was simulated with; the scene itself has one mode."""
+"""Changes of the scene for its recording: four modes, where the scene itself has one."""
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """A board whose recording has been simulated with four modes."""
+    """Return a board whose recording has been simulated with four modes."""
     folder = tmp_path_factory.mktemp("board")
     channels = (channel("base", TIME, pulse(TIME), trigger="one"), channel("board", TIME, pulse(TIME)))
     driven = written(folder / "drive.nc", *channels)
@@ -48,7 +48,7 @@ def study(scene: Scene) -> Comparison:
 def test_the_modes_that_the_truth_has_account_for_all_of_the_recording(study: Comparison) -> None:
     scores = {one.way.setting: one.variance for one in study.measured if one.way.knob == "modes"}
     assert scores[4] == pytest.approx(100.0, abs=1e-6)
-    assert scores[1] < scores[4] - 1e-3  # a slow pulse: the higher modes do little
+    assert scores[1] < scores[4] - 1e-3  # the pulse is slow, so higher modes matter little
     assert all(one.way.model for one in study.measured if one.way.knob == "modes")
 
 

@@ -1,4 +1,4 @@
-"""A scene with other settings keeps its comments and its order, and says what was asked for."""
+"""A scene with new settings keeps its comments and its order, and names the reason of the settings."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def test_settings_are_put_in_and_all_else_stays(execution: str) -> None:
     text = execution + BODY if execution.startswith("\nexecution") else BODY + execution
     found = tuned_text(text, {"how": "fused", "contact_tolerance": 1e-8}, "the cheapest")
     before = parse_toml(text)
-    wanted = {
+    expected = {
         **before,
         "execution": {**before.get("execution", {}), "how": "fused", "contact_tolerance": 1e-8},
     }
-    assert parse_toml(found) == wanted
+    assert parse_toml(found) == expected
     assert "# the cheapest" in found
 
 

@@ -1,4 +1,4 @@
-"""Trials of the ways of a scene: over all of its time or the first part, given up by a clock, and silent."""
+"""Trials of the ways of a scene: over all of its time or a first part, given up by a clock, and without output."""
 
 from __future__ import annotations
 

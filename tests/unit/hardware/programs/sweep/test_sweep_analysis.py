@@ -1,4 +1,4 @@
-"""What the samples of a step say, of motions whose extrema, impacts and faults are known."""
+"""Analysis of the samples of a step, for motions with known extrema, impacts and faults."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ SETTINGS = sweep_of([20.0], inputs=(DRIVE, CELL), path="up", transient_periods=2
 
 
 def metres(volts: Floats, time: Floats) -> Floats:
-    """Return a displacement of 1 mm for each V."""
+    """Return a displacement of 1 mm per V."""
     return 1e-3 * volts
 
 
 def step_of(
     tip: Callable[[Floats], Floats], settings: SweepSettings = SETTINGS, cell: Floats | None = None
 ) -> StepSamples:
-    """Return the samples of the first step, of a tip that is a function of the forcing cycles."""
+    """Return the samples of the first step, for a tip given as a function of the forcing cycles."""
     plan = planned(settings)
     segment = next(segment for segment in plan.segments if segment.kind == "step")
     cycles = np.arange(segment.count) * (segment.increment / CYCLE) + segment.phase / CYCLE
@@ -49,12 +49,12 @@ def step_of(
 
 
 def shown(step: StepSamples, settings: SweepSettings = SETTINGS) -> MeasuredStep:
-    """Return what a step shows, at a converter of 16 bits."""
+    """Return the analysis of a step, for a converter of 16 bits."""
     return analysed(step, settings, metres, [CONVERTER] * len(settings.inputs))
 
 
 def sine(cycles: Floats) -> Floats:
-    """Return a tip that follows the drive, of 2 V."""
+    """Return a tip displacement that follows the drive, of 2 V."""
     found: Floats = 2.0 * np.sin(2.0 * np.pi * cycles)
     return found
 
@@ -65,7 +65,7 @@ def test_extrema_of_a_sine_lie_between_its_samples(phase: float, samples: float,
     wave = size * np.sin(2.0 * np.pi * (np.arange(count) / samples + phase))
     edges = np.ceil(np.array([0.5, 1.5, 2.5]) * samples).astype(np.int64)
     highest, lowest = extrema_of(wave, edges)
-    # the parabola misses a fourth of the fourth order
+    # error of the parabola: of fourth order
     error = (2.0 * np.pi / samples) ** 4 / 20.0 + 1e-12
     np.testing.assert_allclose(highest, size, rtol=error)
     np.testing.assert_allclose(lowest, -size, rtol=error)
@@ -74,7 +74,7 @@ def test_extrema_of_a_sine_lie_between_its_samples(phase: float, samples: float,
 @given(st.floats(0.0, 1.0), st.floats(0.1, 1.0))
 def test_the_extremum_at_a_stop_is_where_the_motion_turns_round(place: float, restitution: float) -> None:
     time = (np.arange(400) - 200.0 - place) * 1e-3
-    # towards the stop at 1 m/s, from it slower, both with the same acceleration
+    # at 1 m/s towards the stop, slower after it, both with the same acceleration
     motion = np.where(time < 0.0, time, -restitution * time) - 2.0 * time**2
     highest, _ = extrema_of(motion, np.array([100, 300]))
     assert highest[0] == pytest.approx(0.0, abs=6e-6)
@@ -191,7 +191,7 @@ def test_impacts_are_counted_once_with_their_ringing() -> None:
     rings = np.exp(-late / 1e-3) * np.cos(2.0 * np.pi * 800.0 * late)
     found = shown(step_of(sine, cell=rings.sum(axis=0) + 0.2))
     assert found.impacts is not None
-    # one in each period, another one in every second
+    # one in each period, and a second one in every other period
     assert found.impacts.tolist() == [2.0, 1.0] * 5
 
 
@@ -201,7 +201,7 @@ def test_the_clock_error_comes_back_from_the_drive(error: float, frequency: floa
     plan: Plan = planned(settings)
     segment = next(segment for segment in plan.segments if segment.kind == "step")
     samples = np.arange(segment.first, segment.stop)
-    # the sample k of a clock that is fast by e is taken at k / (1 + e)
+    # sample k of a clock that is fast by e is taken at k / (1 + e)
     cycles = (samples / (1.0 + 1e-6 * error) - segment.first) * segment.increment / CYCLE
     drive = 0.5 * np.sin(2.0 * np.pi * (cycles + segment.phase / CYCLE))
     found = seen_drive(drive, segment, settings.output.rate)

@@ -1,4 +1,4 @@
-"""The planned output of a sweep: one phase that never jumps, and periods that are exact to the sample."""
+"""The planned output of a sweep: a continuous phase, and periods that are exact to the sample."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SWEEPS = st.builds(
 
 
 def exact_phase(plan: Plan, sample: int) -> Fraction:
-    """Return the phase of the output at a sample, in cycles since it began, summed up in fractions."""
+    """Return the phase of the output at a sample, in cycles since its start, summed as fractions."""
     total = Fraction(0)
     for segment in plan.segments:
         total += Fraction(max(0, min(sample, segment.stop) - segment.first) * segment.increment, CYCLE)

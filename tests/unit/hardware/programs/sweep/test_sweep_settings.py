@@ -1,4 +1,4 @@
-"""The file of a sweep: what it may say, and one line for each thing that is wrong with it."""
+"""The file of a sweep: its valid settings, and one line for each error in it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibroimpact.hardware.programs.sweep.settings import parse_sweep, read_sweep
 
 
 def refusal(text: str) -> str:
-    """Return what is said of a text."""
+    """Return the error message for a text."""
     with pytest.raises(UsageError) as refused:
         parse_sweep(text, "sweep.toml")
     assert refused.value.exit_code == 2
