@@ -83,10 +83,6 @@ class Calibration(BaseModel):
         """Return values in `unit` from volts measured at instants (s from the start)."""
         return (volts - self.offset - self.drift * time) / self.sensitivity
 
-    def to_volts(self, values: Floats, time: Floats) -> Floats:
-        """Return the volts that gave these values."""
-        return self.sensitivity * values + self.offset + self.drift * time
-
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a calibrated channel, from which the volts can be restored."""
         return {

@@ -6,6 +6,7 @@ from collections.abc import Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Self
 
@@ -160,11 +161,10 @@ class Following(Study[str]):
 
     def _print_branches(self) -> None:
         for number, branch in enumerate(self.followed.branches, start=1):
-            stable = sum(each.orbit.is_stable for each in branch.orbits)
             low, high = float(branch.values.min()), float(branch.values.max())
             say(
                 f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
-                f"{stable} stable{_stable_ranges(branch)}; "
+                f"{sum(each.orbit.is_stable for each in branch.orbits)} stable{_stable_ranges(branch)}; "
                 f"begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
             )
 
@@ -198,8 +198,8 @@ class Following(Study[str]):
 
 def _stable_ranges(branch: Branch) -> str:
     """Return the ranges of the followed number with stable orbits, in parentheses; no range: an empty text."""
-    groups = groupby(branch.orbits, key=lambda each: each.orbit.is_stable)
-    ranges = [sorted(each.value for each in orbits) for is_stable, orbits in groups if is_stable]
+    groups = groupby(branch.orbits, attrgetter("orbit.is_stable"))
+    ranges = [sorted(map(attrgetter("value"), orbits)) for is_stable, orbits in groups if is_stable]
     return f" ({', '.join(f'{each[0]:.6g} to {each[-1]:.6g}' for each in ranges)})" if ranges else ""
 
 

@@ -200,7 +200,7 @@ def test_the_threshold_is_in_the_unit_of_the_calibration(sign: float) -> None:
     cell = Calibration(unit="N", sensitivity=sign * 0.02, offset=0.5, drift=0.1, how="-", when="-")
     force = np.zeros(1000)
     force[500:504] = 12.0
-    volts = cell.to_volts(force, np.arange(1000) / 1000.0)
+    volts = cell.sensitivity * force + cell.offset + cell.drift * np.arange(1000) / 1000.0
     finder = PulseFinder(measurement(cell, threshold=10.0))
     kept(finder, stream(volts), [501])
     assert finder.starts == [500]

@@ -30,13 +30,12 @@ def read(tmp_path: Path, text: str) -> object:
     return read_calibrations([path], INPUTS)
 
 
-def test_volts_become_units_and_back(tmp_path: Path) -> None:
+def test_volts_become_units(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(CELL)
     (cell,) = read_calibrations([path], INPUTS).values()
     volts, time = np.array([0.1, -2.07, 1.1]), np.array([0.0, 10.0, 1000.0])
     np.testing.assert_allclose(cell.to_units(volts, time), [0.0, 100.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(cell.to_volts(cell.to_units(volts, time), time), volts, rtol=1e-14)
     assert cell.attributes()["calibration_when"] == "2026-03-01"
 
 
