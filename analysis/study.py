@@ -108,7 +108,7 @@ class Study(ABC, Generic[Row]):
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """The dataset of the rows found when no more come, with the versions of the program."""
+        """Dataset of the rows of the finished study, with the versions of the program."""
         return self.made().assign_attrs(program_attributes())
 
     def take(self, row: Row) -> None:

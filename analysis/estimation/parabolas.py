@@ -83,7 +83,7 @@ def points_of(time: Floats, values: Floats) -> Points:
 
 
 def cuts(points: Points, noise: float) -> list[list[Piece]]:
-    """Return the pieces of a record, cut once for each factor of its noise (standard deviation of a sample)."""
+    """Return the pieces of a record for each factor that multiplies its noise (standard deviation of a sample)."""
     if len(points.time) < FEWEST_IN_PIECE:
         return []
     least = _ROUNDING * float(np.ptp(points.values))

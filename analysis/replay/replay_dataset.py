@@ -179,7 +179,7 @@ def _events(name: str, comparison: Comparison) -> Rows:
 
 
 def _windows(name: str, words: str, scored: Sequence[tuple[list[Span], Floats]]) -> Rows:
-    """Return start, stop and score of windows, NaN if a comparison has fewer than another."""
+    """Return start, stop and score of the windows of each comparison; NaN stands for missing windows."""
     most = max(len(spans) for spans, _ in scored)
     if not most:
         return {}

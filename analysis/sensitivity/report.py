@@ -49,7 +49,7 @@ TABLE = ResultTable(
 
 @dataclass(eq=False)
 class SensitivityOfCampaign(Study[int]):
-    """Sobol indices of a campaign; a row is the number of resamples of a batch. See `sensitivity_report`."""
+    """Sobol indices of a campaign: see `sensitivity_report`. A row of the study counts the resamples of one batch."""
 
     name = "sensitivity"
     nothing = "an index"

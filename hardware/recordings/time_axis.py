@@ -113,7 +113,7 @@ def _even(
 
 
 def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
-    """Place the rows by the user's rate; gaps in the instants of the file stay gaps."""
+    """Return the time axis with the rate of the user; gaps in the file's own instants remain gaps."""
     interval, length = 1.0 / rate, len(column.values)
     begin, remarks = column.start, []
     gaps, count = None, np.arange(length)

@@ -59,7 +59,7 @@ def counted_from_start(
 
 
 def _in_seconds_of_days(tables: Sequence[Table]) -> tuple[Sequence[Table], str]:
-    """Return tables with days of a spreadsheet converted to s, and the date of the first; an empty date without days.
+    """Return tables with the days of a spreadsheet as s, and the first date; it is empty where no table has days.
 
     DatasetError: instants may be days or seconds.
     """

@@ -80,7 +80,7 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 /* Change the mode from one of these modes to another. */
 bool vi_instance_enter(vi_instance *instance, const char *function, int from, vi_mode_of_use to);
 
-/* End initialization: false, after logging the component's message, when a parameter is bad. Warnings are logged. */
+/* End initialization and log warnings. A bad parameter logs the component's message, and the result is false. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
 /* Present time, s. */

@@ -184,7 +184,7 @@ def _strobe(displacement: Floats, segment: Segment, settings: SweepSettings, lat
 
 
 def _drift(highest: Floats, lowest: Floats, share: float) -> str:
-    """Return, in words, a trend over a step above a share of the range; empty without one."""
+    """Return a sentence about each trend in a step that exceeds a share of the range; empty without a trend."""
     ranges = highest - lowest
     size = float(np.nanmean(ranges)) if np.isfinite(ranges).any() else np.nan
     for name, values in (("range", ranges), ("mean", 0.5 * (highest + lowest))):

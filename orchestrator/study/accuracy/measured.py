@@ -106,7 +106,7 @@ class Measured:
         return self.length * self.each / self.impacts if is_known else math.nan
 
     def error(self, quantity: str) -> float:
-        """Relative error of a quantity, or the largest of all; NaN where the way failed."""
+        """Relative error of a quantity, or the largest error of all quantities; NaN where the method failed."""
         return math.nan if self.errors.failure else self.errors.worst(quantity)
 
     def error_in_words(self, quantity: str, known: float) -> str:

@@ -18,7 +18,7 @@ typedef struct {
     double constant, stiffness, damping, exponent;
 } vi_press;
 
-/* A number with the sign of the force, if `constant` is 0: the force itself or, for a power law, 1 + damping d'. */
+/* A number with the sign of the force when `constant` is 0: the force, or 1 + damping d' for a power law. */
 static inline double vi_press_sense(const vi_press *press, double depth, double rate)
 {
     return press->damping * rate + (press->kind == VI_PRESS_POWER ? 1.0 : press->stiffness * depth);

@@ -19,7 +19,7 @@ void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacemen
  * there. scale: sum of the sizes of the displacement's terms. */
 vi_cell_result vi_lane_cell_search(const vi_lane_cell *cell, double scale, double *share, double *slope);
 
-/* Largest sign * displacement strictly inside the cell up to the share `end`; -HUGE_VAL when it is at an end. */
+/* Largest sign * displacement strictly inside the cell, up to the share `end`; -HUGE_VAL: an end has the largest. */
 double vi_lane_cell_crest(const vi_lane_cell *cell, double sign, double end);
 
 #endif

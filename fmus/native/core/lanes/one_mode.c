@@ -114,7 +114,7 @@ static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bul
     return vi_min(first, last) > bulge || vi_max(first, last) < -bulge;
 }
 
-/* Limit of sign * q by the stops on this side. */
+/* Limit that the stops on this side set to sign * q. */
 static double stop_on(const vi_lane_group *g, int lane, int contacts, double sign)
 {
     double farthest = HUGE_VAL;

@@ -133,7 +133,7 @@ static void add_pair(sums *sum, const mover *a, const mover *b, const vi_complex
     }
 }
 
-/* Drag of the body's damping on a movement. */
+/* Force with which the body's damping opposes a velocity. */
 static void drag_of(const vi_pressed_body *body, const mover *m, vi_complex drag[])
 {
     double re[VI_MODES], im[VI_MODES];

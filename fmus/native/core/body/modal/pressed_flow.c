@@ -223,7 +223,7 @@ static void respond_to_loads(vi_pressed_flow *flow, const vi_structure *s, const
     }
 }
 
-/* Does the response leave the motion its digits, in displacements and in the velocities that follow from them? */
+/* Whether the response is small enough that displacements and velocities keep their digits when it is added. */
 static bool keeps_digits(const vi_pressed_flow *flow, const vi_structure *s, double length)
 {
     const vi_pressed_body *body = &flow->pressed->body;

@@ -157,7 +157,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
 /* Complain of the place where time stands still, after VI_STEP_STANDSTILL. */
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
 
-/* Number (1-based) of a contact beyond its stop by more than rounding, or 0. Such a start is refused. */
+/* Number (1-based) of a contact that starts beyond its stop by more than rounding, else 0. The caller refuses it. */
 int vi_structure_beyond(const vi_structure *s);
 
 /* Number of modes in use. */

@@ -7,7 +7,7 @@
 /* Apply joint impulses to all contacts that touch and approach; external laws use their answers if `answered`. */
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
 
-/* Apply once the impulses given to the contacts. A resting contact leaves its stop, or hits it in the next step. */
+/* Apply the given impulses once, each to its contact. A resting contact then leaves its stop, or hits it next. */
 void vi_structure_take_impulses(const vi_structure *s);
 
 /* Model exchange: the integrator brings contact k back to its stop while it still leaves, as its bounce is so low. From
