@@ -80,9 +80,10 @@ lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/mypy tests/benchmarks
 	$(BIN)/lint-imports
 
-docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its pictures and its tutorial; a warning is an error
+docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its pictures and its tutorials, and look at its pages in Chromium; a warning is an error
 	$(BIN)/python docs/site/gallery.py build/docs/gallery
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs/site -d build/docs/doctrees . build/docs/html
+	$(BIN)/python docs/site/look.py build/docs/html build/docs/pictures
 	@echo "The site begins at build/docs/html/index.html."
 
 clean: ## remove what make has made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -9,6 +10,8 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent))
+# Cells of tutorials start `vibroimpact`, the program of this environment.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 project = "vibroimpact"
 author = "vibroimpact developers"
@@ -27,7 +30,9 @@ extensions = [
     "sphinx_design",
     "command_blocks",
     "command_reference",
+    "figure_sizes",
     "gallery_page",
+    "table_cells",
 ]
 
 myst_enable_extensions = ["colon_fence"]
@@ -55,12 +60,13 @@ html_css_files = ["site.css"]
 # The front page is docs/index.html; this page, at the top, redirects there.
 html_additional_pages = {"index": "to_front_page.html"}
 templates_path = ["templates"]
-# A section of a single page would have an empty sidebar.
-html_sidebars = {"docs/index": [], "docs/tutorial": []}
+# These pages belong to no section, whose pages the sidebar of the theme lists.
+html_sidebars = {name: ["sections.html"] for name in ("docs/index", "search", "genindex", "py-modindex")}
 html_copy_source = False
 html_show_copyright = False
 html_theme_options = {
-    "secondary_sidebar_items": ["page-toc"],
+    # pages whose pictures need the whole width have no list of headings
+    "secondary_sidebar_items": {"**": ["page-toc"], "docs/index": [], "docs/gallery": []},
     "navbar_align": "left",
     "show_prev_next": True,
     "footer_start": [],

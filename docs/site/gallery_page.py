@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from docutils import nodes
@@ -9,6 +10,9 @@ from gallery import PICTURES, ROOT, Picture, kinds, scenes
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+
+#: Width of a picture on the page, CSS pixels. A click shows the picture in its own size.
+THUMBNAIL = 300
 
 
 def setup(sphinx: Sphinx) -> dict[str, bool]:
@@ -35,7 +39,20 @@ class Scenes(SphinxDirective):
 
 
 def _grid(pictures: Iterable[Picture]) -> str:
-    return "\n".join(["::::{grid} 1 1 2 2", ":gutter: 2", *map(_card, pictures), "::::"])
+    return "\n".join([":::::{grid}", ":class-container: thumbnails", *map(_card, pictures), ":::::"])
+
+
+def folded(command: str) -> str:
+    """Return a command with a line for each option, as a shell reads it.
+
+    Examples
+    --------
+    >>> print(folded("vibroimpact plot a.nc --kind run -o a.png"))
+    vibroimpact plot a.nc \\
+      --kind run \\
+      -o a.png
+    """
+    return re.sub(r" (?=--?[a-z])", " \\\\\n  ", command)
 
 
 def _card(picture: Picture) -> str:
@@ -43,6 +60,22 @@ def _card(picture: Picture) -> str:
     path = PICTURES / picture.file
     if not path.is_file():
         raise ExtensionError(f"gallery: expected {path}, got no file. `make docs` makes it.")
-    commands = "\n".join(picture.commands)
-    image = f"![{picture.shows.replace('`', '')}](/{path.relative_to(ROOT).as_posix()})"
-    return f":::{{grid-item-card}}\n{image}\n\n{picture.shows}\n\n```\n{commands}\n```\n:::"
+    lines = [
+        "::::{grid-item-card}",
+        # an image with a width links to the whole picture
+        f":::{{image}} /{path.relative_to(ROOT).as_posix()}",
+        f":alt: {picture.shows.replace('`', '')}",
+        f":width: {THUMBNAIL}px",
+        ":class: thumbnail",
+        ":::",
+        "",
+        picture.shows,
+        "",
+        ":::{dropdown} Commands",
+        "```",
+        *map(folded, picture.commands),
+        "```",
+        ":::",
+        "::::",
+    ]
+    return "\n".join(lines)
