@@ -73,12 +73,13 @@ oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.
 audit: $(VENV)/audit.stamp ## ask the database of advisories about what is installed and about the lowest versions allowed; needs the network
 	$(BIN)/python tests/support/audit.py
 
-lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
+lint: $(VENV)/lint.stamp ## check style, types, the directions of imports and the rules of prose
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/mypy tests/benchmarks
 	$(BIN)/lint-imports
+	$(BIN)/python docs/site/prose.py
 
 docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its pictures and its tutorials, and look at its pages in Chromium; a warning is an error
 	$(BIN)/python docs/site/gallery.py build/docs/gallery
