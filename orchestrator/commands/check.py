@@ -18,11 +18,13 @@ from vibroimpact.orchestrator.campaign.check import (
     MOST_TRIAL_SECONDS,
     Trial,
 )
+from vibroimpact.orchestrator.campaign.here import HERE_SECONDS, may_begin_here
 from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.preparing import with_modes
@@ -74,18 +76,13 @@ def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
         yield "run", refused or _time(cost) + _memory(cost, COPIES_IN_RUN)
     if cost.trial is None:
         return
+    most = "at most " if cost.first else ""
     if cost.points > 1:
-        workers = min(processor_count(), cost.branches)
-        on = f" on {counted(workers, 'worker')} and some seconds to start"
-        yield (
-            "campaign",
-            ("at most " if cost.first else "")
-            + _time(cost, workers)
-            + on
-            + _memory(cost, COPIES_IN_CAMPAIGN),
-        )
+        here = may_begin_here(scene, DEFAULT_RUNNER, cost.points) and (cost.seconds() or 0.0) <= HERE_SECONDS
+        workers = 1 if here else min(processor_count(), cost.branches)
+        on = " in this process" if here else f" on {counted(workers, 'worker')} and some seconds to start"
+        yield "campaign", f"{most}{_time(cost, workers)}{on}{_memory(cost, COPIES_IN_CAMPAIGN)}"
     if not cost.trial.given_up:
-        most = "at most " if cost.first else ""
         yield "dataset", f"{most}about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
 
 
@@ -94,8 +91,11 @@ def _points(cost: SceneCost) -> str:
         return f"{cost.first} in the first round, {cost.points} at most: more go where the motion jumps"
     if cost.branches == cost.points:
         return f"{cost.points}"
-    each = cost.points // cost.branches
-    chains = f"in {cost.branches} branches of {each}" if cost.branches > 1 else "in one branch"
+    chains = (
+        f"in {cost.branches} branches of {cost.points // cost.branches}"
+        if cost.branches > 1
+        else "in one branch"
+    )
     return f"{cost.points} {chains}, along which each starts where the one before ended"
 
 

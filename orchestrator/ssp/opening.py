@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.messages import Argument, message
+from vibroimpact.fmus.messages import Argument, counted, message
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
 ENDING = ".ssp"
@@ -58,7 +58,7 @@ def _say_findings(path: str | PathLike[str], scene: Scene, strict: bool) -> None
         raise SceneError([f"{path}: {doubt}" for doubt in scene.doubts])
     say_notes(f"may run wrong: {doubt}" for doubt in scene.doubts)
     say_notes(
-        f"{file}: {count} remark{'s' if count > 1 else ''} on its description, which change no number. "
+        f"{file}: {counted(count, 'remark')} on its description; no number depends on them. "
         f"`vibroimpact fmu check` shows them."
         for file, count in scene.remarks.items()
     )

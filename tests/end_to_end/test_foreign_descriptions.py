@@ -26,7 +26,7 @@ def test_a_remark_changes_no_number_and_is_counted_by_a_run(tmp_path: Path) -> N
     scene = scene_with(tmp_path, REMARK)
     done = in_this_process("run", scene, "-o", tmp_path / "r.nc", "--strict")
     assert done.returncode == 0, done.stderr
-    assert "note: g.fmu: 1 remark on its description, which change no number." in done.stderr
+    assert "note: g.fmu: 1 remark on its description; no number depends on them." in done.stderr
     assert read_flat(tmp_path / "r.nc").g_y.values.tolist() == pytest.approx([6.0] * 11)
     checked = in_this_process("fmu", "check", tmp_path / "g.fmu", "--strict")
     assert checked.returncode == 0, checked.stderr
