@@ -128,8 +128,8 @@ class StopContactTable(SceneTable):
         Positive | None,
         Rule(
             unit="kg",
-            doc="effective mass of the contact point, within 5 % of what a trial step finds; by it the steps of a "
-            "contact are chosen",
+            doc="effective mass of the contact point, within 5 % of the mass that a trial step finds; it determines "
+            "the steps of a contact",
             default="found by a trial step; required of a body that cannot restore its state",
         ),
     ] = None
@@ -139,7 +139,7 @@ class StopContactTable(SceneTable):
     side: Annotated[
         Side | None,
         Rule(
-            doc='`"upper"`: the stop is above, `"lower"`: below; of a stop without a parameter `side`',
+            doc='`"upper"`: the stop is above, `"lower"`: below; for a stop without a parameter `side`',
             default="the stop's own",
         ),
     ] = None
@@ -177,7 +177,8 @@ class BodyPointTable(SceneTable):
     velocity: Annotated[_Text, _name_of("an output of the body: the velocity of that point", "v")]
     force: Annotated[_Text, _name_of("an input of the body: the force on that point", "f")]
     mass: Annotated[
-        Positive, Rule(unit="kg", doc="effective mass of the point, within 5 % of what a trial step finds")
+        Positive,
+        Rule(unit="kg", doc="effective mass of the point, within 5 % of the mass that a trial step finds"),
     ]
 
 
@@ -192,7 +193,7 @@ class PairTable(SceneTable):
             item='a point of a body such as "a.mass[2]"',
             doc='two points: `"a"` (of an Oscillator), `"a.mass[2]"` (of a Chain), `"a.tip"` (of a Beam), or any '
             '`"a.contact[1]"` with its place among the parameters; the gap is clearance + displacement of the second '
-            "- that of the first",
+            "- displacement of the first",
         ),
     ]
     clearance: Annotated[Finite, Rule(unit="m", doc="gap where both displacements are 0")] = 0.0

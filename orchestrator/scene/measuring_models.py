@@ -47,7 +47,7 @@ class Sensor(SceneTable):
     location: Annotated[
         Fraction | None,
         location_rule(
-            "beams only; a point that moves",
+            "beams only; not a supported end",
             "left out: the tip of a clamped-free beam, else the point of `stop[1]`, or the middle",
         ),
     ] = None
@@ -56,24 +56,24 @@ class Sensor(SceneTable):
         Rule(
             hint="A reading is gain * value + offset, in the unit of its channel.",
             doc="reading per value: of `sensor.displacement` in V/m, of `sensor.velocity` in V s/m, of "
-            "`sensor.acceleration` in V s^2/m; in replays both in the unit of the channel, or, where these are of "
-            "different kinds, in its unit per SI unit",
+            "`sensor.acceleration` in V s^2/m; in replays reading and value have the unit of the channel, or, if they "
+            "differ in kind, the gain is in the unit of the channel per SI unit",
         ),
     ] = 1.0
     offset: Annotated[
         Finite,
         Rule(
             hint="It has the unit of the reading.",
-            doc="in V; in replays in the unit of the reading: left out, the level of the channel before its event is "
-            "taken off instead",
+            doc="in V; in replays in the unit of the reading: without an offset, the level of the channel before its "
+            "event is subtracted instead",
         ),
     ] = 0.0
     range: Annotated[
         NotNegative | None,
         Rule(
             hint="Use 0 for a sensor without an end.",
-            doc="in V: readings end at +- this; not in replays",
-            default="0: they do not end",
+            doc="in V: readings are cut off at +- this; not in replays",
+            default="0: no limit",
         ),
     ] = None
 
@@ -86,7 +86,7 @@ class LoadCell(SceneTable):
         Field(ge=1, le=8),
         Rule(hint="Stops count from 1.", doc="the stop whose force it measures"),
     ] = 1
-    sensitivity: Annotated[Finite, Rule(unit="V/N", doc="volts per newton; negative where it is inverted")]
+    sensitivity: Annotated[Finite, Rule(unit="V/N", doc="volts per newton; negative for an inverted signal")]
     natural_frequency: Annotated[
         NotNegative,
         Rule(
@@ -107,7 +107,7 @@ class LoadCell(SceneTable):
             hint="An impact on a rigid stop is seen as a half sine of this duration.",
             doc="an impact on a rigid stop is seen as a half sine of this duration and the same impulse, which begins "
             "at the impact; a stop that yields has a force of its own",
-            default="required of a rigid stop, of no other",
+            default="required for a rigid stop, refused for others",
         ),
     ] = None
 
@@ -125,8 +125,8 @@ class Exciter(SceneTable):
             unit="m",
             hint="Use 0 for a force that does not depend on the displacement.",
             effect=FALLING_FORCE,
-            doc="of the exciter from the body at displacement 0: the force falls with the square of the distance, and "
-            "is held from sample to sample of `[daq]`; 0: it does not depend on the displacement",
+            doc="distance of the exciter from the body at displacement 0: the force falls with the square of the "
+            "distance, and is held from sample to sample of `[daq]`; 0: it does not depend on the displacement",
         ),
     ] = 0.0
     side: Annotated[
@@ -148,7 +148,7 @@ class Noise(SceneTable):
     seed: Annotated[
         int,
         Field(ge=0, le=MOST_SEED),
-        Rule(doc="another one draws other noise; each run of a campaign has noise of its own"),
+        Rule(doc="another seed draws other noise; each run of a campaign has noise of its own"),
     ] = 0
     sensor: Annotated[
         NotNegative, _noise("`sensor.displacement`, `sensor.velocity`, `sensor.acceleration`")
@@ -191,7 +191,7 @@ class Daq(SceneTable):
         Rule(
             "parts per million from -1e5 to 1e5",
             unit="ppm",
-            doc="the clock is so much faster than it says: sample k is taken k / (rate (1 + clock_error / 10^6)) after "
+            doc="the clock is faster by this than it says: sample k is taken k / (rate (1 + clock_error / 10^6)) after "
             "the first, and has the time k / rate",
         ),
     ] = 0.0

@@ -111,7 +111,7 @@ class Forcing(SceneTable):
         Rule(
             "a finite number, or an array of them for a chain",
             unit="N (m/s^2 for base_acceleration, N/m for uniform, V beside `[exciter]`)",
-            doc='of a chain under `"force"` one for each mass; a number is enough for a single mass',
+            doc='a chain under `"force"` has one for each mass; a number is enough for a single mass',
         ),
     ]
     angular_frequency_given: Annotated[
@@ -133,21 +133,21 @@ class Forcing(SceneTable):
         Rule(
             unit="rad",
             fmu="forcing.phase",
-            doc="of the force at time 0. The recording begins and ends where the forcing phase is 0, so with a phase "
-            "other than 0 it begins up to one period after time 0, also with `transient_periods = 0`: what happens "
-            "before is not in the data",
+            doc="phase of the force at time 0. A recording begins and ends at forcing phase 0. With another phase at "
+            "time 0 it begins up to one period later, even if `transient_periods = 0`; the motion before is not "
+            "recorded",
         ),
     ] = 0.0
     location: Annotated[
         Fraction | None,
         location_rule(
-            'point of a beam that a `"force"` acts on; one that moves', "the free tip, or the middle"
+            'point of a beam where a `"force"` acts; not a supported end', "the free tip, or the middle"
         ),
     ] = None
     mode: Annotated[
         ModeNumber | None,
         Rule(
-            doc="the mode whose shape the load has; no other mode is driven by it",
+            doc="the load has the shape of this mode, and drives no other mode",
             default='required for `"mode"`',
         ),
     ] = None
@@ -185,7 +185,7 @@ class StopTable(SceneTable):
     location: Annotated[
         Fraction | None,
         location_rule(
-            "beams: the point that the stop limits; one that moves",
+            "beams: the point that the stop limits; not a supported end",
             "the tip; required where the far end is supported",
         ),
     ] = None
@@ -254,7 +254,7 @@ class TimeSeries(SceneTable):
         Rule(
             unit="samples per s",
             doc="at most 10^8 samples per run",
-            default="required; beside `[daq]` its rate",
+            default="required; with `[daq]` the rate of `[daq]`",
         ),
     ] = None
     variables: Annotated[
@@ -288,7 +288,7 @@ class Record(SceneTable):
     extrema: Annotated[
         bool,
         Rule(
-            doc="largest and smallest displacement of each period; an unforced scene has no periods and none of these"
+            doc="largest and smallest displacement of each period; an unforced scene has no periods and no extremes"
         ),
     ] = True
     strobe: Annotated[
@@ -300,8 +300,8 @@ class Record(SceneTable):
     each_period: Annotated[
         bool,
         Rule(
-            doc="`false`: one value for all recorded periods together, which is what a map of many points needs: the "
-            "largest and smallest displacement, the mean number of impacts, the strobe of the last"
+            doc="`false`: one value for all recorded periods together, enough for a map of many points: the largest "
+            "and smallest displacement, the mean number of impacts, the strobe of the last period"
         ),
     ] = True
     time_series: Annotated[
@@ -323,7 +323,7 @@ class Execution(SceneTable):
         Literal["auto", "coupled", "fused"],
         Rule(
             unavailable=("batch",),
-            doc='`"auto"`: `"fused"`, and where a sweep allows it many points at once, in lanes, see '
+            doc='`"auto"`: `"fused"`, or many points at once, in lanes, if the sweep allows it, see '
             '[below](#many-points-at-once); `"fused"`: the contact law runs inside the body; `"coupled"`: each '
             "component is an FMU of its own and the importer finds the events between them",
         ),
@@ -332,7 +332,8 @@ class Execution(SceneTable):
         int,
         Field(ge=1, le=MOST_IMPACTS_PER_POINT),
         Rule(
-            doc="impacts, touch-downs and rests per point, recorded or not, then its outcome is impact_limit"
+            doc="number of impacts, touch-downs and rests, recorded or not, at which a point ends with the outcome "
+            "impact_limit"
         ),
     ] = DEFAULT_IMPACT_LIMIT
     deadline: Annotated[
@@ -340,8 +341,8 @@ class Execution(SceneTable):
         Rule(
             unit="s",
             sweepable=False,
-            doc="wall time per point, then its outcome is timeout; looked at every few hundredths of a second, within "
-            "a long step too; with one points do not run in lanes, where none has a clock of its own",
+            doc="wall time after which a point ends with the outcome timeout, checked every few hundredths of a "
+            "second, within a long step too; with a deadline no points run in lanes, where a point has no clock",
         ),
     ] = None
     macro_step: Annotated[
@@ -378,8 +379,8 @@ class Execution(SceneTable):
             "0 < tolerance <= 0.5",
             hint="It is the relative error that is asked of what is recorded.",
             sweepable=False,
-            doc='relative error asked of what is recorded: `body.modes = "auto"` meets it, and datasets say how large '
-            "the error is (`estimated_error`)",
+            doc='largest relative error of the recorded results: `body.modes = "auto"` meets it, and datasets have the '
+            "estimated error (`estimated_error`)",
             default="nothing is estimated",
         ),
     ] = None

@@ -65,8 +65,8 @@ class Replay(SceneTable):
         Rule(
             'an array such as [{ simulated = "beam.sensor.acceleration", measured = "board" }]',
             item="a table with simulated and measured",
-            doc="`simulated`: a variable as in a time series, `sensor.` before it for a reading of `[sensor]`, the "
-            "body's kind before that if you like; `measured`: a channel",
+            doc="`simulated`: a variable of a time series, with `sensor.` before it for a reading of `[sensor]`; the "
+            "kind of the body may stand first (`beam.sensor.acceleration`); `measured`: a channel",
             default="none",
         ),
     ] = ()
@@ -75,21 +75,22 @@ class Replay(SceneTable):
         Rule(
             unit="unit of the channel",
             hint="Without it the channel's level before and after its event is taken off.",
-            doc="taken off what drives",
-            default="the channel's level where it is quietest; 0 for a force beside which nothing is compared",
+            doc="level that is subtracted from the driving channel",
+            default="the channel's level where it is quietest; 0 for a force if nothing is compared",
         ),
     ] = None
     start: Annotated[
         Finite | None,
         Rule(
             unit="s",
-            doc="where the simulation begins, on the clock of the channel that drives; without one, of the first that "
-            "is compared",
+            doc="start of the simulation on the clock of the driving channel; without a driving channel, on the clock "
+            "of the first compared channel",
             default="the first sample",
         ),
     ] = None
     stop: Annotated[
-        Finite | None, Rule(unit="s", doc="where the simulation ends", default="the last sample")
+        Finite | None,
+        Rule(unit="s", doc="end of the simulation on the same clock", default="the last sample"),
     ] = None
     most_lag: Annotated[
         Positive | None,
@@ -103,7 +104,7 @@ class Replay(SceneTable):
         Positive | None,
         Rule(
             unit="s",
-            doc="lag and polarity are found within so much of the start of the event",
+            doc="time from the start of the event on in which lag and polarity are found",
             default="from half a dominant period before to three after the onset",
         ),
     ] = None
@@ -112,14 +113,16 @@ class Replay(SceneTable):
         Rule(
             unit="s",
             hint="Without it the lag is estimated from the start of the event.",
-            doc="given, it is not estimated",
+            doc="a lag that is given is not estimated",
             default="found; 0 for channels of one trigger",
         ),
     ] = None
     polarity: Annotated[
         Literal[-1, 1] | None,
         Rule(
-            "1 or -1", doc="1 or -1; given, it is not found", default="found; 1 for channels of one trigger"
+            "1 or -1",
+            doc="1 or -1; a polarity that is given is not estimated",
+            default="found; 1 for channels of one trigger",
         ),
     ] = None
     peaks: Annotated[

@@ -20,16 +20,16 @@ class SampleTable(SceneTable):
     design: Annotated[
         DesignName,
         Rule(
-            doc='`"random"`; `"sobol"`: evenly spread, for a power of 2 of points; `"saltelli"`: that of '
-            "`vibroimpact sensitivity`, keys + 2 runs for each of a power of 2 of points"
+            doc='`"random"`; `"sobol"`: evenly spread, `points` is a power of 2; `"saltelli"`: for `vibroimpact '
+            "sensitivity`, `points` is a power of 2, and each of these points has keys + 2 runs"
         ),
     ]
     points: Annotated[
         int,
         Field(ge=1, le=MOST_POINTS_PER_AXIS),
-        Rule(doc="points that are drawn; more keep those there were"),
+        Rule(doc="number of drawn points; a larger number can keep the earlier points, see below"),
     ]
-    seed: Annotated[int, Field(ge=0, le=10**9), Rule(doc="another one draws other points")] = 0
+    seed: Annotated[int, Field(ge=0, le=10**9), Rule(doc="another seed draws other points")] = 0
 
 
 class AdaptiveTable(SceneTable):
@@ -38,13 +38,14 @@ class AdaptiveTable(SceneTable):
     tolerance: Annotated[
         Finite,
         Field(gt=0),
-        Rule(doc="intervals where the motion jumps are halved until they are no wider"),
+        Rule(doc="intervals where the motion jumps are halved until they are no wider than this"),
     ]
     at_most: Annotated[
         int | None,
         Field(ge=2, le=MOST_POINTS_PER_AXIS),
         Rule(
-            doc="points of the whole sweep; of two adaptive axes one says it, or both the same",
+            doc="largest number of points of the whole sweep; with two adaptive axes one of them has it, or both have "
+            "the same number",
             default="required",
         ),
     ] = None
@@ -72,7 +73,7 @@ class AxisTable(SceneTable):
         Literal["linear", "log"],
         Rule(
             hint="log: each value over the one before is the same.",
-            doc='`"linear"`; `"log"`: each value of a range over the one before is the same, with ends of one sign',
+            doc='`"linear"`: equal steps; `"log"`: equal ratios of neighbouring values, and both ends have one sign',
         ),
     ] = "linear"
     values: Annotated[
@@ -87,24 +88,28 @@ class AxisTable(SceneTable):
         Rule(
             "a name of small letters, digits and _",
             hint="Keys with the same name move together.",
-            doc="name of the dimension of keys that move together, of as many values each",
+            doc="keys with the same name move together, along a dimension of this name; all have equally many values",
         ),
     ] = None
     distribution: Annotated[
         Literal["uniform", "log-uniform", "normal"] | None,
         Rule(
             hint="Uniform and log-uniform go from low to high; normal has a mean and a deviation.",
-            doc='instead of a range: values are drawn as `sample` says; `"uniform"`, `"log-uniform"`, `"normal"`',
+            doc='instead of a range: `"uniform"`, `"log-uniform"`, `"normal"`; values are drawn as `sample` says',
         ),
     ] = None
-    low: Annotated[Finite | None, Rule(doc="lowest value of a distribution; normal ones may do without")] = (
-        None
-    )
-    high: Annotated[Finite | None, Rule(doc="highest value of a distribution; likewise")] = None
-    mean: Annotated[Finite | None, Rule(doc="of a normal distribution, before it is cut off")] = None
+    low: Annotated[
+        Finite | None, Rule(doc="lowest value of a distribution; optional for a normal distribution")
+    ] = None
+    high: Annotated[
+        Finite | None, Rule(doc="highest value of a distribution; optional for a normal distribution")
+    ] = None
+    mean: Annotated[
+        Finite | None, Rule(doc="mean of a normal distribution, before `low` and `high` cut it off")
+    ] = None
     deviation: Annotated[
         Annotated[Finite, Field(gt=0)] | None,
-        Rule(doc="standard deviation of a normal distribution; likewise"),
+        Rule(doc="standard deviation of a normal distribution, before `low` and `high` cut it off"),
     ] = None
     adaptive: Annotated[
         AdaptiveTable | None,

@@ -100,7 +100,7 @@ class BeamBody(BodyTable):
         Rule(
             f'a whole number from 1 to {MOST_MODES}, or "auto"',
             sweepable=True,
-            doc="1 to 64; a coefficient of restitution has a meaning only together with it; "
+            doc="1 to 64; a coefficient of restitution has a meaning only together with this number; "
             '`"auto"`: the fewest that meet `execution.tolerance`, see [below](#how-many-modes)',
         ),
     ] = 4
@@ -109,8 +109,8 @@ class BeamBody(BodyTable):
         Rule(
             hint="It needs stops that yield.",
             default="false",
-            doc="the last of the modes, one for each place of a stop, are not natural ones but what all modes beyond "
-            "give way under a force there, so that the beam is not too stiff for its stops; they have to yield",
+            doc="`true`: residual vectors replace the last modes, one for each place of a stop, so that the beam is "
+            "not too stiff at its stops, see [below](#how-many-modes); all stops have to yield",
         ),
     ] = None
     damping_ratio: Annotated[
@@ -152,7 +152,7 @@ class BeamBody(BodyTable):
             unit="m",
             hint="One for each mode.",
             fmu="modal_displacement_start[i]",
-            doc="of the modes: the displacement at s is the sum of shape(s) times these; at most one for each mode. "
+            doc="one number for each mode, or fewer: the displacement at s is the sum of shape(s) times these numbers. "
             "The beam's FMU refuses a start beyond a rigid stop",
             default="0",
         ),
@@ -163,7 +163,7 @@ class BeamBody(BodyTable):
             unit="m/s",
             hint="One for each mode.",
             fmu="modal_velocity_start[i]",
-            doc="likewise",
+            doc="one number for each mode, or fewer",
             default="0",
         ),
     ] = ()

@@ -81,7 +81,13 @@ class ChainBody(BodyTable):
     ] = 0.0
     far_damping: Annotated[
         NotNegative,
-        Rule(unit="N s/m", hint=_FREE_END, fmu="far_damping", effect=DAMPING, doc="likewise a dashpot"),
+        Rule(
+            unit="N s/m",
+            hint=_FREE_END,
+            fmu="far_damping",
+            effect=DAMPING,
+            doc="a dashpot between the last mass and the ground behind it",
+        ),
     ] = 0.0
     modes: Annotated[
         ModeCount | None,
@@ -89,7 +95,7 @@ class ChainBody(BodyTable):
             f'a whole number from 1 to {MOST_MODES}, or "auto"',
             sweepable=True,
             hint="The slowest ones are simulated.",
-            doc='1 to the number of masses, the slowest; `"auto"`: the fewest that meet `execution.tolerance`, '
+            doc='1 to the number of masses: the slowest modes; `"auto"`: the fewest that meet `execution.tolerance`, '
             "see [below](#how-many-modes)",
             default="all",
         ),
