@@ -99,7 +99,7 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
         )
     if record.inflation > 1.0:
         yield (
-            f"Neighbouring rests are correlated ({record.correlation:.2f}): coloured noise or motion that the model "
+            f"Neighbouring residuals are correlated ({record.correlation:.2f}): coloured noise or motion that the model "
             f"lacks. Standard errors are {record.inflation:.2f} times those of white noise."
         )
     if record.trajectory is not None and len(record.flights) > MOST_IMPACTS:

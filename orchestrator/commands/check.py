@@ -107,10 +107,10 @@ def _trial(trial: Trial) -> str:
     if trial.message:
         text = " ".join(trial.message.split())
         return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {text}"
-    alike = "; what follows takes all points to be like it" if at else ""
+    alike = "; the lines below assume that all points are like it" if at else ""
     if trial.lane_seconds is not None:
         alike = (
-            f"; {duration(trial.lane_seconds)} each of {LANE_TRIALS} at once, of which follows what all take"
+            f"; {duration(trial.lane_seconds)} with {LANE_TRIALS} points at once, which the lines below assume"
         )
     return f"{where}{duration(trial.seconds)}, {counted(trial.impacts, 'impact')}, {size(trial.size)} of results{alike}"
 

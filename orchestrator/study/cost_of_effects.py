@@ -91,7 +91,7 @@ class CostOfEffects(Study[Share]):
         if self.found:
             full = float(np.nanmedian([share.full for share in self.found]))
             say(f"A run takes {duration(full)}; shares overlap.")
-        say(f"Not asked for, and not simulated: {', '.join(not_called(self.scene)) or 'nothing'}.")
+        say(f"Absent from the scene, and not simulated: {', '.join(not_called(self.scene)) or 'nothing'}.")
 
 
 def _print_motions(shares: Sequence[Share], system: UnitSystem) -> None:

@@ -59,7 +59,7 @@ def test_effects_leave_a_table_a_dataset_and_a_figure(scene: Path, monkeypatch: 
     done = in_this_process("effects", str(scene), "-o", str(parts), "--figure", str(figure))
     assert done.returncode == 0, done.stderr
     assert "damping" in done.stdout
-    assert "Not asked for, and not simulated: forcing, " in done.stdout
+    assert "Absent from the scene, and not simulated: forcing, " in done.stdout
     with open_measured(parts) as found:
         assert set(found["name"].values) == {"damping", "record of impacts"}
     assert in_this_process("plot", str(parts), "-o", str(scene.with_name("p.png"))).returncode == 0
