@@ -35,7 +35,7 @@ class ComponentTable(SceneTable):
         Rule(
             "a path of an FMU file, or the name of a shipped component",
             hint='For example "ball.fmu".',
-            doc="a file name that ends in `.fmu`, from the folder of the scene file; or a shipped component: "
+            doc="a path that ends in `.fmu`, relative to the folder of the scene file; or a shipped component: "
             '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, `"LoadCell"`, `"Exciter"`, '
             '`"Noise"`, `"AnalogInput"`, in any spelling',
         ),
@@ -44,7 +44,7 @@ class ComponentTable(SceneTable):
         Literal["3.0", "2.0"] | None,
         Rule(
             '"3.0" or "2.0", in quotes',
-            doc='`"3.0"`, `"2.0"`; only of a shipped component',
+            doc='`"3.0"`, `"2.0"`; only for a shipped component',
             default='`"3.0"`',
         ),
     ] = None
@@ -52,7 +52,7 @@ class ComponentTable(SceneTable):
         dict[str, object],
         Rule(
             'a table such as { "mass" = 1.0, "contact[1].law" = "external" }',
-            doc="start values by variable name, names with dots or brackets in quotes",
+            doc="start values by variable name; names with dots or brackets stand in quotes",
             default="empty",
         ),
     ] = Field(default_factory=dict)
@@ -61,7 +61,7 @@ class ComponentTable(SceneTable):
         Rule(
             "0 < tolerance <= 1",
             hint="It is the relative tolerance of the solver inside the FMU.",
-            doc="relative tolerance that the FMU is set up with, for the solver inside it; only of a file",
+            doc="relative tolerance of the solver inside the FMU; only for an FMU from a file",
             default="the FMU's own",
         ),
     ] = None
@@ -77,10 +77,10 @@ class ConnectionTable(SceneTable):
         _Text,
         replace(
             _VARIABLE_RULE,
-            doc="an input, or a tunable parameter, which changes at events; each is fed by one connection at most",
+            doc="an input, or a tunable parameter, which changes at events; at most one connection may feed it",
         ),
     ] = Field(alias="to")
-    gain: Annotated[Finite, Rule(doc="the input is gain times the output; between real numbers only")] = 1.0
+    gain: Annotated[Finite, Rule(doc="the input is gain times the output; only between real numbers")] = 1.0
     gain_unit: Annotated[
         _Text | None,
         Rule(
@@ -128,9 +128,9 @@ class StopContactTable(SceneTable):
         Positive | None,
         Rule(
             unit="kg",
-            doc="effective mass of the contact point, within 5 % of the mass that a trial step finds; it determines "
-            "the steps of a contact",
-            default="found by a trial step; required of a body that cannot restore its state",
+            doc="effective mass of the contact point, within 5 % of the mass that a trial step finds; it sets the "
+            "length of the steps in a contact",
+            default="found by a trial step; required for a body that cannot restore its state",
         ),
     ] = None
     stop: Annotated[
@@ -139,7 +139,8 @@ class StopContactTable(SceneTable):
     side: Annotated[
         Side | None,
         Rule(
-            doc='`"upper"`: the stop is above, `"lower"`: below; for a stop without a parameter `side`',
+            doc='`"upper"`: the stop is above the body, `"lower"`: below it; only for a stop without a parameter '
+            "`side`",
             default="the stop's own",
         ),
     ] = None
@@ -157,14 +158,14 @@ class StopContactTable(SceneTable):
         _Text,
         replace(
             _name_of("the stop's force", "applied_force"),
-            doc="the name of the stop's force, >= 0, which presses the body away",
+            doc="the name of the output of the stop with its force, >= 0, which presses the body away",
         ),
     ] = "applied_force"
 
 
 _PAIR_LAWS = Rule(
     "the name of a contact law",
-    doc='`"restitution"`, `"kelvin_voigt"`, `"hertz"`, `"hunt_crossley"`; decides which other keys there are',
+    doc='`"restitution"`, `"kelvin_voigt"`, `"hertz"`, `"hunt_crossley"`; each law has its own further keys',
 )
 
 
@@ -192,17 +193,18 @@ class PairTable(SceneTable):
             'two points of bodies such as ["a.mass[2]", "b.tip"]',
             item='a point of a body such as "a.mass[2]"',
             doc='two points: `"a"` (of an Oscillator), `"a.mass[2]"` (of a Chain), `"a.tip"` (of a Beam), or any '
-            '`"a.contact[1]"` with its place among the parameters; the gap is clearance + displacement of the second '
-            "- displacement of the first",
+            '`"a.contact[1]"` with its place among the parameters; the gap is the clearance, plus the displacement of '
+            "the second point, minus the displacement of the first",
         ),
     ]
-    clearance: Annotated[Finite, Rule(unit="m", doc="gap where both displacements are 0")] = 0.0
+    clearance: Annotated[Finite, Rule(unit="m", doc="gap while both displacements are 0")] = 0.0
     bodies: Annotated[
         dict[str, BodyPointTable],
         Rule(
             "a table of bodies",
             hint='For example bodies = { ball = { displacement = "x", velocity = "v", force = "f", mass = 2.0 } }.',
-            doc="points of bodies of other tools that can restore their state, by their names in `between`",
+            doc="for each body of another tool: its name in `between`, and the variables of its point; the body must "
+            "be able to restore its state",
             default="none",
         ),
     ] = Field(default_factory=dict)
@@ -252,7 +254,7 @@ PAIR_MODELS: dict[str, type[BodyPair]] = {
 class GeneralRecord(SceneTable):
     """`[record]` of a general scene: transient time, recorded time, and recorded variables."""
 
-    transient_time: Annotated[NotNegative, Rule(unit="s", doc="not recorded")] = 0.0
+    transient_time: Annotated[NotNegative, Rule(unit="s", doc="time before the recording")] = 0.0
     recorded_time: Annotated[Positive, Rule(unit="s")]
     variables: Annotated[
         tuple[Reference, ...],
@@ -260,7 +262,7 @@ class GeneralRecord(SceneTable):
         replace(
             _VARIABLE_RULE,
             expected='an array such as ["ball.h", "ball.v"]',
-            doc="numbers, and true or false, of any component; each once",
+            doc="variables of any component, numbers or true/false; each once",
             default="empty",
         ),
     ] = ()
@@ -269,7 +271,7 @@ class GeneralRecord(SceneTable):
         Rule(
             unit="samples per s",
             doc="at most 10^8 samples per run",
-            default="required beside `variables`",
+            default="required with `variables`",
         ),
     ] = None
-    events: Annotated[bool, Rule(doc="the events that were located")] = True
+    events: Annotated[bool, Rule(doc="whether the located events are recorded")] = True

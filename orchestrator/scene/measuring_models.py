@@ -47,7 +47,7 @@ class Sensor(SceneTable):
     location: Annotated[
         Fraction | None,
         location_rule(
-            "beams only; not a supported end",
+            "beams only; a point that moves",
             "left out: the tip of a clamped-free beam, else the point of `stop[1]`, or the middle",
         ),
     ] = None
@@ -55,24 +55,24 @@ class Sensor(SceneTable):
         Finite,
         Rule(
             hint="A reading is gain * value + offset, in the unit of its channel.",
-            doc="reading per value: of `sensor.displacement` in V/m, of `sensor.velocity` in V s/m, of "
-            "`sensor.acceleration` in V s^2/m; in replays reading and value have the unit of the channel, or, if they "
-            "differ in kind, the gain is in the unit of the channel per SI unit",
+            doc="V/m for `sensor.displacement`, V s/m for `sensor.velocity`, V s^2/m for `sensor.acceleration`; in a "
+            "replay a plain number if the channel measures the same quantity, otherwise the unit of the channel per SI "
+            "unit",
         ),
     ] = 1.0
     offset: Annotated[
         Finite,
         Rule(
             hint="It has the unit of the reading.",
-            doc="in V; in replays in the unit of the reading: without an offset, the level of the channel before its "
-            "event is subtracted instead",
+            doc="in V; in a replay in the unit of the channel; a replay without `offset` subtracts the level of the "
+            "channel before its event",
         ),
     ] = 0.0
     range: Annotated[
         NotNegative | None,
         Rule(
             hint="Use 0 for a sensor without an end.",
-            doc="in V: readings are cut off at +- this; not in replays",
+            doc="in V: readings are limited to +- range; not in replays",
             default="0: no limit",
         ),
     ] = None
@@ -84,30 +84,30 @@ class LoadCell(SceneTable):
     stop: Annotated[
         int,
         Field(ge=1, le=8),
-        Rule(hint="Stops count from 1.", doc="the stop whose force it measures"),
+        Rule(hint="Stops count from 1.", doc="number of the stop whose force the cell measures"),
     ] = 1
-    sensitivity: Annotated[Finite, Rule(unit="V/N", doc="volts per newton; negative for an inverted signal")]
+    sensitivity: Annotated[Finite, Rule(unit="V/N", doc="volts per newton; negative for an inverted cell")]
     natural_frequency: Annotated[
         NotNegative,
         Rule(
             unit="Hz",
             hint="Use 0 for a cell that follows the force at once.",
-            doc="of the cell's ring; 0: it follows the force at once",
+            doc="natural frequency of the cell's ring; 0: the cell follows the force without delay",
         ),
     ] = 0.0
     damping_ratio: Annotated[
-        NotNegative, Rule(unit="1", hint="A cell does not feed energy.", doc="of the ring")
+        NotNegative, Rule(unit="1", hint="A cell does not feed energy.", doc="damping ratio of the ring")
     ] = 0.0
     offset: Annotated[Finite, Rule(unit="V", doc="voltage without a force, at time 0")] = 0.0
-    drift: Annotated[Finite, Rule(unit="V/s", doc="change of that voltage")] = 0.0
+    drift: Annotated[Finite, Rule(unit="V/s", doc="rate of change of the offset")] = 0.0
     contact_duration: Annotated[
         Positive | None,
         Rule(
             unit="s",
             hint="An impact on a rigid stop is seen as a half sine of this duration.",
-            doc="an impact on a rigid stop is seen as a half sine of this duration and the same impulse, which begins "
-            "at the impact; a stop that yields has a force of its own",
-            default="required for a rigid stop, refused for others",
+            doc="an impact on a rigid stop gives the cell a half sine with this duration and the impulse of the "
+            "impact, from the impact on",
+            default="required for a rigid stop; not allowed for a stop that yields",
         ),
     ] = None
 
@@ -116,24 +116,24 @@ class Exciter(SceneTable):
     """`[exciter]`: force = (gain volts + offset) / (1 +- displacement / distance)^2."""
 
     gain: Annotated[
-        Finite, Rule(unit="N/V", doc="newtons per volt; the amplitude of `[forcing]` is in V beside it")
+        Finite, Rule(unit="N/V", doc="newtons per volt; with this table the amplitude of `[forcing]` is in V")
     ]
-    offset: Annotated[Finite, Rule(unit="N", doc="constant force, at displacement 0")] = 0.0
+    offset: Annotated[Finite, Rule(unit="N", doc="constant force without a voltage, at displacement 0")] = 0.0
     distance: Annotated[
         NotNegative,
         Rule(
             unit="m",
             hint="Use 0 for a force that does not depend on the displacement.",
             effect=FALLING_FORCE,
-            doc="distance of the exciter from the body at displacement 0: the force falls with the square of the "
-            "distance, and is held from sample to sample of `[daq]`; 0: it does not depend on the displacement",
+            doc="distance of the exciter from the body at displacement 0: the force falls with the square of the true "
+            "distance, and is held from sample to sample of `[daq]`; 0: the force does not depend on the displacement",
         ),
     ] = 0.0
     side: Annotated[
         Literal["lower", "upper"],
         Rule(
             hint="lower: a positive displacement leads away from the exciter.",
-            doc='`"lower"`: a positive displacement leads away from the exciter; `"upper"`: towards it',
+            doc='`"lower"`: a positive displacement moves the body away from the exciter; `"upper"`: towards it',
         ),
     ] = "lower"
 
@@ -148,13 +148,13 @@ class Noise(SceneTable):
     seed: Annotated[
         int,
         Field(ge=0, le=MOST_SEED),
-        Rule(doc="another seed draws other noise; each run of a campaign has noise of its own"),
+        Rule(doc="another seed gives other noise; each run of a campaign has its own noise"),
     ] = 0
     sensor: Annotated[
         NotNegative, _noise("`sensor.displacement`, `sensor.velocity`, `sensor.acceleration`")
     ] = 0.0
     load_cell: Annotated[NotNegative, _noise("`load_cell`")] = 0.0
-    drive: Annotated[NotNegative, _noise("`drive`, where it is read back")] = 0.0
+    drive: Annotated[NotNegative, _noise("the measured `drive`")] = 0.0
 
     def of(self, channel: str) -> float:
         """Return the rms of the noise of a channel, V.
@@ -175,14 +175,14 @@ class Daq(SceneTable):
     bits: Annotated[
         int, Field(ge=2, le=32), Rule(doc="a sample is one of 2^bits steps from -range to +range")
     ]
-    range: Annotated[Positive, Rule(unit="V", doc="samples end at +- this")]
+    range: Annotated[Positive, Rule(unit="V", doc="samples are limited to +- range")]
     skew: Annotated[
         NotNegative,
         Rule(
             unit="s",
             hint="Use 0 for channels that are sampled at once.",
-            doc="time from one channel to the next, in the order of `record.time_series.variables`; all of them "
-            "within one sample",
+            doc="time from one channel to the next, in the order of `record.time_series.variables`; all channels "
+            "must be sampled within one sampling interval",
         ),
     ] = 0.0
     clock_error: Annotated[
@@ -191,8 +191,8 @@ class Daq(SceneTable):
         Rule(
             "parts per million from -1e5 to 1e5",
             unit="ppm",
-            doc="the clock is faster by this than it says: sample k is taken k / (rate (1 + clock_error / 10^6)) after "
-            "the first, and has the time k / rate",
+            doc="the true rate of the clock is rate (1 + clock_error / 10^6): sample k is taken k / (true rate) after "
+            "the first sample, but its recorded time is k / rate",
         ),
     ] = 0.0
 
