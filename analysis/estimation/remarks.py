@@ -99,8 +99,8 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
         )
     if record.inflation > 1.0:
         yield (
-            f"Neighbouring residuals are correlated ({record.correlation:.2f}): coloured noise or motion that the model "
-            f"lacks. Standard errors are {record.inflation:.2f} times those of white noise."
+            f"Neighbouring residuals are correlated ({record.correlation:.2f}): coloured noise, or motion outside the "
+            f"model. Standard errors are {record.inflation:.2f} times those of white noise."
         )
     if record.trajectory is not None and len(record.flights) > MOST_IMPACTS:
         yield f"The trajectories are those of about {MOST_IMPACTS} impacts, the first."

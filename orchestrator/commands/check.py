@@ -109,9 +109,7 @@ def _trial(trial: Trial) -> str:
         return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {text}"
     alike = "; the lines below assume that all points are like it" if at else ""
     if trial.lane_seconds is not None:
-        alike = (
-            f"; {duration(trial.lane_seconds)} with {LANE_TRIALS} points at once, which the lines below assume"
-        )
+        alike = f"; {duration(trial.lane_seconds)} with {LANE_TRIALS} points at once, which the lines below assume"
     return f"{where}{duration(trial.seconds)}, {counted(trial.impacts, 'impact')}, {size(trial.size)} of results{alike}"
 
 

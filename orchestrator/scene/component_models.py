@@ -139,8 +139,7 @@ class StopContactTable(SceneTable):
     side: Annotated[
         Side | None,
         Rule(
-            doc='`"upper"`: the stop is above the body, `"lower"`: below it; only for a stop without a parameter '
-            "`side`",
+            doc='`"upper"`: the stop is above the body, `"lower"`: below it; for a stop without `side`',
             default="the stop's own",
         ),
     ] = None
@@ -178,8 +177,7 @@ class BodyPointTable(SceneTable):
     velocity: Annotated[_Text, _name_of("an output of the body: the velocity of that point", "v")]
     force: Annotated[_Text, _name_of("an input of the body: the force on that point", "f")]
     mass: Annotated[
-        Positive,
-        Rule(unit="kg", doc="effective mass of the point, within 5 % of the mass that a trial step finds"),
+        Positive, Rule(unit="kg", doc="effective mass of the point, within 5 % of a trial step's mass")
     ]
 
 
@@ -203,8 +201,7 @@ class PairTable(SceneTable):
         Rule(
             "a table of bodies",
             hint='For example bodies = { ball = { displacement = "x", velocity = "v", force = "f", mass = 2.0 } }.',
-            doc="for each body of another tool: its name in `between`, and the variables of its point; the body must "
-            "be able to restore its state",
+            doc="points of bodies of other tools, by their names in `between`; each body can restore its state",
             default="none",
         ),
     ] = Field(default_factory=dict)

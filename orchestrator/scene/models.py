@@ -134,8 +134,7 @@ class Forcing(SceneTable):
             unit="rad",
             fmu="forcing.phase",
             doc="phase of the force at time 0. A recording begins and ends at forcing phase 0. With another phase at "
-            "time 0 it begins up to one period later, even if `transient_periods = 0`; the motion before is not "
-            "recorded",
+            "time 0 it begins up to one period later, even if `transient_periods = 0`",
         ),
     ] = 0.0
     location: Annotated[
@@ -332,8 +331,7 @@ class Execution(SceneTable):
         int,
         Field(ge=1, le=MOST_IMPACTS_PER_POINT),
         Rule(
-            doc="number of impacts, touch-downs and rests, recorded or not, at which a point ends with the outcome "
-            "impact_limit"
+            doc="impacts, touch-downs and rests, recorded or not, that end a point with the outcome impact_limit"
         ),
     ] = DEFAULT_IMPACT_LIMIT
     deadline: Annotated[

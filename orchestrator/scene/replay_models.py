@@ -89,8 +89,7 @@ class Replay(SceneTable):
         ),
     ] = None
     stop: Annotated[
-        Finite | None,
-        Rule(unit="s", doc="end of the simulation on the same clock", default="the last sample"),
+        Finite | None, Rule(unit="s", doc="end of the simulation on that clock", default="the last sample")
     ] = None
     most_lag: Annotated[
         Positive | None,
@@ -120,9 +119,7 @@ class Replay(SceneTable):
     polarity: Annotated[
         Literal[-1, 1] | None,
         Rule(
-            "1 or -1",
-            doc="1 or -1; a polarity that is given is not estimated",
-            default="found; 1 for channels of one trigger",
+            "1 or -1", doc="1 or -1; not estimated if given", default="found; 1 for channels of one trigger"
         ),
     ] = None
     peaks: Annotated[

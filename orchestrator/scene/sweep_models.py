@@ -44,8 +44,7 @@ class AdaptiveTable(SceneTable):
         int | None,
         Field(ge=2, le=MOST_POINTS_PER_AXIS),
         Rule(
-            doc="largest number of points of the whole sweep; with two adaptive axes one of them has it, or both have "
-            "the same number",
+            doc="largest number of points of the sweep; of two adaptive axes one has it, or both the same",
             default="required",
         ),
     ] = None
@@ -98,15 +97,9 @@ class AxisTable(SceneTable):
             doc='instead of a range: `"uniform"`, `"log-uniform"`, `"normal"`; values are drawn as `sample` says',
         ),
     ] = None
-    low: Annotated[
-        Finite | None, Rule(doc="lowest value of a distribution; optional for a normal distribution")
-    ] = None
-    high: Annotated[
-        Finite | None, Rule(doc="highest value of a distribution; optional for a normal distribution")
-    ] = None
-    mean: Annotated[
-        Finite | None, Rule(doc="mean of a normal distribution, before `low` and `high` cut it off")
-    ] = None
+    low: Annotated[Finite | None, Rule(doc="lowest value; optional for a normal distribution")] = None
+    high: Annotated[Finite | None, Rule(doc="highest value; optional for a normal distribution")] = None
+    mean: Annotated[Finite | None, Rule(doc="mean of a normal distribution before its cut")] = None
     deviation: Annotated[
         Annotated[Finite, Field(gt=0)] | None,
         Rule(doc="standard deviation of a normal distribution, before `low` and `high` cut it off"),

@@ -29,11 +29,7 @@ FREQUENCY_SLOPE = (
     "[below](#motion-that-depends-on-its-amplitude)",
 )
 DAMPING_SLOPE = ("damping_slope", "1/m", "change of the damping ratio per metre of amplitude")
-DAMPING_RECIPROCAL = (
-    "damping_reciprocal",
-    "m",
-    "this number over the amplitude is added to the damping ratio",
-)
+DAMPING_RECIPROCAL = ("damping_reciprocal", "m", "its ratio to the amplitude is added to the damping ratio")
 
 
 class BodyTable(SceneTable):

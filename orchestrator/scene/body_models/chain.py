@@ -86,7 +86,7 @@ class ChainBody(BodyTable):
             hint=_FREE_END,
             fmu="far_damping",
             effect=DAMPING,
-            doc="a dashpot between the last mass and the ground behind it",
+            doc="a dashpot beside this spring",
         ),
     ] = 0.0
     modes: Annotated[
