@@ -81,13 +81,7 @@ class ChainBody(BodyTable):
     ] = 0.0
     far_damping: Annotated[
         NotNegative,
-        Rule(
-            unit="N s/m",
-            hint=_FREE_END,
-            fmu="far_damping",
-            effect=DAMPING,
-            doc="a dashpot beside this spring",
-        ),
+        Rule(unit="N s/m", hint=_FREE_END, fmu="far_damping", effect=DAMPING, doc="a dashpot beside it"),
     ] = 0.0
     modes: Annotated[
         ModeCount | None,
