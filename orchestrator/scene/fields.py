@@ -1,7 +1,7 @@
-"""The rule of a field of a scene: accepted values, unit, FMU variable, and its line in docs/scene.md.
+"""The rule of a field of a scene: accepted values, unit, FMU variable, and its line in docs/scene.
 
 A field is an annotation with constraints and a `Rule`. It is the source of messages, sweepable keys, units in datasets,
-parameters of FMUs, bounds of a fit, and the tables of docs/scene.md.
+parameters of FMUs, bounds of a fit, and the tables of docs/scene.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class Rule:
     effect : str
         Effect that a value > 0 asks for, in the words of `vibroimpact check`.
     doc : str
-        Text in docs/scene.md after the bounds; by default the hint.
+        Text in docs/scene after the bounds; by default the hint.
     default : str
-        Text in docs/scene.md on the default, if the value alone is not clear.
+        Text in docs/scene on the default, if the value alone is not clear.
     """
 
     expected: str = ""

@@ -1,7 +1,7 @@
 """The tables of a scene file as frozen pydantic models.
 
 A field is defined in one place: its constraints, its default, and its `Rule`. Messages, keys of sweeps, units of
-datasets, parameters of FMUs and the tables of docs/scene.md come from there (`fields`). Rules between fields or tables
+datasets, parameters of FMUs and the tables of docs/scene come from there (`fields`). Rules between fields or tables
 are in `rules`. A new contact law is one more model here, in `Stop`; a new kind of body is one more in `body_models`.
 The tables of a measuring chain, a replay and a sweep are in `measuring_models`, `replay_models` and `sweep_models`.
 """
