@@ -68,9 +68,10 @@ def fitting(data: Data) -> list[str]:
 
 def _dataset_of(data: Any) -> Any:
     """Return the dataset of a result; objects of a family are drawn themselves."""
-    if isinstance(data, (xr.Dataset, *filter(None, (family.type for family in FAMILIES.values())))):
+    whole = (type, xr.Dataset, *filter(None, (family.type for family in FAMILIES.values())))
+    if isinstance(data, whole) or not hasattr(data, "dataset"):
         return data
-    found = getattr(data, "dataset", data)
+    found = data.dataset
     return found() if callable(found) else found
 
 

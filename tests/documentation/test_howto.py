@@ -32,6 +32,7 @@ def blocks_of(recipe: str) -> list[tuple[str, str]]:
 
 def test_each_recipe_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One test: a recipe may use the files of those above it."""
+    assert set(NEEDED) <= {name for name, _ in RECIPES}
     (tmp_path / "examples").mkdir()
     for path in EXAMPLES.iterdir():
         (tmp_path / "examples" / path.name).symlink_to(path)

@@ -273,6 +273,11 @@ def test_runs_in_threads_are_those_of_one_thread():
         (lambda: vi.campaign(FREE, "c", workers=0), "workers: expected a whole number of 1 or more, got 0"),
         (lambda: vi.campaign(FREE, "c", workers="two"), "workers: expected a whole number of 1 or more"),
         (lambda: vi.replay(FREE, 3), "path: expected the name of a file or folder, got 3"),
+        (lambda: vi.draw(vi.Scene), "expected a dataset, a recording or a result, got ModelMetaclass"),
+        (
+            lambda: vi.draw(print),
+            "expected a dataset, a recording or a result, got builtin_function_or_method",
+        ),
         (lambda: vi.draw("run.nc"), "expected a dataset, a recording or a result, got str. open_dataset"),
         (lambda: vi.draw(vi.run(FREE), width="a"), "size: expected numbers, mm, got 'a'"),
         (lambda: vi.estimate_impacts(xr.DataArray([0.0, 1.0], {"time": [0.0, 1.0]}), 10.0), "got float"),
