@@ -139,7 +139,7 @@ class Operation:
     def fields(cls) -> Iterator[Field]:
         """Yield the arguments in their order."""
         hints = get_type_hints(cls, include_extras=True)
-        for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        for field in dataclasses.fields(cls):  # type: ignore[arg-type]  # the decorators below make each a dataclass
             hint = hints[field.name]
             assert get_origin(hint) is Annotated, f"{cls.__name__}.{field.name}: an argument without words"
             kind, words = get_args(hint)[:2]

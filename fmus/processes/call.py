@@ -116,7 +116,7 @@ def _ended(process: Process, order: bytes, seconds: float) -> tuple[bytes, bytes
     end = time.monotonic() + seconds
     process.say([LENGTH.pack(len(order)), order])
     # `communicate` would close the pipe, and so end the process
-    orders, process.stdin = process.stdin, None  # type: ignore[assignment]
+    orders, process.stdin = process.stdin, None  # type: ignore[assignment]  # Popen types it as always there
     is_killed = is_late = False
     try:
         while True:
