@@ -13,7 +13,7 @@ struct vi_door_structure {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;
-    vi_pressed pressed;
+    vi_pressed_cache pressed;
     vi_scan scan;
     int by_series; /* long rests too */
 };
