@@ -1,8 +1,8 @@
 /* The complex modes of a body on its present stops, kept for each set of stops on which it has rested.
  *
  * A body that chatters changes between few sets of stops, and returns to each of them many times. Modes of several
- * stops cost thousands of evaluations of a motion. The cache is no part of the state, as its contents follow from the
- * body: kept modes have the bits of modes that are found again.
+ * stops cost thousands of evaluations of a motion. The cache is no part of the state: its contents follow from the
+ * body. Kept modes have the bits of modes that are found again.
  */
 #ifndef VIBROIMPACT_PRESSED_CACHE_H
 #define VIBROIMPACT_PRESSED_CACHE_H

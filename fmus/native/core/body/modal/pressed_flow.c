@@ -303,13 +303,13 @@ double vi_pressed_step(const vi_pressed_sight *sight, const vi_pressed_flow *flo
                        double horizon)
 {
     const vi_pressed_modes *modes = &flow->pressed->modes;
-    vi_part sum[VI_TERMS + 1]; /* the response and the slow terms */
+    vi_part sum[VI_TERMS + 1], so_far = response_at(sight, flow, u); /* with the slow terms */
     double ripple[VI_TERMS];
-    sum[0] = response_at(sight, flow, u);
+    vi_part_keep(&sum[0], &so_far);
     for (int m = 0; m < modes->terms; ++m) {
         const vi_part term = term_at(sight->weight[m], part[m], modes->rate[m]);
-        sum[m + 1] = sum[m];
-        vi_part_add(&sum[m + 1], 1.0, &term);
+        vi_part_add(&so_far, 1.0, &term);
+        vi_part_keep(&sum[m + 1], &so_far);
         ripple[m] = term.reach;
     }
     return vi_rippling_step(sum, ripple, modes->terms, sight->offset, sight->sign, horizon);

@@ -13,8 +13,8 @@
 /* Segments by series after which a rest counts as long, for stops that yield and for held contacts. Most contacts with
  * stops that yield end earlier. */
 enum { PATIENCE = 16, PATIENCE_HELD = 4 };
-/* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms: with 64 modes a radian
- * by series costs as much. LEAST_REST: least length of a rest; times the number of modes where the modes must be found
+/* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms. A radian by series costs
+ * as much with 64 modes. LEAST_REST: least length of a rest; times the number of modes where the modes must be found
  * anew. */
 static const double LEAST_STEP = 2.0, LEAST_REST = 32.0;
 /* Least length of a rest, in radians times modes^2, for modes of several contacts or of coupled damping. */
