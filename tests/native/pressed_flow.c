@@ -11,7 +11,7 @@
 #include "body/modal/structure/structure.h"
 #include "check.h"
 
-enum { RUNS = 400, SEGMENTS = 40, BODIES = 3, SETS = 60 };
+enum { RUNS = 400, SEGMENTS = 40, BODIES = 3, SETS = 120 };
 
 typedef struct {
     vi_structure_model model;
@@ -32,9 +32,7 @@ static vi_structure body_of(parts *it, vi_pressed_cache *kept)
 /* Make the cache a new one. */
 static void forget(vi_pressed_cache *cache)
 {
-    for (int i = 0; i < VI_PRESSED_SETS; ++i) {
-        cache->set[i].known = VI_MODES_UNKNOWN;
-    }
+    memset(cache->stops, 0, sizeof cache->stops);
 }
 
 /* Damping of the modes. */
@@ -243,7 +241,7 @@ static bool same_terms(const vi_pressed *a, const vi_pressed *b)
 
 static void check_sets(uint64_t *seed)
 {
-    const vi_structure s = make(seed, 6 + (int)choice(seed, 3), 5, CLASSICAL), other_cache = body_of(&one, &fresh);
+    const vi_structure s = make(seed, 6 + (int)choice(seed, 3), 6, CLASSICAL), other_cache = body_of(&one, &fresh);
     int met[1 << VI_PORTS] = {0}, sets = 0, found = 0;
     for (int run = 0; run < SETS; ++run) {
         const int set = rest_on_some(seed);

@@ -165,6 +165,11 @@ VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], d
     facts[5] = structure->record.displacement_min;
 }
 
+VI_DOOR double vi_door_structure_work(const vi_door_structure *structure)
+{
+    return (double)(structure->state.budget.since_mark + structure->pressed.spent);
+}
+
 VI_DOOR int vi_door_structure_rows(vi_door_structure *structure, double rows[], int room)
 {
     vi_record *record = &structure->record;

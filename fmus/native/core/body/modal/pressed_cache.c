@@ -7,6 +7,9 @@
 #include "body/modal/held.h"
 #include "modes/pressed_modes.h"
 
+/* Cost of finding modes, in evaluations of one mode: on one contact over modes^2, on all contacts over modes^3. */
+enum { COST_OF_ONE = 8, COST_OF_ALL = 9 };
+
 /* ---- the contacts of a rest ---- */
 
 static bool is_linear(const vi_structure *s, int k)
@@ -78,17 +81,12 @@ static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
     return same;
 }
 
-/* Are the kept modes those of the body on these contacts, seen from the same points? */
-static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const vi_pressed_body *body,
-                     const int32_t port[])
+/* Are the kept modes of these contacts those of the body, seen from the same points? */
+static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const vi_pressed_body *body)
 {
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
-    bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
-                && pressed->body.contacts == body->contacts;
-    for (int i = 0; i < body->contacts && same; ++i) {
-        same = pressed->port[i] == port[i];
-    }
-    same = same && same_body(body, &pressed->body) && memcmp(pressed->observed, model->observed, size) == 0;
+    bool same = pressed->contacts == model->contacts && same_body(body, &pressed->body)
+                && memcmp(pressed->observed, model->observed, size) == 0;
     for (int l = 0; l < model->contacts && same; ++l) {
         same = memcmp(pressed->shape[l], model->shape[l], size) == 0;
     }
@@ -128,9 +126,9 @@ static void know_harmonic(vi_pressed *pressed, double angular_frequency)
     }
 }
 
-static void begin(vi_pressed *pressed, const vi_structure_model *model, const vi_pressed_body *body,
-                  const int32_t port[])
+static void begin(vi_pressed_cache *cache, vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
+    const vi_pressed_body *body = &cache->present;
     pressed->known = VI_MODES_NOT_FOUND;
     pressed->searched = 0;
     pressed->still.known = pressed->harmonic.known = 0;
@@ -140,26 +138,31 @@ static void begin(vi_pressed *pressed, const vi_structure_model *model, const vi
     memcpy(pressed->shape, model->shape, sizeof pressed->shape);
     memcpy(pressed->observed, model->observed, sizeof pressed->observed);
     const bool one = body->contacts == 1 && !body->coupled;
+    cache->spent += one ? (int64_t)COST_OF_ONE * body->modes * body->modes : 0;
     if (one && vi_pressed_modes_find(&pressed->modes, body)) {
         pressed->known = VI_MODES_OF_ONE;
         weigh_all(pressed, model);
     }
 }
 
-/* The set of the present contacts; a new set takes the place of the set used longest ago. Modes that follow the
+/* Place of the set of the present contacts; a new set takes the place of the set used longest ago. Modes that follow the
  * amplitude are never met again: all of their sets share one place. */
-static vi_pressed *set_of(vi_pressed_cache *cache, const vi_structure_model *model, const int32_t port[])
+static int place_of(vi_pressed_cache *cache, const vi_structure_model *model, const int32_t port[])
 {
-    vi_pressed *oldest = &cache->set[0];
-    for (int i = 0; i < VI_PRESSED_SETS; ++i) {
-        vi_pressed *set = &cache->set[i];
-        if (rests_as(set, model, &cache->present, port)) {
-            return set;
-        }
-        oldest = set->used < oldest->used ? set : oldest;
+    uint64_t stops = 0;
+    int oldest = 0;
+    for (int i = 0; i < cache->present.contacts; ++i) {
+        stops |= (uint64_t)1 << port[i];
     }
-    vi_pressed *place = model->varies ? &cache->set[0] : oldest;
-    begin(place, model, &cache->present, port);
+    for (int i = 0; i < VI_PRESSED_SETS; ++i) {
+        if (cache->stops[i] == stops && rests_as(&cache->set[i], model, &cache->present)) {
+            return i;
+        }
+        oldest = cache->used[i] < cache->used[oldest] ? i : oldest;
+    }
+    const int place = model->varies ? 0 : oldest;
+    cache->stops[place] = stops;
+    begin(cache, &cache->set[place], model, port);
     return place;
 }
 
@@ -169,10 +172,13 @@ const vi_pressed *vi_pressed_find(const vi_structure *s, bool all)
     int32_t port[VI_PORTS] = {0};
     const int contacts = vi_pressed_contacts(s, port);
     describe(s, port, contacts, &cache->present);
-    vi_pressed *pressed = set_of(cache, s->model, port);
-    pressed->used = ++cache->searches;
+    const int place = place_of(cache, s->model, port);
+    vi_pressed *pressed = &cache->set[place];
+    cache->used[place] = ++cache->searches;
     if (pressed->known == VI_MODES_NOT_FOUND && all && !pressed->searched) {
+        const int64_t modes = pressed->body.modes;
         pressed->searched = 1;
+        cache->spent += COST_OF_ALL * modes * modes * modes;
         if (vi_coupled_modes_find(&pressed->modes, &pressed->body, &cache->work)) {
             pressed->known = VI_MODES_OF_ALL;
             vi_coupled_equations_find(&pressed->still, &pressed->body, (vi_complex){0.0, 0.0});

@@ -13,19 +13,18 @@
 #include "modes/pressed_terms.h"
 
 /* Sets of stops whose modes are kept; a further set replaces the one that was used longest ago. */
-enum { VI_PRESSED_SETS = 16 };
+enum { VI_PRESSED_SETS = 32 };
 
 /* Observed quantities: displacements of the contacts and of the observed point, and forces of the contacts. */
 enum { VI_SEEN_OBSERVED = VI_PORTS, VI_SEEN_FORCE, VI_SEEN = VI_SEEN_FORCE + VI_PORTS };
 
-/* Knowledge of a rest's modes: not searched yet, found for one contact, found for all contacts, or not found. */
-typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_FOUND = 3 } vi_modes_known;
+/* Knowledge of the modes of a set: not found, for one contact, or for all contacts. */
+typedef enum { VI_MODES_NOT_FOUND = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2 } vi_modes_known;
 
 /* The body's modes on one set of stops. */
 typedef struct {
     int32_t known;          /* vi_modes_known */
     int32_t searched;       /* the modes of all contacts have been searched for */
-    int64_t used;           /* number of the last search that this set answered */
     int32_t contacts;       /* of the body */
     int32_t port[VI_PORTS]; /* contact of the body, for each pressed contact */
     vi_pressed_body body;
@@ -37,7 +36,10 @@ typedef struct {
 
 struct vi_pressed_cache {
     int64_t searches; /* in the cache */
+    int64_t spent;    /* on finding modes, in evaluations of one mode */
     vi_pressed_body present; /* the body on its present contacts */
+    uint64_t stops[VI_PRESSED_SETS]; /* of each set, one bit for each contact; 0: the place is empty */
+    int64_t used[VI_PRESSED_SETS];   /* number of the last search that the set answered */
     vi_pressed set[VI_PRESSED_SETS];
     vi_coupled_work work;
 };
