@@ -1,11 +1,12 @@
-/* Local segments of several modes begun together equal those of single modes to the last bit. At their start and end
- * they agree with the given displacement and velocity. */
+/* Local segments of several modes begun together equal those of single modes to the last bit, and so do their parts. At
+ * their start and end they agree with the given displacement and velocity. */
 #include "motion/flow.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "check.h"
+#include "motion/mode_series.h"
 
 enum { MOST = 20 };
 
@@ -16,6 +17,23 @@ static void draw_mode(uint64_t *seed, vi_mode *mode)
     const double damping = 2.0 * ratios[choice(seed, 4)] * sqrt(mass * stiffness);
     vi_mode_start(mode, mass, damping, stiffness, choice(seed, 4) ? uniform(seed, -2.0, 2.0) : 0.0,
                   choice(seed, 4) ? uniform(seed, 0.1, 5.0) : 0.0);
+}
+
+/* Parts of modes side by side end at the first mode that is no series, and at the last whole group. */
+static void check_parts(uint64_t *seed, vi_segment segments[], int count, double length)
+{
+    vi_part parts[MOST], alone;
+    const int split = choice(seed, 4) ? count : (int)choice(seed, (unsigned)count);
+    const double u = uniform(seed, 0.0, 1.0) * length;
+    if (split < count) {
+        segments[split].series = false;
+    }
+    const int done = vi_series_parts(segments, count, u, parts);
+    CHECK(done <= split && split - done < 4, "%d of %d modes, split at %d", done, count, split);
+    for (int j = 0; j < done; ++j) {
+        vi_segment_part(&segments[j], u, &alone);
+        CHECK(memcmp(&alone, &parts[j], sizeof alone) == 0, "part of mode %d of %d", j, count);
+    }
 }
 
 int main(void)
@@ -51,6 +69,7 @@ int main(void)
             vi_segment_end(&alone, alone.length, phase, &q, &p);
             CHECK(q == x[j] + end.x && p == end.v, "mode %d, case %d", j, n);
         }
+        check_parts(&seed, together, count, length);
     }
     return 0;
 }

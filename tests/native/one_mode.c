@@ -29,7 +29,7 @@ typedef struct {
         vi_record record;
         double root; /* sqrt(mass) */
     } saved;
-    vi_pressed pressed;
+    vi_pressed_cache pressed;
     vi_scan scan;
 } body;
 

@@ -26,7 +26,7 @@ static vi_structure_model model;
 static vi_structure_state state;
 static vi_contact contacts[VI_PORTS];
 static vi_record record;
-static vi_pressed pressed;
+static vi_pressed_cache pressed;
 static vi_scan scan;
 static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan};
 

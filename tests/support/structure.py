@@ -132,6 +132,8 @@ def _library() -> ctypes.CDLL:
         *(ctypes.c_void_p, numbers, numbers, ctypes.POINTER(integer), numbers, numbers),
     ]
     library.vi_door_structure_complaint.argtypes = [ctypes.c_void_p, integer, ctypes.c_char_p]
+    library.vi_door_structure_work.restype = number
+    library.vi_door_structure_work.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_rows.argtypes = [ctypes.c_void_p, numbers, integer]
     return library
 
@@ -354,6 +356,11 @@ class Structure:
     def energy(self) -> float:
         """Kinetic and elastic energy of the modes, J."""
         return float(0.5 * (self.velocity @ self.velocity) + 0.5 * self._stiffness @ self.displacement**2)
+
+    @property
+    def work(self) -> float:
+        """Work of all steps so far, in evaluations of one mode."""
+        return float(self._library.vi_door_structure_work(self._handle))
 
     def close(self) -> None:
         """Free the structure."""

@@ -65,7 +65,7 @@ typedef struct {
 
 /* A component. All functions work on the flat struct `self` and allocate nothing; `message` is empty on entry. */
 typedef struct {
-    /* Fill `self` (zeroed) with the default values. */
+    /* Fill `self` (zeroed up to its caches) with the default values. */
     void (*defaults)(void *self);
     /* Check all parameters, start, compute the outputs. On failure write every problem into `message` and return false; on
      * success it is empty or holds a warning. */
@@ -87,6 +87,8 @@ typedef struct {
     double (*time)(const void *self);
     /* Bytes of `self` in use, so that a saved state holds no unused rows of the record; NULL: all bytes. */
     size_t (*used_size)(const void *self);
+    /* Bytes of caches at the end of `self`: zero for a new instance, kept by a reset, and right for every state. */
+    size_t cache_size;
     /* The model description has `count` of the repeated variables `block` ("modes", "contacts"); called after
      * `defaults`. NULL: sizes make no difference. */
     void (*sized)(void *self, const char *block, int count);

@@ -94,7 +94,7 @@ static void put_start(vi_instance *instance, const vi_start *start)
 
 void vi_instance_reset(vi_instance *instance)
 {
-    memset(instance->self, 0, description->struct_size);
+    memset(instance->self, 0, description->struct_size - component->cache_size);
     component->defaults(instance->self);
     if (component->attach != NULL) {
         component->attach(instance->self, instance->resources);

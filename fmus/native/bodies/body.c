@@ -343,11 +343,13 @@ static bool needs_events(const void *self)
     return false;
 }
 
+/* Bytes of `pressed` and `scan`, the last members. */
+enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) };
+
 /* Caches and unused rows of the record are not saved. */
 static size_t used_size(const void *self)
 {
-    const vi_body *c = const_body_of(self);
-    return vi_this_description.struct_size - (vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan);
+    return vi_this_description.struct_size - (vi_record_unused(&const_body_of(self)->record) + CACHES);
 }
 
 const vi_component vi_this_component = {
@@ -361,6 +363,7 @@ const vi_component vi_this_component = {
     .needs_events = needs_events,
     .time = present_time,
     .used_size = used_size,
+    .cache_size = CACHES,
     .sized = sized,
     .exchange = &vi_body_exchange,
 };

@@ -34,7 +34,7 @@ typedef struct {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;   /* saved only as far as it is used; the members after it are not saved */
-    vi_pressed pressed; /* `pressed` and `scan` are caches */
+    vi_pressed_cache pressed; /* `pressed` and `scan` are caches */
     vi_scan scan;
 } vi_body;
 

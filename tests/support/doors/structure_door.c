@@ -13,7 +13,7 @@ struct vi_door_structure {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;
-    vi_pressed pressed;
+    vi_pressed_cache pressed;
     vi_scan scan;
     int by_series; /* long rests too */
 };
@@ -163,6 +163,11 @@ VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], d
     facts[3] = state->energies.contact_loss;
     facts[4] = structure->record.displacement_max;
     facts[5] = structure->record.displacement_min;
+}
+
+VI_DOOR double vi_door_structure_work(const vi_door_structure *structure)
+{
+    return (double)(structure->state.budget.since_mark + structure->pressed.spent);
 }
 
 VI_DOOR int vi_door_structure_rows(vi_door_structure *structure, double rows[], int room)

@@ -42,6 +42,9 @@ VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int resul
 VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], double p[], int status[], double force[],
                                      double facts[6]);
 
+/* Work of all steps so far, in evaluations of one mode, and of the searches for modes at rest. */
+VI_DOOR double vi_door_structure_work(const vi_door_structure *structure);
+
 /* Move up to `room` rows of eight numbers (record.h) out of the record; returns their number. */
 VI_DOOR int vi_door_structure_rows(vi_door_structure *structure, double rows[], int room);
 

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "motion/magnitude.h"
+#include "motion/mode_series.h"
 
 /* Largest steady response that is split off, in units of the motion; above, the split loses too many digits. */
 static const double LARGEST_SPLIT = 8.0;
@@ -11,9 +12,6 @@ static const double LARGEST_SPLIT = 8.0;
  * decay time. */
 static const double LONGEST_SERIES = 1e4;
 static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
-/* Length of a series segment, in units of 1 / fastest rate; the 21st term is then below 1e-17 of the first. */
-static const double SERIES_REACH = 0.7;
-
 /* stiffness/mass - (damping/(2 mass))^2 without cancellation: 0 exactly at critical damping. */
 static double discriminant(double mass, double damping, double stiffness)
 {
@@ -248,126 +246,10 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
     m->j = s->held_rate - mode->force * w * sn - 2.0 * mode->decay * m->a - mode->stiffness * m->v;
 }
 
-/* ---- the series form ---- */
-
-/* 1 / ((n + 1) (n + 2)): factor of the differential equation's recurrence for Taylor coefficient n + 2. */
-static const double SHARE[VI_SERIES_ORDER - 1] = {1.0 / 2.0,   1.0 / 6.0,   1.0 / 12.0,  1.0 / 20.0,  1.0 / 30.0,
-                                                  1.0 / 42.0,  1.0 / 56.0,  1.0 / 72.0,  1.0 / 90.0,  1.0 / 110.0,
-                                                  1.0 / 132.0, 1.0 / 156.0, 1.0 / 182.0, 1.0 / 210.0, 1.0 / 240.0,
-                                                  1.0 / 272.0, 1.0 / 306.0, 1.0 / 342.0, 1.0 / 380.0};
-/* n (n - 1) (n - 2) (n - 3): factor of Taylor coefficient n in the fourth derivative. */
-static const double FOURTH[VI_SERIES_ORDER + 1] = {0.0,     0.0,     0.0,     0.0,     24.0,    120.0,   360.0,
-                                                   840.0,   1680.0,  3024.0,  5040.0,  7920.0,  11880.0, 17160.0,
-                                                   24024.0, 32760.0, 43680.0, 57120.0, 73440.0, 93024.0, 116280.0};
-
-/* Modes whose coefficients are found side by side, since each coefficient of a mode waits for the one before. */
-enum { ABREAST = 8 };
-
-/* Taylor coefficients, indexed by order n, then by mode. */
-typedef double coefficients[VI_SERIES_ORDER + 1][ABREAST];
-
-/* Taylor coefficients of `count` modes from the differential equation itself. Each caller passes a constant count:
- * loops over one mode vanish, loops over ABREAST become vectors. */
-static inline void find_coefficients(coefficients c, const vi_segment s[], const double x[], const double v[],
-                                     const int count)
-{
-    double drive[2][ABREAST], held[3][ABREAST] = {{0.0}}, rate[ABREAST], damping[ABREAST], stiffness[ABREAST];
-    for (int i = 0; i < count; ++i) {
-        const vi_mode *mode = s[i].mode;
-        rate[i] = mode->angular_frequency;
-        damping[i] = 2.0 * mode->decay;
-        stiffness[i] = mode->stiffness;
-        drive[0][i] = mode->force * s[i].phase.cosine;
-        drive[1][i] = -mode->force * rate[i] * s[i].phase.sine;
-        held[0][i] = s[i].held - stiffness[i] * x[i];
-        held[1][i] = s[i].held_rate;
-        c[0][i] = 0.0;
-        c[1][i] = v[i];
-    }
-    for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
-        const double next = (double)n + 1.0, share = SHARE[n];
-        const double *constant = held[n < 2 ? n : 2];
-        double *load = drive[n % 2];
-        for (int i = 0; i < count; ++i) {
-            const double sum = load[i] + constant[i] - damping[i] * next * c[n + 1][i] - stiffness[i] * c[n][i];
-            c[n + 2][i] = sum * share;
-            load[i] = -load[i] * rate[i] * rate[i] * share;
-        }
-    }
-}
-
-/* Begin the series of `count` prepared segments, with bounds up to the ends of the segments. */
-static inline void begin_series(vi_segment s[], const double x[], const double v[], const int count)
-{
-    coefficients c;
-    double snap[ABREAST] = {0.0}, scale[ABREAST] = {0.0}, length[ABREAST];
-    find_coefficients(c, s, x, v, count);
-    for (int i = 0; i < count; ++i) {
-        const double fastest = s[i].mode->fastest;
-        length[i] = fastest > 0.0 ? fmin(s[i].length, SERIES_REACH / fastest) : s[i].length;
-    }
-    for (int n = VI_SERIES_ORDER; n >= 4; --n) {
-        for (int i = 0; i < count; ++i) {
-            snap[i] = snap[i] * length[i] + FOURTH[n] * fabs(c[n][i]);
-            scale[i] = scale[i] * length[i] + fabs(c[n][i]);
-        }
-    }
-    for (int n = 3; n >= 0; --n) {
-        for (int i = 0; i < count; ++i) {
-            scale[i] = scale[i] * length[i] + fabs(c[n][i]);
-        }
-    }
-    for (int i = 0; i < count; ++i) {
-        s[i].origin = x[i];
-        s[i].length = length[i];
-        s[i].series_snap_bound = snap[i];
-        s[i].scale = scale[i];
-        for (int n = 0; n <= VI_SERIES_ORDER; ++n) {
-            s[i].coefficient[n] = c[n][i];
-        }
-    }
-}
-
-static void series_at(const vi_segment *s, double u, vi_motion *m)
-{
-    const vi_mode *mode = s->mode;
-    const double *c = s->coefficient;
-    double x = c[VI_SERIES_ORDER], v = (double)VI_SERIES_ORDER * c[VI_SERIES_ORDER];
-    for (int n = VI_SERIES_ORDER - 1; n >= 1; --n) {
-        x = x * u + c[n];
-        v = v * u + (double)n * c[n];
-    }
-    m->x = x * u;
-    m->v = v;
-    const double angle = s->phase.angle + mode->angular_frequency * u;
-    m->a = mode->force * cos(angle) + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v
-           - mode->stiffness * (s->origin + m->x);
-    m->j = s->held_rate - mode->force * mode->angular_frequency * sin(angle) - 2.0 * mode->decay * m->a
-           - mode->stiffness * m->v;
-    m->snap_bound = s->series_snap_bound;
-}
-
-static void series_part(const vi_segment *s, double u, vi_part *part)
-{
-    const double *c = s->coefficient;
-    double x = c[VI_SERIES_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
-    if (u == 0.0) {
-        *part = (vi_part){c[0], c[1], 2.0 * c[2], 6.0 * c[3], s->series_snap_bound, s->scale};
-        return;
-    }
-    for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
-        j = j * u + a;
-        a = a * u + v;
-        v = v * u + x;
-        x = x * u + c[n];
-    }
-    *part = (vi_part){x, v, 2.0 * a, 6.0 * j, s->series_snap_bound, s->scale};
-}
-
 void vi_segment_part(const vi_segment *s, double u, vi_part *part)
 {
     if (s->series) {
-        series_part(s, u, part);
+        vi_series_part(s, u, part);
         return;
     }
     const vi_mode *mode = s->mode;
@@ -429,7 +311,7 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
     set_out(segment, mode, phase, held, held_rate, length);
     segment->series = local || !split(segment, x, v);
     if (segment->series) {
-        begin_series(segment, &x, &v, 1);
+        vi_series_begin(segment, x, v);
     } else {
         segment->start = segment->x;
         segment->start_rate = segment->v;
@@ -441,17 +323,11 @@ void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int c
                              const double v[], vi_phase phase, const double held[], const double held_rate[],
                              double length)
 {
-    int j = 0;
-    for (; j < count; ++j) {
+    for (int j = 0; j < count; ++j) {
         set_out(&segments[j], &modes[j], phase, held[j], held_rate[j], length);
         segments[j].series = true;
     }
-    for (j = 0; j + ABREAST <= count; j += ABREAST) {
-        begin_series(&segments[j], &x[j], &v[j], ABREAST);
-    }
-    for (; j < count; ++j) {
-        begin_series(&segments[j], &x[j], &v[j], 1);
-    }
+    vi_series_begin_all(segments, count, x, v);
 }
 
 void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low)
@@ -467,29 +343,16 @@ void vi_segment_continue(vi_segment *segment, double x, double v, double amplitu
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
 {
     if (segment->series) {
-        series_at(segment, u, motion);
+        vi_series_at(segment, u, motion);
     } else {
         split_at(segment, u, motion);
     }
 }
 
-/* The same bits as from the series of a part. */
-static void series_end(const vi_segment *s, double u, double *displacement, double *velocity)
-{
-    const double *c = s->coefficient;
-    double x = c[VI_SERIES_ORDER], v = 0.0;
-    for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
-        v = v * u + x;
-        x = x * u + c[n];
-    }
-    *displacement = s->origin + x;
-    *velocity = v;
-}
-
 void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double *x, double *v)
 {
     if (segment->series) {
-        series_end(segment, u, x, v);
+        vi_series_end(segment, u, x, v);
         return;
     }
     const vi_mode *mode = segment->mode;

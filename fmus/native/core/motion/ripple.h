@@ -15,6 +15,16 @@ static inline void vi_part_add(vi_part *sum, double weight, const vi_part *part)
     sum->snap_bound += fabs(weight) * part->snap_bound;
 }
 
+/* Keep a sum, field by field: a copy of the whole struct would wait until its last field is stored. */
+static inline void vi_part_keep(vi_part *kept, const vi_part *sum)
+{
+    kept->x = sum->x;
+    kept->v = sum->v;
+    kept->a = sum->a;
+    kept->j = sum->j;
+    kept->snap_bound = sum->snap_bound;
+}
+
 /* The approach of a motion to its stop, with clearance = offset - sign * displacement. */
 static inline vi_approach vi_part_approach(const vi_part *sum, double offset, double sign)
 {

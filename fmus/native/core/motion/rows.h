@@ -21,6 +21,42 @@ static inline double vi_row_dot(const double *restrict a, const double *restrict
     return sum[0] + sum[1];
 }
 
+/* Rows whose sums are found side by side, since each sum waits for its last product. */
+enum { VI_ROWS_ABREAST = 4 };
+
+/* Sums of the products of VI_ROWS_ABREAST rows with one row, each with the bits of vi_row_dot; stride: from row to
+ * row. */
+static inline void vi_rows_dot_abreast(const double *restrict rows, int stride, const double *restrict b, int width,
+                                       double dots[])
+{
+    const double *restrict second = rows + stride, *restrict third = second + stride, *restrict fourth = third + stride;
+    double sum[VI_ROWS_ABREAST][VI_LANES] = {{0.0}};
+    for (int j = 0; j < width; j += VI_LANES) {
+        for (int i = 0; i < VI_LANES; ++i) {
+            sum[0][i] += rows[j + i] * b[j + i];
+            sum[1][i] += second[j + i] * b[j + i];
+            sum[2][i] += third[j + i] * b[j + i];
+            sum[3][i] += fourth[j + i] * b[j + i];
+        }
+    }
+    for (int r = 0; r < VI_ROWS_ABREAST; ++r) {
+        dots[r] = sum[r][0] + sum[r][1];
+    }
+}
+
+/* Sums of the products of `count` rows with one row. */
+static inline void vi_rows_dot(int count, const double *restrict rows, int stride, const double *restrict b, int width,
+                               double dots[])
+{
+    int r = 0;
+    for (; r + VI_ROWS_ABREAST <= count; r += VI_ROWS_ABREAST) {
+        vi_rows_dot_abreast(rows + r * stride, stride, b, width, dots + r);
+    }
+    for (; r < count; ++r) {
+        dots[r] = vi_row_dot(rows + r * stride, b, width);
+    }
+}
+
 /* row += factor * other */
 static inline void vi_row_add(double *restrict row, double factor, const double *restrict other, int width)
 {

@@ -56,6 +56,7 @@ typedef struct {
     int yields[VI_PORTS], yielding;                        /* the contacts that yield, and their number */
     double compliance[VI_PORTS][VI_PORTS];                 /* of each contact to yielding contacts' forces */
     int is_held[VI_PORTS], any_held, any_power;
+    double holding[VI_PORTS][VI_PORTS];                    /* of each contact to held contacts' forces */
 } equation;
 
 static void set_up_contacts(equation *e, const vi_structure_model *model, const vi_drift_start *start)
@@ -92,13 +93,18 @@ static void set_up(equation *e, const vi_structure_model *model, const vi_drift_
         for (int y = 0; y < e->yielding; ++y) {
             e->compliance[k][y] = start->sign[k] * start->sign[e->yields[y]] * model->compliance[k][e->yields[y]];
         }
+        for (int l = 0; l < model->contacts && e->any_held; ++l) {
+            e->holding[k][l] = start->sign[k] * start->sign[l] * model->compliance[k][l];
+        }
     }
 }
 
 static void extend_penetrations(vi_drift *drift, const equation *e, int n)
 {
+    double moved[VI_PORTS];
+    vi_rows_dot(drift->model->contacts, e->toward[0], VI_ROW, drift->modal[n], e->width, moved);
     for (int k = 0; k < drift->model->contacts; ++k) {
-        drift->penetration[k][n] = e->is_held[k] ? 0.0 : vi_row_dot(e->toward[k], drift->modal[n], e->width);
+        drift->penetration[k][n] = e->is_held[k] ? 0.0 : moved[k];
     }
 }
 
@@ -145,14 +151,18 @@ INLINE void load_modes(const vi_drift *drift, const equation *restrict e, double
     }
 }
 
-/* Coefficient n + 2 of the motion, still without the loads of inputs, held contacts and coupling damping. The contacts
- * do not wait for the modes: the compliances give the effect of the forces on them. */
-INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, double share, int contacts, int yielding)
+/* Coefficient n + 2 of the motion, still without the loads of inputs, held contacts and coupling damping. Where none of
+ * these act (`apart`), the contacts do not wait for the modes: the compliances give the effect of the forces on them. */
+INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, double share, int contacts, int yielding,
+                   bool apart)
 {
-    double load[VI_ROW], *restrict next = drift->modal[n + 2];
+    double load[VI_ROW], loaded[VI_PORTS], *restrict next = drift->modal[n + 2];
     load_modes(drift, e, drive, n, load);
-    for (int k = 0; k < contacts; ++k) {
-        double all = vi_row_dot(e->toward[k], load, e->width);
+    if (apart) {
+        vi_rows_dot(contacts, e->toward[0], VI_ROW, load, e->width, loaded);
+    }
+    for (int k = 0; k < contacts && apart; ++k) {
+        double all = loaded[k];
         for (int y = 0; y < yielding; ++y) {
             all -= e->compliance[k][y] * drift->force[e->yields[y]][n];
         }
@@ -179,18 +189,15 @@ static void drag(vi_drift *drift, int n, double share)
 }
 
 /* Add the forces that keep the held contacts at rest: shape_k . q'' = 0 for each of them. */
-static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start, int n, double share)
+static void hold(vi_drift *drift, equation *e, int n, double share)
 {
-    const vi_structure_model *model = drift->model;
-    double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, f[VI_PORTS], *next = drift->modal[n + 2];
-    for (int k = 0; k < model->contacts; ++k) {
-        for (int l = 0; l < model->contacts; ++l) {
-            g[k][l] = start->sign[k] * start->sign[l] * model->compliance[k][l];
-        }
+    const int contacts = drift->model->contacts;
+    double b[VI_PORTS] = {0.0}, f[VI_PORTS], *next = drift->modal[n + 2];
+    for (int k = 0; k < contacts; ++k) {
         b[k] = e->is_held[k] ? vi_row_dot(e->toward[k], next, e->width) : 0.0;
     }
-    vi_solve_active(model->contacts, g, b, e->is_held, f);
-    for (int k = 0; k < model->contacts; ++k) {
+    vi_solve_active(contacts, e->holding, b, e->is_held, f);
+    for (int k = 0; k < contacts; ++k) {
         if (e->is_held[k]) {
             drift->force[k][n] = f[k] / share;
             vi_row_add(next, -f[k], e->toward[k], e->width);
@@ -200,21 +207,38 @@ static void hold(vi_drift *drift, const equation *e, const vi_drift_start *start
 
 /* ---- a drift ---- */
 
+/* Sizes of the loads on the modes at the start, N kg^(-1/2). */
+static void size_loads(const vi_structure_model *model, const vi_drift_start *start, double size[])
+{
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        const vi_mode *mode = &model->mode[j];
+        size[j] = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j]);
+        size[j] += vi_structure_drag_size(model, j, start->p);
+    }
+}
+
 static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
 {
     const vi_structure_model *model = drift->model;
-    for (int k = 0; k < model->contacts; ++k) {
-        double size = 0.0;
-        for (int j = 0; j < vi_structure_modes(model); ++j) {
-            const vi_mode *mode = &model->mode[j];
-            double terms = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j]);
-            terms += vi_structure_drag_size(model, j, start->p);
-            for (int l = 0; l < model->contacts; ++l) { /* of yielding and of other holding stops */
+    double load[VI_MODES], size[VI_PORTS] = {0.0};
+    int pushing[VI_PORTS], count = 0; /* the stops with a force */
+    size_loads(model, start, load);
+    for (int l = 0; l < model->contacts; ++l) {
+        pushing[count] = l;
+        count += drift->force[l][0] != 0.0;
+    }
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        for (int k = 0; k < model->contacts; ++k) {
+            double terms = load[j];
+            for (int i = 0; i < count; ++i) { /* of yielding and of other holding stops */
+                const int l = pushing[i];
                 terms += l == k ? 0.0 : fabs(model->shape[l][j] * drift->force[l][0]);
             }
-            size += fabs(model->shape[k][j]) * terms;
+            size[k] += fabs(model->shape[k][j]) * terms;
         }
-        drift->force_scale[k] = size / fabs(model->mobility[k][k]);
+    }
+    for (int k = 0; k < model->contacts; ++k) {
+        drift->force_scale[k] = size[k] / fabs(model->mobility[k][k]);
     }
 }
 
@@ -309,7 +333,7 @@ static void start_series(vi_drift *drift, const equation *e, const vi_drift_star
 }
 
 /* Find all coefficients of the series. */
-INLINE void find_series(vi_drift *drift, const equation *e, const vi_drift_start *start, vi_power_series power[],
+INLINE void find_series(vi_drift *drift, equation *e, const vi_drift_start *start, vi_power_series power[],
                         int contacts, int yielding)
 {
     const vi_structure_model *model = drift->model;
@@ -319,7 +343,7 @@ INLINE void find_series(vi_drift *drift, const equation *e, const vi_drift_start
     for (int n = 0; n + 2 <= VI_ORDER; ++n) {
         const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
         press(drift, e, start, n, yielding, power);
-        extend(drift, e, drive[0], n, share, contacts, yielding);
+        extend(drift, e, drive[0], n, share, contacts, yielding, apart);
         if (n < 2) {
             vi_row_add(drift->modal[n + 2], share, e->held[n], e->width);
         }
@@ -327,7 +351,7 @@ INLINE void find_series(vi_drift *drift, const equation *e, const vi_drift_start
             drag(drift, n, share);
         }
         if (any_held) {
-            hold(drift, e, start, n, share);
+            hold(drift, e, n, share);
         }
         if (n < 2 || !apart) {
             extend_penetrations(drift, e, n + 2);

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "motion/mode_series.h"
 #include "motion/ripple.h"
 
 static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
@@ -70,7 +71,9 @@ void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
     instant->u = u;
     instant->cosine = u == 0.0 ? flight->phase.cosine : cos(angle);
     instant->sine = u == 0.0 ? flight->phase.sine : sin(angle);
-    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
+    const int modes = vi_structure_modes(flight->model);
+    int j = flight->series && u > 0.0 ? vi_series_parts(flight->segment, modes, u, instant->part) : 0;
+    for (; j < modes; ++j) {
         vi_segment_part(&flight->segment[j], u, &instant->part[j]);
     }
 }
@@ -97,12 +100,12 @@ vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, co
 double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant, double horizon)
 {
     const int n = vi_structure_modes(flight->model);
-    vi_part sum[VI_MODES + 1]; /* the particular part and the first modes */
+    vi_part sum[VI_MODES + 1], so_far = particular(point, flight, instant); /* with the first modes */
     double ripple[VI_MODES];
-    sum[0] = particular(point, flight, instant);
+    vi_part_keep(&sum[0], &so_far);
     for (int j = 0; j < n; ++j) {
-        sum[j + 1] = sum[j];
-        vi_part_add(&sum[j + 1], point->shape[j], &instant->part[j]);
+        vi_part_add(&so_far, point->shape[j], &instant->part[j]);
+        vi_part_keep(&sum[j + 1], &so_far);
         ripple[j] = fabs(point->shape[j]) * instant->part[j].reach;
     }
     return vi_rippling_step(sum, ripple, n, point->offset, point->sign, horizon);

@@ -4,8 +4,6 @@
 #include <string.h>
 
 #include "body/modal/forces.h"
-#include "body/modal/held.h"
-#include "modes/pressed_modes.h"
 #include "modes/pressed_response.h"
 #include "motion/ripple.h"
 
@@ -14,157 +12,6 @@ static const double LARGEST_RESPONSE = 64.0;
 /* Radians of a term below which its integral is a series, since the difference of its end values would be rounding. */
 static const double SHORT = 0.5;
 enum { SERIES = 14 };
-
-/* ---- the contacts of a rest ---- */
-
-static bool is_linear(const vi_structure *s, int k)
-{
-    if (s->state->status[k] == VI_CONTACT_HELD) {
-        return true;
-    }
-    if (s->state->status[k] != VI_CONTACT_YIELDING || s->state->leaving[k]) {
-        return false;
-    }
-    const vi_contact_law *law = &s->contacts[k].law; /* refuses external laws: their force is not known over a rest */
-    return vi_law_of(law->law)->press == VI_PRESS_LINEAR && law->stiffness > 0.0 && !vi_structure_is_kept(s, k);
-}
-
-int vi_pressed_contacts(const vi_structure *s, int32_t port[VI_PORTS])
-{
-    int count = 0;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (s->state->status[k] == VI_CONTACT_FREE) {
-            continue;
-        }
-        if (!is_linear(s, k)) {
-            return 0;
-        }
-        port[count++] = k;
-    }
-    return count;
-}
-
-static void describe(const vi_structure *s, const int32_t port[], int contacts, vi_pressed_body *body)
-{
-    const vi_structure_model *model = s->model;
-    body->modes = vi_structure_modes(model);
-    body->contacts = contacts;
-    body->coupled = model->coupled && vi_structure_modes(model) > 1;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
-        body->square[j] = model->mode[j].stiffness;
-        body->decay[j] = 0.5 * vi_structure_damping(model, j, j);
-        if (body->coupled) {
-            memcpy(body->coupling[j], model->coupling[j], (size_t)vi_structure_modes(model) * sizeof body->coupling[j][0]);
-        }
-    }
-    for (int i = 0; i < contacts; ++i) {
-        const int k = port[i];
-        const vi_press press = vi_structure_press(s, k);
-        body->held[i] = press.kind == VI_PRESS_HOLD;
-        body->stiffness[i] = press.stiffness;
-        body->damping[i] = press.damping;
-        for (int j = 0; j < vi_structure_modes(model); ++j) {
-            body->shape[i][j] = vi_structure_direction(s, k) * model->shape[k][j];
-        }
-    }
-}
-
-/* ---- modes, kept ---- */
-
-static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
-{
-    const size_t size = (size_t)a->modes * sizeof(double);
-    bool same = a->modes == b->modes && a->contacts == b->contacts && a->coupled == b->coupled
-                && memcmp(a->square, b->square, size) == 0 && memcmp(a->decay, b->decay, size) == 0;
-    for (int i = 0; i < a->contacts && same; ++i) {
-        same = a->held[i] == b->held[i] && a->stiffness[i] == b->stiffness[i] && a->damping[i] == b->damping[i]
-               && memcmp(a->shape[i], b->shape[i], size) == 0;
-    }
-    for (int j = 0; j < a->modes && same && a->coupled; ++j) {
-        same = memcmp(a->coupling[j], b->coupling[j], size) == 0;
-    }
-    return same;
-}
-
-/* Are the kept modes those of the present contacts, seen from the same points? */
-static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
-{
-    const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
-    bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
-                && same_body(&pressed->present, &pressed->body)
-                && memcmp(pressed->observed, model->observed, size) == 0;
-    for (int i = 0; i < pressed->present.contacts && same; ++i) {
-        same = pressed->port[i] == port[i];
-    }
-    for (int l = 0; l < model->contacts && same; ++l) {
-        same = memcmp(pressed->shape[l], model->shape[l], size) == 0;
-    }
-    return same;
-}
-
-static void weigh(const vi_pressed_modes *modes, const double shape[], vi_complex weight[])
-{
-    for (int m = 0; m < modes->terms; ++m) {
-        weight[m] = (vi_complex){0.0, 0.0};
-        for (int j = 0; j < modes->modes; ++j) {
-            weight[m].re += shape[j] * modes->vector[m][j].re;
-            weight[m].im += shape[j] * modes->vector[m][j].im;
-        }
-    }
-}
-
-static void weigh_all(vi_pressed *pressed, const vi_structure_model *model)
-{
-    for (int l = 0; l < model->contacts; ++l) {
-        weigh(&pressed->modes, model->shape[l], pressed->weight[l]);
-    }
-    weigh(&pressed->modes, model->observed, pressed->weight[VI_SEEN_OBSERVED]);
-    for (int i = 0; i < pressed->body.contacts; ++i) {
-        for (int m = 0; m < pressed->modes.terms; ++m) {
-            pressed->weight[VI_SEEN_FORCE + i][m] = pressed->modes.force[m][i];
-        }
-    }
-}
-
-static void begin(vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
-{
-    pressed->known = VI_MODES_NOT_FOUND;
-    pressed->searched = 0;
-    pressed->still.known = pressed->harmonic.known = 0;
-    pressed->contacts = model->contacts;
-    pressed->body = pressed->present;
-    memcpy(pressed->port, port, sizeof pressed->port);
-    memcpy(pressed->shape, model->shape, sizeof pressed->shape);
-    memcpy(pressed->observed, model->observed, sizeof pressed->observed);
-    const bool one = pressed->body.contacts == 1 && !pressed->body.coupled;
-    if (one && vi_pressed_modes_find(&pressed->modes, &pressed->body)) {
-        pressed->known = VI_MODES_OF_ONE;
-        weigh_all(pressed, model);
-    }
-}
-
-const vi_pressed *vi_pressed_find(const vi_structure *s, bool all)
-{
-    vi_pressed *pressed = s->pressed;
-    int32_t port[VI_PORTS] = {0};
-    const int contacts = vi_pressed_contacts(s, port);
-    describe(s, port, contacts, &pressed->present);
-    if (!rests_as(pressed, s->model, port)) {
-        begin(pressed, s->model, port);
-    }
-    if (pressed->known == VI_MODES_NOT_FOUND && all && !pressed->searched) {
-        pressed->searched = 1;
-        if (vi_coupled_modes_find(&pressed->modes, &pressed->body, &pressed->work)) {
-            pressed->known = VI_MODES_OF_ALL;
-            vi_coupled_equations_find(&pressed->still, &pressed->body, (vi_complex){0.0, 0.0});
-            weigh_all(pressed, s->model);
-        }
-    }
-    const bool is_known = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
-    return is_known ? pressed : NULL;
-}
-
-/* ---- the flow ---- */
 
 /* Response to loads of the form Re(load e^(s t)); s is 0 or that of the forcing. */
 static void answer(const vi_pressed *pressed, vi_complex s, const vi_complex load[], const vi_complex offset[],
@@ -241,26 +88,16 @@ static bool keeps_digits(const vi_pressed_flow *flow, const vi_structure *s, dou
     return response <= LARGEST_RESPONSE * way && response_speed <= LARGEST_RESPONSE * speed;
 }
 
-/* Find the equations of the response to the forcing, unless they are known at its present frequency. */
-static void know_harmonic(vi_pressed *pressed, double angular_frequency)
-{
-    vi_coupled_equations *harmonic = &pressed->harmonic;
-    if (pressed->known == VI_MODES_OF_ALL && !(harmonic->known && harmonic->s.im == angular_frequency)) {
-        vi_coupled_equations_find(harmonic, &pressed->body, (vi_complex){0.0, angular_frequency});
-    }
-}
-
 bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, const vi_pressed *pressed, double length)
 {
     const vi_phase phase = vi_structure_phase(s);
     const double w = s->model->clock.angular_frequency;
-    double held[VI_MODES], q[VI_MODES], p[VI_MODES];
+    double held[VI_MODES] = {0.0}, q[VI_MODES] = {0.0}, p[VI_MODES] = {0.0};
     flow->pressed = pressed;
     flow->angle = phase.angle;
     flow->angular_frequency = w;
     flow->since = flow->since_low = 0.0;
     vi_structure_held_now(s, held);
-    know_harmonic(s->pressed, w);
     respond_to_forcing(flow, s);
     respond_to_loads(flow, s, held);
     for (int j = 0; j < pressed->body.modes; ++j) {
@@ -466,13 +303,13 @@ double vi_pressed_step(const vi_pressed_sight *sight, const vi_pressed_flow *flo
                        double horizon)
 {
     const vi_pressed_modes *modes = &flow->pressed->modes;
-    vi_part sum[VI_TERMS + 1]; /* the response and the slow terms */
+    vi_part sum[VI_TERMS + 1], so_far = response_at(sight, flow, u); /* with the slow terms */
     double ripple[VI_TERMS];
-    sum[0] = response_at(sight, flow, u);
+    vi_part_keep(&sum[0], &so_far);
     for (int m = 0; m < modes->terms; ++m) {
         const vi_part term = term_at(sight->weight[m], part[m], modes->rate[m]);
-        sum[m + 1] = sum[m];
-        vi_part_add(&sum[m + 1], 1.0, &term);
+        vi_part_add(&so_far, 1.0, &term);
+        vi_part_keep(&sum[m + 1], &so_far);
         ripple[m] = term.reach;
     }
     return vi_rippling_step(sum, ripple, modes->terms, sight->offset, sight->sign, horizon);

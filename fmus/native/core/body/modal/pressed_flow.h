@@ -7,41 +7,9 @@
 #ifndef VIBROIMPACT_PRESSED_FLOW_H
 #define VIBROIMPACT_PRESSED_FLOW_H
 
-#include "body/modal/state.h"
-#include "modes/coupled_modes.h"
-#include "modes/coupled_response.h"
-#include "modes/pressed_terms.h"
+#include "body/modal/pressed_cache.h"
 #include "motion/flow.h"
 #include "motion/majorant.h"
-
-/* Observed quantities: displacements of the contacts and of the observed point, and forces of the contacts. */
-enum { VI_SEEN_OBSERVED = VI_PORTS, VI_SEEN_FORCE, VI_SEEN = VI_SEEN_FORCE + VI_PORTS };
-
-/* Knowledge of a rest's modes: not searched yet, found for one contact, found for all contacts, or not found. */
-typedef enum { VI_MODES_UNKNOWN = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2, VI_MODES_NOT_FOUND = 3 } vi_modes_known;
-
-/* Cache of the body's modes on its present contacts, no part of the state: its contents follow from the body. */
-struct vi_pressed {
-    int32_t known;                 /* vi_modes_known */
-    int32_t searched;              /* the modes of all contacts have been searched for */
-    int32_t contacts;              /* of the body */
-    int32_t port[VI_PORTS];        /* contact of the body, for each pressed contact */
-    vi_pressed_body body, present; /* present: the body on its present contacts */
-    double shape[VI_PORTS][VI_MODES], observed[VI_MODES];
-    vi_pressed_modes modes;
-    vi_complex weight[VI_SEEN][VI_TERMS]; /* of each term in the observed quantities */
-    vi_coupled_equations still, harmonic; /* of the responses */
-    vi_coupled_work work;
-};
-
-/* Find the contacts on which the body rests, all others being free. Returns their number; 0 where the motion is not
- * linear. It is not on a power law, on a force from another FMU, or on a stop whose point others hold. */
-int vi_pressed_contacts(const vi_structure *s, int32_t port[VI_PORTS]);
-
-/* The modes of the body on its present contacts; NULL where they do not give its motion to the last digits. `all`:
- * modes of several contacts, or of coupling or strong damping, are worth their cost. This cost counts for no budget,
- * since the cache is no part of the state. */
-const vi_pressed *vi_pressed_find(const vi_structure *s, bool all);
 
 typedef struct {
     const vi_pressed *pressed;

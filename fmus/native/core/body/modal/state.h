@@ -123,7 +123,7 @@ typedef struct {
 } vi_structure_state;
 
 /* Modes of a body at rest on a contact: pressed_flow.h. */
-typedef struct vi_pressed vi_pressed;
+typedef struct vi_pressed_cache vi_pressed_cache;
 
 /* Samples of a body's flights: modal_scan.h. */
 typedef struct vi_scan vi_scan;
@@ -135,7 +135,7 @@ typedef struct {
     vi_contact *contacts; /* array of model->contacts */
     vi_record *record;
     /* caches, no part of the state */
-    vi_pressed *pressed; /* NULL: long rests are followed by series, like short ones */
+    vi_pressed_cache *pressed; /* NULL: long rests are followed by series, like short ones */
     vi_scan *scan;       /* NULL: flights are followed by certified steps only */
 } vi_structure;
 

@@ -263,6 +263,9 @@ bool vi_structure_meets_now(const vi_structure *s, int k)
         return false;
     }
     const double v = vi_structure_approach(s, k);
+    if (!(v > 0.0)) {
+        return false;
+    }
     const double room = SAME_INSTANT * DBL_EPSILON * (vi_structure_displacement_size(s, k) + v * s->state->now.rest);
-    return v > VI_ROUNDING * vi_structure_velocity_size(s, k) && vi_structure_clearance(s, k) <= room;
+    return vi_structure_clearance(s, k) <= room && v > VI_ROUNDING * vi_structure_velocity_size(s, k);
 }

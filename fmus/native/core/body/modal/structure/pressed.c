@@ -13,9 +13,10 @@
 /* Segments by series after which a rest counts as long, for stops that yield and for held contacts. Most contacts with
  * stops that yield end earlier. */
 enum { PATIENCE = 16, PATIENCE_HELD = 4 };
-/* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms. LEAST_REST: least
- * length of a rest; times the number of modes where the modes must be found anew. */
-static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
+/* Least certified step, in radians of the fastest rate, that repays an evaluation of all terms. A radian by series costs
+ * as much with 64 modes. LEAST_REST: least length of a rest; times the number of modes where the modes must be found
+ * anew. */
+static const double LEAST_STEP = 2.0, LEAST_REST = 32.0;
 /* Least length of a rest, in radians times modes^2, for modes of several contacts or of coupled damping. */
 static const double ALL_MODES = 2.0;
 /* Distance from zero, in roundings of the terms, below which a guarded quantity is left to the series. */
