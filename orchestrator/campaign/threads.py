@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextvars import copy_context
 from queue import Empty, SimpleQueue
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, lay_down, run_chunk, take_up
@@ -45,7 +46,9 @@ def compute_in_threads(
     orders, answers = SimpleQueue[Chunk | None](), SimpleQueue[tuple[Chunk | None, Answer]]()
     ended = threading.Event()
     threads = [
-        threading.Thread(target=_compute, args=(work, orders, answers, ended), daemon=True)
+        threading.Thread(
+            target=copy_context().run, args=(_compute, work, orders, answers, ended), daemon=True
+        )
         for _ in range(count)
     ]
     for thread in threads:
