@@ -30,10 +30,11 @@ CHUNK_SECONDS = 2.0
 """Planned time of one chunk, s, of up to 200 workers."""
 
 SHORTEST_SECONDS = 0.1
-"""Least planned time of a chunk, s, for the last chunks of a sweep."""
+"""Least planned time of a chunk, s, for the last chunks of a sweep, of up to 40 workers."""
 
 MOST_RATE = 100.0
-"""Largest number of chunks that all workers end in a second, 1/s: a chunk takes Dask some 2 ms of one processor."""
+"""Number of chunks that all workers end in a second, 1/s, four times as many towards the end of a sweep. A chunk takes
+Dask some 2 ms of one processor."""
 
 FIRST_POINTS = 64
 """Number of points in a chunk before the time of a point is known; a slow chunk ends early."""
@@ -230,7 +231,8 @@ class ChunkSchedule:
     def _fair_seconds(self) -> float:
         """Return the planned time of the next chunk of units, s: half of a worker's share of the rest."""
         share = self.left * (self._pace or 0.0) / (2 * self._workers)
-        return min(self._chunk_seconds, max(share, SHORTEST_SECONDS))
+        shortest = max(SHORTEST_SECONDS, self._workers / (4.0 * MOST_RATE))
+        return min(self._chunk_seconds, max(share, shortest))
 
     @property
     def _chunk_seconds(self) -> float:

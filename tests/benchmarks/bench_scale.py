@@ -1,8 +1,9 @@
 """Saturation of a campaign with many workers: up to 1,000 of them in one process, whose points sleep.
 
 Schedule, client and scheduler are those of a campaign; a worker sleeps for the time of its points, and writes no part.
-All share this process and its interpreter lock, unlike workers on other machines: the rates are lower bounds. The ideal
-rate is the number of workers over the seconds of a point. The peak memory is that of client, scheduler and all workers.
+Up to 200 workers share this process and its interpreter lock, unlike workers on other machines: the rates are lower
+bounds. The ideal rate is the number of workers over the seconds of a point. The processor time and the peak memory
+are those of this process.
 
 Run with `python tests/benchmarks/bench_scale.py [--output results/benchmarks]`, on a quiet machine.
 """
@@ -37,8 +38,8 @@ from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, axis_of_rang
 matplotlib.use("Agg")
 WORKERS = (1, 2, 5, 10, 20, 50, 100, 200)
 MANY_WORKERS = 1000
-LARGEST_CLUSTER = 100
-"""Number of Dask's workers in this process. Beyond it each has several threads, and a thread is a worker here."""
+MANY_PROCESSES = 4
+"""Number of processes of many workers, each a thread there; this process has client and scheduler alone."""
 POINT_MILLISECONDS = (0.005, 1.0, 10.0, 100.0)
 SECONDS, MANY_SECONDS = 10.0, 60.0
 """Duration of a measurement with ideal workers, and with many ideal workers, s."""
@@ -87,14 +88,14 @@ class Sleeper:
 
 
 @contextmanager
-def workers_of_this_process(number: int) -> Iterator[Cluster]:
-    """Open workers that are threads of this process."""
-    processes = min(number, LARGEST_CLUSTER) if number > 2 * LARGEST_CLUSTER else number
+def sleeping_workers(number: int) -> Iterator[Cluster]:
+    """Open workers that are threads of this process, or many workers that are threads of some others."""
+    processes = number if number < MANY_WORKERS else MANY_PROCESSES
     with (
         LocalCluster(
             n_workers=processes,
             threads_per_worker=number // processes,
-            processes=False,
+            processes=number >= MANY_WORKERS,
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
             memory_limit=0,
@@ -118,20 +119,28 @@ def rate(number: int, point_seconds: float, seconds: float) -> float:
     branches = sweep_of(int(seconds * number / point_seconds))
     points = sum(len(branch.points) for branch in branches)
     scene = parse_scene(SCENE, "scale.toml")
-    done = 0
+    done = chunks = 0
 
     def take(result: ChunkResult) -> None:
-        nonlocal done
-        done += result.chunk.count
+        nonlocal done, chunks
+        done, chunks = done + result.chunk.count, chunks + 1
 
     with dask.config.set(QUIET), patch.object(computation, "run_chunk", Sleeper(point_seconds)):
-        pool = WorkerPool(lambda: workers_of_this_process(number), "this process", Progress())
+        pool = WorkerPool(lambda: sleeping_workers(number), "this process", Progress())
         with pool.connection:
             pool.wait_for_workers()
             schedule = ChunkSchedule(branches, [], number)
-            began = time.perf_counter()
+            began, busy = time.perf_counter(), time.process_time()
             computation.Computation(pool, Work(scene, "", "", ""), schedule, take).run()
             spent = time.perf_counter() - began
+            busy = time.process_time() - busy
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(
+        f"points of {point_seconds * 1e3:g} ms, {number} workers: {points / spent:.0f} points/s, "
+        f"{points * point_seconds / spent / number:.0%} of the ideal; {chunks} chunks, {busy / chunks * 1e3:.1f} ms of "
+        f"processor each, {memory:.0f} MB",
+        flush=True,
+    )
     if done != points:
         raise AssertionError(f"{done} points of {points}")
     return points / spent
@@ -186,13 +195,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     runs += [(POINT_MILLISECONDS[0], MANY_WORKERS, MANY_SECONDS)]
     for milliseconds, number, seconds in runs:
         rates.append((milliseconds, number, rate(number, milliseconds / 1e3, seconds)))
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        share = rates[-1][2] * milliseconds / 1e3 / number
-        print(
-            f"points of {milliseconds:g} ms, {number} workers: {rates[-1][2]:.0f} points/s, {share:.0%} of the ideal, "
-            f"{memory:.0f} MB",
-            flush=True,
-        )
     with (options.output / "bench_scale.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("point_ms", "workers", "points_per_second"))
