@@ -30,11 +30,11 @@ CHUNK_SECONDS = 2.0
 """Planned time of one chunk, s, of up to 200 workers."""
 
 SHORTEST_SECONDS = 0.1
-"""Least planned time of a chunk, s, for the last chunks of a sweep, of up to 40 workers."""
+"""Least planned time of a chunk, s, for the last chunks of a sweep, of up to 20 workers."""
 
 MOST_RATE = 100.0
-"""Number of chunks that all workers end in a second, 1/s, four times as many towards the end of a sweep. A chunk takes
-Dask some 2 ms of one processor."""
+"""Number of chunks that all workers end in a second, 1/s, twice as many towards the end of a sweep. A chunk takes client
+and scheduler some 3 ms of one processor."""
 
 FIRST_POINTS = 64
 """Number of points in a chunk before the time of a point is known; a slow chunk ends early."""
@@ -231,7 +231,7 @@ class ChunkSchedule:
     def _fair_seconds(self) -> float:
         """Return the planned time of the next chunk of units, s: half of a worker's share of the rest."""
         share = self.left * (self._pace or 0.0) / (2 * self._workers)
-        shortest = max(SHORTEST_SECONDS, self._workers / (4.0 * MOST_RATE))
+        shortest = max(SHORTEST_SECONDS, self._workers / (2.0 * MOST_RATE))
         return min(self._chunk_seconds, max(share, shortest))
 
     @property

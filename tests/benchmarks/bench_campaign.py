@@ -84,7 +84,8 @@ def measured(points: int, impacts: bool, workers: int | None) -> None:
     print(
         f"{report.runs:>8} points: {wall:.1f} s, processor {sum(os.times()[:4]):.1f} s, computing "
         f"{report.compute_seconds:.1f} s, joining {report.compaction_seconds:.1f} s; "
-        f"{own / report.runs * 1e6:.0f} us a point in the body, overhead {overhead * 1e6:.1f} us; client {client:.0f} MB, largest worker {largest:.0f} MB; "
+        f"{own / report.runs * 1e6:.0f} us a point in the body, overhead {overhead * 1e6:.1f} us; "
+        f"client {client:.0f} MB, largest worker {largest:.0f} MB; "
         f"{size / report.runs:.0f} bytes a point; opened in {statistics.median(openings) * 1e3:.0f} ms",
         flush=True,
     )
