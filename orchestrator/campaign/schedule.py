@@ -33,8 +33,8 @@ SHORTEST_SECONDS = 0.1
 """Least planned time of a chunk, s, for the last chunks of a sweep, of up to 20 workers."""
 
 MOST_RATE = 100.0
-"""Number of chunks that all workers end in a second, 1/s, twice as many towards the end of a sweep. A chunk takes client
-and scheduler some 3 ms of one processor."""
+"""Number of chunks that all workers end in a second, 1/s, twice as many towards the end of a sweep. A chunk takes some
+3 ms of a processor of client and scheduler."""
 
 FIRST_POINTS = 64
 """Number of points in a chunk before the time of a point is known; a slow chunk ends early."""
