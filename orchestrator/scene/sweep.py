@@ -12,6 +12,7 @@ Run order (the `run` dimension of the dataset) is fixed by the scene alone:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -79,6 +80,14 @@ class SpacedValues(Sequence[float]):
         """Yield all values in blocks of at most `MOST_LISTED`."""
         for first in range(0, self.points, MOST_LISTED):
             yield self.at(np.arange(first, min(first + MOST_LISTED, self.points)))
+
+    @property
+    def differ(self) -> bool:
+        """Whether all values differ; they never turn back, so equal values are neighbours."""
+        step = abs(self.stop / 2.0 - self.start / 2.0) / (self.points - 1)
+        if step > 2.0 * math.ulp(max(abs(self.start), abs(self.stop)) / 2.0):
+            return True
+        return all((np.diff(block) != 0.0).all() for block in self.blocks())
 
     def at(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the values at some places, from 0 on."""
@@ -159,15 +168,15 @@ class SweepAxis:
     @property
     def lowest(self) -> float:
         """Lowest value."""
-        return min(self._ends)
+        return min(self.bounding)
 
     @property
     def highest(self) -> float:
         """Highest value."""
-        return max(self._ends)
+        return max(self.bounding)
 
     @property
-    def _ends(self) -> Sequence[float]:
+    def bounding(self) -> Sequence[float]:
         """Values among which are the lowest and the highest."""
         return (self.values[0], self.values[-1]) if isinstance(self.values, SpacedValues) else self.values
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice, pairwise
 
-import numpy as np
 from pydantic import ValidationError
 
 from vibroimpact.analysis.dataset.schema import DRAW, RESERVED_NAMES, SCATTERED
@@ -314,8 +313,8 @@ def _most_repeated(members: Sequence[SweepAxis]) -> tuple[tuple[float, ...], int
     spaced = [axis.values for axis in members if isinstance(axis.values, SpacedValues)]
     if not spaced:
         return Counter(zip(*(axis.values for axis in members), strict=True)).most_common(1)[0]
-    for values in spaced:  # these never turn back, so equal values are neighbours
-        if not any((np.diff(block) == 0.0).any() for block in values.blocks()):
+    for values in spaced:
+        if values.differ:
             return (values[0],), 1
     blocks = zip(*(axis.values for axis in members), strict=True)
     return Counter(islice(blocks, MOST_LISTED)).most_common(1)[0]

@@ -170,6 +170,7 @@ def test_values_on_access_have_the_bits_of_listed_ones(start: float, stop: float
     assert list(spaced[::-1]) == list(listed)[::-1]
     assert [spaced[place] for place in range(-points, points)] == [*listed, *listed]
     assert spaced[1:-1] == listed[1:-1]
+    assert spaced.differ == (len(set(listed)) == points)
     with pytest.raises(IndexError):
         spaced[points]
 
