@@ -24,7 +24,7 @@ static const vi_body *const_body_of(const void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power};
 }
 
 static void defaults(void *self)
@@ -347,7 +347,7 @@ static bool needs_events(const void *self)
 static size_t used_size(const void *self)
 {
     const vi_body *c = const_body_of(self);
-    return vi_this_description.struct_size - (vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan);
+    return vi_this_description.struct_size - (vi_record_unused(&c->record) + sizeof c->pressed + sizeof c->scan + sizeof c->power);
 }
 
 const vi_component vi_this_component = {
