@@ -126,6 +126,7 @@ def _library() -> ctypes.CDLL:
     ]
     library.vi_door_structure_free.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_by_series.argtypes = [ctypes.c_void_p]
+    library.vi_door_structure_at_once.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_record.argtypes = [ctypes.c_void_p, numbers, integer, integer, integer, integer]
     library.vi_door_structure_advance.argtypes = [ctypes.c_void_p, number, numbers, numbers, number]
     library.vi_door_structure_state.argtypes = [
@@ -185,7 +186,9 @@ class Structure:
     extrema, periods, energies : bool
         Follow the extremes, write a row for each forcing period, integrate the energies.
     by_series : bool
-        Follow long rests by series too, in place of their exact flow.
+        Follow long rests and contacts with power laws by series, in place of their exact flows.
+    at_once : bool
+        Take the steps of contacts with power laws from the first contact on.
 
     Raises
     ------
@@ -213,6 +216,7 @@ class Structure:
         periods: bool = False,
         energies: bool = False,
         by_series: bool = False,
+        at_once: bool = False,
     ) -> None:
         self._library = _library()
         natural = np.atleast_1d(np.asarray(modes.natural, dtype=np.float64))
@@ -253,6 +257,8 @@ class Structure:
         )
         if by_series:
             self._library.vi_door_structure_by_series(self._handle)
+        if at_once:
+            self._library.vi_door_structure_at_once(self._handle)
         self._rows = Rows()
         self._read()
 

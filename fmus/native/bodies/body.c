@@ -24,7 +24,7 @@ static const vi_body *const_body_of(const void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power};
 }
 
 static void defaults(void *self)
@@ -343,8 +343,8 @@ static bool needs_events(const void *self)
     return false;
 }
 
-/* Bytes of `pressed` and `scan`, the last members. */
-enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) };
+/* Bytes of `pressed`, `scan` and `power`, the last members. */
+enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) };
 
 /* Caches and unused rows of the record are not saved. */
 static size_t used_size(const void *self)

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "body/modal/modal_scan.h"
+#include "body/modal/power_tables.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/exchange.h"
 #include "body/modal/structure/structure.h"
@@ -34,8 +35,9 @@ typedef struct {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;   /* saved only as far as it is used; the members after it are not saved */
-    vi_pressed_cache pressed; /* `pressed` and `scan` are caches */
+    vi_pressed_cache pressed; /* `pressed`, `scan` and `power` are caches */
     vi_scan scan;
+    vi_power_tables power;
 } vi_body;
 
 /* The functions and references of one component; `self` is its struct. */

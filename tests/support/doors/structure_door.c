@@ -1,10 +1,12 @@
 #include "structure_door.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "body/modal/modal_scan.h"
+#include "body/modal/power_tables.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/structure.h"
 
@@ -15,13 +17,14 @@ struct vi_door_structure {
     vi_record record;
     vi_pressed_cache pressed;
     vi_scan scan;
-    int by_series; /* long rests too */
+    vi_power_tables power;
+    int by_series; /* long rests and contacts with a power law too */
 };
 
 static vi_structure parts(vi_door_structure *d)
 {
     return (vi_structure){&d->model, &d->state, d->contacts, &d->record, d->by_series ? NULL : &d->pressed,
-                          &d->scan};
+                          &d->scan, d->by_series ? NULL : &d->power};
 }
 
 static void set_stop(vi_contact *contact, const vi_door_stop *stop)
@@ -102,6 +105,11 @@ VI_DOOR void vi_door_structure_free(vi_door_structure *structure)
 VI_DOOR void vi_door_structure_by_series(vi_door_structure *structure)
 {
     structure->by_series = 1;
+}
+
+VI_DOOR void vi_door_structure_at_once(vi_door_structure *structure)
+{
+    structure->state.budget.events = INT32_MAX;
 }
 
 VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,

@@ -22,8 +22,11 @@ VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural
                                                  const double p[], double tolerance);
 VI_DOOR void vi_door_structure_free(vi_door_structure *structure);
 
-/* Follow long rests by series, in place of their exact flow. */
+/* Follow long rests, and contacts with power laws, by series, in place of their exact flows. */
 VI_DOOR void vi_door_structure_by_series(vi_door_structure *structure);
+
+/* Take the steps of contacts with power laws from the first contact on: tables are made whether they repay or not. */
+VI_DOOR void vi_door_structure_at_once(vi_door_structure *structure);
 
 /* Record impacts and sticks, extremes of the point `observed`, periods; follow energies. */
 VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,

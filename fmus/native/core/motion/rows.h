@@ -3,6 +3,8 @@
 #ifndef VIBROIMPACT_ROWS_H
 #define VIBROIMPACT_ROWS_H
 
+#include <stddef.h>
+
 /* Rows are read by whole lanes: each row has room for them, with zeros behind its last number. */
 enum { VI_LANES = 2 };
 
@@ -64,6 +66,35 @@ static inline void vi_row_add(double *restrict row, double factor, const double 
         for (int i = 0; i < VI_LANES; ++i) {
             row[j + i] += factor * other[j + i];
         }
+    }
+}
+
+/* Two numbers, wherever they are. GNU vector extensions: gcc, clang and zig have them on every machine. */
+typedef double vi_pair __attribute__((vector_size(16), aligned(8), may_alias));
+
+/* Width of a block of columns of a table. */
+enum { VI_COLUMNS = 8 };
+
+/* value += weight[0] * row 0 + weight[1] * row 1 + ... of a table whose rows are `stride` numbers apart. The sums are
+ * in the order of the rows. width: a multiple of VI_COLUMNS. */
+static inline void vi_rows_combine(double *restrict value, const double *restrict table, ptrdiff_t stride,
+                                   const double *restrict weight, int count, int width)
+{
+    for (int i = 0; i < width; i += VI_COLUMNS) {
+        vi_pair *const to = (vi_pair *)(value + i);
+        vi_pair a = to[0], b = to[1], c = to[2], d = to[3];
+        const double *row = table + i;
+        for (int n = 0; n < count; ++n, row += stride) {
+            const vi_pair *const from = (const vi_pair *)row, factor = {weight[n], weight[n]};
+            a += factor * from[0];
+            b += factor * from[1];
+            c += factor * from[2];
+            d += factor * from[3];
+        }
+        to[0] = a;
+        to[1] = b;
+        to[2] = c;
+        to[3] = d;
     }
 }
 

@@ -108,6 +108,7 @@ typedef struct {
     int32_t moved;              /* the instant at which the motion began has passed */
     vi_energies energies;
     vi_exchange exchange;
+    int64_t power_level;        /* longest step in a contact with a power law: power_tables.h */
     int64_t series;             /* segments followed by series since a contact came to rest, or nearly ended */
     double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
     int64_t low_impacts[VI_PORTS];   /* number of impacts in a row far below that approach */
@@ -128,6 +129,9 @@ typedef struct vi_pressed_cache vi_pressed_cache;
 /* Samples of a body's flights: modal_scan.h. */
 typedef struct vi_scan vi_scan;
 
+/* Responses over steps in a contact with a power law: power_tables.h. */
+typedef struct vi_power_tables vi_power_tables;
+
 /* Pointers to the parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
@@ -137,6 +141,7 @@ typedef struct {
     /* caches, no part of the state */
     vi_pressed_cache *pressed; /* NULL: long rests are followed by series, like short ones */
     vi_scan *scan;       /* NULL: flights are followed by certified steps only */
+    vi_power_tables *power; /* NULL: contacts with a power law are followed by series only */
 } vi_structure;
 
 /* Set mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.

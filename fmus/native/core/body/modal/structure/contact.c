@@ -88,6 +88,7 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     s->state->budget.events += 1;
     s->state->status[k] = VI_CONTACT_YIELDING;
     s->state->series = 0;
+    s->state->power_level = INT32_MAX;
     s->state->leaving[k] = 0;
     /* a contact that begins now begins at depth 0: a graze ends before its depth would exceed rounding */
     if (fabs(vi_structure_clearance(s, k)) <= SAME_INSTANT * DBL_EPSILON * size) {

@@ -10,6 +10,7 @@
 #include "body/modal/held.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/extremes.h"
+#include "body/modal/structure/power_contact.h"
 #include "body/modal/structure/pressed.h"
 #include "body/modal/structure/thin.h"
 
@@ -232,6 +233,12 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
                                   now.at, now.sign, now.press};
     if (!enter(s, &now, &start, length + room, &drift)) {
         look_at_powers(s, &now);
+        const double pressed = vi_structure_press_on(s, &now, &start, length);
+        if (pressed > 0.0) {
+            *event = VI_DRIFT_NO_EVENT;
+            *k = -1;
+            return pressed;
+        }
         vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));
     }
     const bool to_end = drift.length >= length;
