@@ -65,16 +65,18 @@ LANES_INLINE vector gathered(const vi_lane_array *table, int at, const int row[]
               + gather(table + VI_OF_ONE, VI_PARTS, at, row));
 }
 
-/* The state after some whole cells of each lane. */
-LANES_INLINE state after_cells(const vi_lane_group *g, int at, const state *s, vector cells)
+/* The state after some whole cells of each lane; q[]: displacements after all numbers of cells. */
+LANES_INLINE state after_cells(const vi_lane_group *g, int at, const state *s, const vector q[], vector cells)
 {
     int row[VI_WIDTH];
+    vector here;
 #pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         row[i] = (int)cells[i];
+        here[i] = q[row[i]][i];
     }
     const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
-    return (state){gathered(g->one.end_q[0], at, row, s), gathered(g->one.end_p[0], at, row, s),
+    return (state){here, gathered(g->one.end_p[0], at, row, s),
                    s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
 }
 

@@ -114,9 +114,10 @@ LANES_INLINE vector turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi
 /* Lanes at a strobe after some whole cells go on from there in the same round. Returns these lanes: all but those with
  * doubtful extremes. */
 LANES_INLINE mask pass_strobe(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
-                              bool follows, mask turns, vector passed, flight *f, extremes *e)
+                              bool follows, mask turns, const vector cells_q[], vector passed, flight *f,
+                              extremes *e)
 {
-    const state start = after_cells(g, at, &f->now, passed);
+    const state start = after_cells(g, at, &f->now, cells_q, passed);
     const vector length = larger(f->to_goal - passed, all(0.0));
     vector term[VI_LANE_ORDER + 1], added, slope;
     expand(g, at, &start, term);
@@ -164,7 +165,7 @@ LANES_INLINE candidate choose_cell(vi_lane_group *g, const vi_lanes_plan *plan, 
         const mask jumps = all_cells & (f->jumped < (double)(MOST_JUMPS * VI_CELLS));
         mask turns = on_strobe & (cleared > cell.passed) & (f->to_goal - cell.passed <= 1.0);
         if (any(turns)) {
-            turns = pass_strobe(g, plan, points, at, contacts, follows, turns, cell.passed, f, e);
+            turns = pass_strobe(g, plan, points, at, contacts, follows, turns, q, cell.passed, f, e);
             on_strobe = on_strobe & ~on_strobe; /* once */
         }
         if (!any(jumps | turns)) {
@@ -188,7 +189,7 @@ LANES_INLINE candidate choose_cell(vi_lane_group *g, const vi_lanes_plan *plan, 
         cell.limit = choose(met, load(g->limit[c] + at), cell.limit);
         cell.number = choose(met, all((double)(c + 1)), cell.number);
     }
-    cell.start = after_cells(g, at, &f->now, cell.passed);
+    cell.start = after_cells(g, at, &f->now, q, cell.passed);
     return cell;
 }
 
