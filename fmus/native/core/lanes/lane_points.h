@@ -6,8 +6,8 @@
 
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
 
-/* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
- * duration (s), largest force (N; NaN at a rigid stop). */
+/* Columns of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution. Then
+ * duration (s) and largest force (N), 0 and NaN at a rigid stop. */
 enum { VI_IMPACT_WIDTH = 8 };
 /* Columns of a period, over its points: largest and smallest displacement (m), displacement (m) and velocity (m/s) at
  * its start, number of impacts. */

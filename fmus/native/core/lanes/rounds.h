@@ -4,8 +4,8 @@
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
-/* Largest difference between the first guess of a contact and its share of the cell in the last flight, which is then a
- * better guess: periodic motion repeats. */
+/* Largest difference between the first guess of a contact and the share of the cell that ended the last flight. That
+ * share is a better guess then: periodic motion repeats. */
 #define ALIKE 1e-3
 /* Step of third order below which its error is a rounding. */
 #define EXACT_FROM 4e-6
@@ -60,7 +60,7 @@ LANES_INLINE void ends_of_cells(const vi_lane_group *g, int at, const flight *f,
 /* Count the cells in which a contact is surely not met. q[]: at the ends of the cells; bend: q'' now, over a cell.
  *
  * The motion exceeds the line over a cell by at most an eighth of its largest -y''. Second differences give y'' at the
- * ends of cells to a twelfth of the fourth derivative; between them y'' is off a line by an eighth of it. */
+ * ends of cells to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it. */
 LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const flight *f, const vector q[], vector bend)
 {
     const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
