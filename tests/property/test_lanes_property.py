@@ -11,7 +11,7 @@ from support.tolerance import LONG_PHASE, ORBIT
 from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, instructions
 from vibroimpact.fmus.errors import UsageError
 
-SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1)]
+SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1), (2, 4), (5, 3)]
 #: Largest difference of a point: a rounding after some dozen impacts, each of which may multiply it.
 FLIGHTS = 1e-9
 #: Most events of one point: elastic bodies between two stops would go on for long.

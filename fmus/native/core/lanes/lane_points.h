@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
+/* Most modes and contacts of a body, and most contacts of a body of one mode. */
+enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
 /* State of a point. */
 enum {
@@ -21,7 +22,7 @@ enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_A
 /* Common parameters of all points. */
 typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
-    int32_t contacts; /* 0 to VI_LANES_CONTACTS; each a rigid stop */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS, of one mode to VI_ONE_MODE_CONTACTS; each a rigid stop */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */

@@ -1,155 +1,144 @@
-/* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the careful search
- * finds. Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
-#include "lanes/rounds.h"
+/* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the search finds.
+ * Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
+#include "lanes/many_search.h"
+#include "lanes/many_tables.h"
 
-/* Rows of the tables for the present cell lengths of the lanes. */
+/* Result of a search for the lanes. */
 typedef struct {
-    vector step[VI_LANES_MODES][4], bulge[VI_LANES_CONTACTS];
-    vector turn_cosine, turn_sine, cells, rate;
-} level_rows;
+    mask hits, careful, arrives, leaves;
+    vector half, share; /* passed shortest cells, and the share of one more */
+    vector number;      /* of the contact that is hit */
+} search_result;
 
-LANES_INLINE level_rows rows_of(const vi_lane_group *g, int at, int modes, int contacts, const vector amplitude[])
+/* Rebound at the hit contacts; returns the lanes that leave lockstep. */
+LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, mask hits, const meeting *first,
+                               vector p[])
 {
-    const vi_many_modes *many = &g->many;
-    level_rows rows;
-    int row[VI_WIDTH];
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)many->level[at + i];
-    }
-    for (int j = 0; j < modes; ++j) {
-        for (int i = 0; i < 4; ++i) {
-            rows.step[j][i] = gather(&many->step[0][j][i], VI_LANES_MODES * 4, at, row);
-        }
-    }
+    const vector approach = first->approach * load(g->cell_rate + at);
+    const vector after = restitution_of(g, at, contacts, hits, first->number, approach) * approach;
+    const vector fastest = larger(load(g->fastest_impact + at), only(hits, approach));
+    const vector resolution = 2.0 * 2.220446049250313e-16 * (first->pull * first->size);
     for (int c = 0; c < contacts; ++c) {
-        const int stride = VI_POINTS * (VI_LANES_MODES + 1);
-        rows.bulge[c] = gather(&many->bulge[0][c][VI_LANES_MODES], stride, at, row);
+        const vector change = only(hits & (first->number == (double)(c + 1)), approach + after);
         for (int j = 0; j < modes; ++j) {
-            rows.bulge[c] += gather(&many->bulge[0][c][j], stride, at, row) * amplitude[j];
+            p[j] -= load(g->many.kick[c][j] + at) * change;
         }
     }
-    rows.turn_cosine = gather(many->turn_cosine, 1, at, row);
-    rows.turn_sine = gather(many->turn_sine, 1, at, row);
-    rows.cells = gather(many->cells, 1, at, row);
-    rows.rate = gather(many->rate, 1, at, row);
-    return rows;
+    store(g->fastest_impact + at, fastest);
+    store(g->hit + at, only(hits, first->number));
+    store(g->approach + at, only(hits, approach));
+    return hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
 }
 
-/* Displacement of a point from its stop, positive towards the stop. */
-LANES_INLINE vector point_at(const vi_lane_group *g, int at, int modes, int point, const vector q[], vector cosine,
-                             vector sine)
+/* Search the lanes whose next cell may have a contact, or has the goal; the lanes move on as far as is sure. */
+LANES_INLINE search_result search_many(vi_lane_group *g, int at, int modes, int contacts, const vector amplitude[],
+                                       mask searched, certified_flight *s)
 {
-    const vi_many_modes *many = &g->many;
-    vector y = (load(many->cosine[point] + at) * cosine + load(many->sine[point] + at) * sine)
-               + load(many->offset[point] + at);
-    for (int j = 0; j < modes; ++j) {
-        y += load(many->shape[point][j] + at) * q[j];
-    }
-    return y;
-}
-
-/* Has a contact just left come away over a shortest cell? Its mean velocity since then stays negative. */
-LANES_INLINE mask comes_away(const vi_lane_group *g, int at, int modes, int c, const vector p[], const vector amplitude[],
-                             vector cosine, vector sine, vector y)
-{
-    const vi_many_modes *many = &g->many;
-    vector speed = load(g->angular_frequency + at)
-                   * (load(many->sine[c] + at) * cosine - load(many->cosine[c] + at) * sine);
-    vector bound = load(many->leaving[c][VI_LANES_MODES] + at);
-    for (int j = 0; j < modes; ++j) {
-        speed += load(many->shape[c][j] + at) * p[j];
-        bound += load(many->leaving[c][j] + at) * amplitude[j];
-    }
-    return (larger(speed * load(g->cell + at), y) + bound < 0.0) & (load(many->level + at) == load(many->last + at));
-}
-
-/* The state after each cell, and the number of cells in which no contact is met. */
-typedef struct {
-    vector q[VI_CELLS + 1][VI_LANES_MODES], p[VI_CELLS + 1][VI_LANES_MODES];
-    vector count;
-} cells_ahead;
-
-LANES_INLINE void scan_many(const vi_lane_group *g, int at, int modes, int contacts, const level_rows *rows,
-                            const vector amplitude[], vector cosine, vector sine, cells_ahead *ahead)
-{
-    vector before[VI_LANES_CONTACTS];
-    mask clear = cosine == cosine;
-    const vector on = load(g->on + at);
-    const vector start_cosine = cosine, start_sine = sine;
+    const vector to_goal = seconds_to_goal(g, at) * load(g->cell_rate + at), none = all(0.0);
+    searched_cell cell;
+    derivatives d;
+    vector q[VI_LANES_MODES], p[VI_LANES_MODES];
+    cell.amplitude = amplitude;
+    choose_half(g, at, modes, contacts, s, to_goal - s->passed * load(g->many.present.cells + at), &cell);
+    expand_modes(g, at, modes, &cell.start, &d);
+    meeting first = {cell.length, none, none, none != none, none, none};
     for (int c = 0; c < contacts; ++c) {
-        before[c] = point_at(g, at, modes, c, ahead->q[0], cosine, sine);
-    }
-    ahead->count = all(0.0);
-    for (int i = 1; i <= VI_CELLS; ++i) {
-        const vector *q = ahead->q[i - 1], *p = ahead->p[i - 1];
-        for (int j = 0; j < modes; ++j) {
-            ahead->q[i][j] = rows->step[j][0] * q[j] + rows->step[j][1] * p[j];
-            ahead->p[i][j] = rows->step[j][2] * q[j] + rows->step[j][3] * p[j];
+        const mask met = searched & s->met[c];
+        if (any(met)) {
+            meet(g, at, modes, c, met, &cell, &d, &first);
         }
-        const vector turned = cosine * rows->turn_cosine - sine * rows->turn_sine;
-        sine = sine * rows->turn_cosine + cosine * rows->turn_sine;
-        cosine = turned;
-        for (int c = 0; c < contacts; ++c) {
-            const vector y = point_at(g, at, modes, c, ahead->q[i], cosine, sine);
-            mask passes = larger(before[c], y) + rows->bulge[c] < 0.0;
-            if (i == 1) {
-                const mask here = on == (double)(c + 1);
-                const mask left = comes_away(g, at, modes, c, ahead->p[0], amplitude, start_cosine, start_sine, y);
-                passes = (passes & ~here) | (left & here);
+    }
+    search_result r = {.careful = first.careful, .half = only(searched, cell.half)};
+    const mask moves = searched & ~first.careful;
+    r.hits = moves & (first.number > 0.0);
+    r.arrives = moves & cell.goal & ~r.hits;
+    r.share = only(moves, first.share);
+    r.number = only(r.hits, first.number);
+    state_at(g, at, modes, &d, first.share, q, p);
+    r.leaves = rebound_many(g, at, modes, contacts, r.hits, &first, p);
+    for (int j = 0; j < modes; ++j) {
+        s->now.q[j] = choose(moves, q[j], choose(searched, cell.start.q[j], s->now.q[j]));
+        s->now.p[j] = choose(moves, p[j], choose(searched, cell.start.p[j], s->now.p[j]));
+    }
+    return r;
+}
+
+/* Put the tables for the next round in place: longer cells after a whole round, shorter ones before a contact. */
+LANES_INLINE void change_level(vi_lane_group *g, int at, int modes, int contacts, mask whole)
+{
+    const vector level = load(g->many.level + at), last = load(g->many.last + at);
+    const vector next = choose(whole, larger(level - 1.0, all(0.0)), smaller(level + 1.0, last));
+    store(g->many.start_level + at, level);
+    store(g->many.level + at, next);
+    const mask changed = next != level;
+    if (any(changed)) {
+        for (int i = 0; i < VI_WIDTH; ++i) {
+            if (changed[i]) {
+                vi_lane_put_level(g, at + i, modes, contacts);
             }
-            clear &= passes;
-            before[c] = y;
         }
-        ahead->count += only(clear, all(1.0));
     }
+}
+
+/* Read the state at the start of a round, and bound the amplitudes of the modes from there on. */
+LANES_INLINE void begin_round_many(vi_lane_group *g, int at, int modes, cells_ahead *ahead, vector amplitude[])
+{
+    const vi_many_modes *many = &g->many;
+    vector cosine, sine;
+    turn(load(g->angular_frequency + at) * load(g->rest + at), &cosine, &sine);
+    store(g->start_cosine + at, ahead->cosine[0] = cosine);
+    store(g->start_sine + at, ahead->sine[0] = sine);
+    for (int j = 0; j < modes; ++j) {
+        const vector q = load(g->q[j] + at), p = load(g->p[j] + at);
+        amplitude[j] = size_of(q) + size_of(p + load(many->mix[j] + at) * q) * load(many->reach[j] + at);
+        store(g->start_q[j] + at, ahead->q[j][0] = q);
+        store(g->start_p[j] + at, ahead->p[j][0] = p);
+    }
+}
+
+/* Store the state at the end of a round; true when a lane has an event. */
+LANES_INLINE bool end_round_many(vi_lane_group *g, int at, int modes, const certified_flight *s, const search_result *r)
+{
+    const vector cells = s->passed * load(g->many.present.cells + at), share = r->half + r->share;
+    const vector impacts = load(g->impacts + at) + only(r->hits, all(1.0));
+    const mask reports = (load(g->reports + at) > 0.0) | (impacts >= load(g->most_impacts + at));
+    for (int j = 0; j < modes; ++j) {
+        store(g->q[j] + at, s->now.q[j]);
+        store(g->p[j] + at, s->now.p[j]);
+    }
+    store(g->passed + at, s->passed);
+    store(g->share + at, share);
+    store(g->impacts + at, impacts);
+    store(g->on + at, choose(r->hits, r->number, only(cells + share == 0.0, load(g->on + at))));
+    move_clock(g, at, cells + r->half, r->share, r->arrives);
+    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    event = choose(r->hits & reports, all((double)VI_EVENT_IMPACT), event);
+    event = choose(r->arrives, all((double)VI_EVENT_GOAL), event);
+    event = choose(r->careful, all((double)VI_EVENT_CELL), event);
+    event = choose(r->leaves, all((double)VI_EVENT_LEAVE), event);
+    store(g->event + at, event);
+    return any(event > 0.0);
 }
 
 LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contacts)
 {
-    const vi_many_modes *many = &g->many;
     cells_ahead ahead;
-    vector amplitude[VI_LANES_MODES], cosine, sine;
-    turn(load(g->angular_frequency + at) * load(g->rest + at), &cosine, &sine);
-    for (int j = 0; j < modes; ++j) {
-        const vector q = ahead.q[0][j] = load(g->q[j] + at), p = ahead.p[0][j] = load(g->p[j] + at);
-        amplitude[j] = size_of(q) + size_of(p + load(many->mix[j] + at) * q) * load(many->reach[j] + at);
+    certified_flight s;
+    vector amplitude[VI_LANES_MODES];
+    begin_round_many(g, at, modes, &ahead, amplitude);
+    const vector to_goal = seconds_to_goal(g, at) * load(g->many.present.rate + at);
+    const vector most = whole_part(smaller(larger(to_goal, all(0.0)), all((double)VI_CELLS)));
+    fly(g, at, modes, contacts, amplitude, most, &ahead, &s);
+    const mask whole = s.passed == (double)VI_CELLS;
+    const mask searched = ~whole & (load(g->many.level + at) == load(g->many.last + at));
+    const mask never = s.passed != s.passed;
+    search_result r = {never, never, never, never, all(0.0), all(0.0), all(0.0)};
+    if (any(searched)) {
+        r = search_many(g, at, modes, contacts, amplitude, searched, &s);
     }
-    const level_rows rows = rows_of(g, at, modes, contacts, amplitude);
-    scan_many(g, at, modes, contacts, &rows, amplitude, cosine, sine, &ahead);
-    const vector to_goal = seconds_to_goal(g, at) * rows.rate;
-    const vector before_goal = whole_part(smaller(larger(to_goal, all(0.0)), all((double)VI_CELLS)));
-    const vector passed = smaller(ahead.count, before_goal), level = load(many->level + at);
-    const mask whole = passed == (double)VI_CELLS, shortest = level == load(many->last + at);
-    int row[VI_WIDTH];
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)passed[i];
-    }
-    store(g->start_cosine + at, cosine);
-    store(g->start_sine + at, sine);
-    store(g->passed + at, passed);
-    store(g->share + at, all(0.0));
-    store(g->many.start_level + at, level);
-    for (int j = 0; j < modes; ++j) {
-        store(g->start_q[j] + at, ahead.q[0][j]);
-        store(g->start_p[j] + at, ahead.p[0][j]);
-        vector q, p;
-#pragma GCC unroll 8
-        for (int i = 0; i < VI_WIDTH; ++i) {
-            q[i] = ahead.q[row[i]][j][i];
-            p[i] = ahead.p[row[i]][j][i];
-        }
-        store(g->q[j] + at, q);
-        store(g->p[j] + at, p);
-    }
-    store(g->on + at, only(passed == 0.0, load(g->on + at)));
-    store(g->many.level + at, choose(whole, larger(level - 1.0, all(0.0)), smaller(level + 1.0, load(many->last + at))));
-    move_clock(g, at, passed * rows.cells, all(0.0), passed != passed);
-    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(~whole & shortest, all((double)VI_EVENT_CELL), event);
-    store(g->event + at, event);
-    return any(event > 0.0);
+    const bool found = end_round_many(g, at, modes, &s, &r);
+    change_level(g, at, modes, contacts, whole);
+    return found;
 }
 
 LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)

@@ -71,14 +71,20 @@ LANES_INLINE vector root(vector a)
     return r;
 }
 
+/* Is the mask set in a lane? Halves of registers are joined before numbers are. */
 LANES_INLINE bool any(mask where)
 {
-    int64_t found = 0;
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        found |= where[i];
+    typedef int64_t pair __attribute__((vector_size(16)));
+    const union {
+        mask all;
+        pair part[(VI_WIDTH + 1) / 2];
+    } parts = {where};
+    pair found = parts.part[0];
+#pragma GCC unroll 4
+    for (int i = 1; i < VI_WIDTH / 2; ++i) {
+        found |= parts.part[i];
     }
-    return found != 0;
+    return (found[0] | found[1]) != 0;
 }
 
 /* Rounding error of the sum `sum` = a + b (Knuth). */
