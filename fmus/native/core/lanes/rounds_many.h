@@ -96,32 +96,61 @@ LANES_INLINE void begin_round_many(vi_lane_group *g, int at, int modes, cells_ah
     }
 }
 
-/* Store the state at the end of a round; true when a lane has an event. */
-LANES_INLINE bool end_round_many(vi_lane_group *g, int at, int modes, const certified_flight *s, const search_result *r)
+/* Store the state at the end of a round. */
+LANES_INLINE void end_round_many(vi_lane_group *g, int at, int modes, const certified_flight *s, const search_result *r)
 {
     const vector cells = s->passed * load(g->many.present.cells + at), share = r->half + r->share;
-    const vector impacts = load(g->impacts + at) + only(r->hits, all(1.0));
-    const mask reports = (load(g->reports + at) > 0.0) | (impacts >= load(g->most_impacts + at));
     for (int j = 0; j < modes; ++j) {
         store(g->q[j] + at, s->now.q[j]);
         store(g->p[j] + at, s->now.p[j]);
     }
     store(g->passed + at, s->passed);
     store(g->share + at, share);
-    store(g->impacts + at, impacts);
+    store(g->impacts + at, load(g->impacts + at) + only(r->hits, all(1.0)));
     store(g->on + at, choose(r->hits, r->number, only(cells + share == 0.0, load(g->on + at))));
     move_clock(g, at, cells + r->half, r->share, r->arrives);
-    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(r->hits & reports, all((double)VI_EVENT_IMPACT), event);
-    event = choose(r->arrives, all((double)VI_EVENT_GOAL), event);
+}
+
+/* Turn the periods of lanes at their goals, as turn_periods. */
+LANES_INLINE mask turn_periods_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                    certified_flight *s, mask arrives)
+{
+    const vector goal = load(g->goal_periods + at), last = load(g->record.last_turn + at);
+    const mask turns = arrives & (goal < last) & (load(g->record.doubtful + at) == 0.0);
+    if (any(turns)) {
+        vector displacement, velocity;
+        s->now.cosine = all(1.0);
+        s->now.sine = all(0.0);
+        contact_at(g, at, plan->modes, VI_LANES_CONTACTS, &s->now, &displacement, &velocity);
+        end_periods(g, plan, points, at, turns);
+        begin_periods(g, at, turns, displacement, velocity);
+        store(g->goal_periods + at, goal + only(turns, all(1.0)));
+    }
+    return turns;
+}
+
+/* Record the round; true when a lane has an event. */
+LANES_INLINE bool record_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                    certified_flight *s, const search_result *r)
+{
+    store(g->record.doubtful + at, load(g->record.extremes + at));
+    const mask written = r->hits & ~r->leaves & (load(g->record.impacts + at) > 0.0);
+    if (any(written)) {
+        write_impacts(g, points, at, plan->contacts, written);
+    }
+    const mask turns = any(r->arrives) ? turn_periods_many(g, plan, points, at, s, r->arrives) : r->arrives;
+    vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    event = choose(r->hits & (load(g->impacts + at) >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT), event);
+    event = choose(r->arrives & ~turns, all((double)VI_EVENT_GOAL), event);
     event = choose(r->careful, all((double)VI_EVENT_CELL), event);
     event = choose(r->leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
     return any(event > 0.0);
 }
 
-LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contacts)
+LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
 {
+    const int modes = plan->modes, contacts = plan->contacts;
     cells_ahead ahead;
     certified_flight s;
     vector amplitude[VI_LANES_MODES];
@@ -136,28 +165,29 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contac
     if (any(searched)) {
         r = search_many(g, at, modes, contacts, amplitude, searched, &s);
     }
-    const bool found = end_round_many(g, at, modes, &s, &r);
+    end_round_many(g, at, modes, &s, &r);
+    const bool found = record_round_many(g, plan, points, at, &s, &r);
     change_level(g, at, modes, contacts, whole);
     return found;
 }
 
-LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
+LANES_INLINE void run_rounds_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
     bool found = false;
-    for (int i = 0; i < MOST_ROUNDS && !found; ++i) {
+    for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= one_round_many(g, at, modes, contacts);
+            found |= one_round_many(g, plan, points, at);
         }
     }
 }
 
-void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
+void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
-    if (modes > 1) {
-        run_rounds_many(g, modes, contacts);
-    } else if (contacts < 2) {
-        run_rounds(g, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
+    if (plan->modes > 1) {
+        run_rounds_many(g, plan, points);
+    } else if (plan->contacts < 2) {
+        run_rounds(g, plan, points, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
     } else {
-        run_rounds(g, 2);
+        run_rounds(g, plan, points, 2);
     }
 }
