@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from support.lane_points import IMPACT, TURN, Columns, follow_alone, oscillators, run
+from support.lane_points import IMPACT, PERIOD, TURN, Columns, follow_alone, oscillators, run
 from support.structure import peaking
 from support.tolerance import SEQUENCE
 
@@ -79,6 +79,18 @@ def test_a_peak_of_many_modes_over_the_stop_is_an_impact_however_little_it_is(
         for rows, over in zip(impacts[:5], LEVELS[:5], strict=True):
             allowed = bend / curve**2 * over + 4e-16 / over
             assert rows[0, 3] == pytest.approx(math.sqrt(2.0 * curve * over), rel=allowed)
+
+
+@pytest.mark.parametrize("modes", [1, 2, 5, 8])
+def test_the_largest_displacement_of_a_period_is_the_crest_to_rounding(modes: int) -> None:
+    # the length of the period moves the cells of the lanes against the crest
+    natural, shape, start = peaking(modes)
+    for end in np.linspace(3.5, 9.0, 12):
+        found = run(undamped(natural, shape, start, [2.0], float(end)))
+        largest, smallest = found.rows[0][found.rows[0][:, 0] == PERIOD][0, 2:4]
+        assert abs(largest - 1.0) <= 40.0 * np.finfo(float).eps
+        if end >= 2.0 * math.pi:  # the start is the trough that mirrors the crest
+            assert abs(smallest + 1.0) <= 40.0 * np.finfo(float).eps
 
 
 @pytest.mark.parametrize(("ripple", "fast"), [(1e-2, 211.0), (1e-3, 211.0), (1e-1, 61.0), (1e-2, 61.0)])

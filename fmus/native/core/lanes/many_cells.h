@@ -19,7 +19,7 @@ typedef vector edges[VI_CELLS + 1];
 /* The lanes of a vector over the cells of a round. */
 typedef struct {
     edges q[VI_LANES_MODES], p[VI_LANES_MODES], cosine, sine;
-    edges y[VI_LANES_CONTACTS], v[VI_LANES_CONTACTS];
+    edges y[VI_POINTS], v[VI_POINTS]; /* displacements of the points from their stops, and velocities */
 } cells_ahead;
 
 /* The lanes of a vector after the cells that are certified to be without contact. */
@@ -60,9 +60,8 @@ LANES_INLINE void contact_at(const vi_lane_group *g, int at, int modes, int c, c
 
 /* ---- the cells of a round ---- */
 
-LANES_INLINE void turn_ahead(const vi_level_rows *rows, int at, edges cosine, edges sine)
+LANES_INLINE void turn_ahead(vector c, vector n, edges cosine, edges sine)
 {
-    const vector c = load(rows->turn_cosine + at), n = load(rows->turn_sine + at);
 #pragma GCC unroll 8
     for (int i = 1; i <= VI_CELLS; ++i) {
         cosine[i] = cosine[i - 1] * c - sine[i - 1] * n;
@@ -176,9 +175,10 @@ LANES_INLINE void fly(const vi_lane_group *g, int at, int modes, int contacts, c
                       cells_ahead *ahead, certified_flight *s)
 {
     int row[VI_WIDTH];
-    turn_ahead(&g->many.present, at, ahead->cosine, ahead->sine);
+    const vi_level_rows *rows = &g->many.present;
+    turn_ahead(load(rows->turn_cosine + at), load(rows->turn_sine + at), ahead->cosine, ahead->sine);
     for (int j = 0; j < modes; ++j) {
-        mode_ahead(g->many.present.step[j], at, ahead->q[j], ahead->p[j]);
+        mode_ahead(rows->step[j], at, ahead->q[j], ahead->p[j]);
     }
     for (int c = 0; c < contacts; ++c) {
         contact_ahead(g, at, modes, c, ahead);

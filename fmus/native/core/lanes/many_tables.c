@@ -135,6 +135,21 @@ static void take_bulges(vi_lane_group *g, int lane, int c, int modes, const boun
     many->steady_pull[c][lane] = w * w * steady;
 }
 
+/* Set the largest deviations of the observed displacement from a cubic. */
+static void take_waves(vi_lane_group *g, int lane, int modes, const bounds bound[])
+{
+    vi_many_modes *many = &g->many;
+    const double cell = g->cell[lane], square = cell * cell, w = g->angular_frequency[lane];
+    for (int j = 0; j <= modes; ++j) {
+        const double first = j < modes ? bound[j].first : w, fourth = j < modes ? bound[j].fourth : w * w * w * w;
+        const double size = j < modes ? fabs(many->shape[VI_LANES_CONTACTS][j][lane])
+                                      : steady_size(g, lane, VI_LANES_CONTACTS);
+        many->wave[j][lane] = size * (fourth * (square * square) / 384.0);
+        many->flat[j][lane] = 2.0 * size;
+        many->rise[j][lane] = 0.25 * size * first * cell;
+    }
+}
+
 /* Set the largest deviations of the observed displacement and velocity from a line over cells of all levels. */
 static void take_tilts(vi_lane_group *g, int lane, int modes, const bounds bound[])
 {
@@ -218,6 +233,7 @@ static void take_steps(vi_lane_group *g, int lane, int modes, const vi_mode mode
     vi_many_modes *many = &g->many;
     const double cell = g->cell[lane];
     take_step(g, lane, modes, mode, cell, many->half, &many->half_cosine[lane], &many->half_sine[lane]);
+    take_step(g, lane, modes, mode, 2.0 * cell, many->two, &many->two_cosine[lane], &many->two_sine[lane]);
     for (int level = 0; level <= (int)many->last[lane]; ++level) {
         vi_level_rows *of = &many->rows[level];
         take_step(g, lane, modes, mode, of->cells[lane] * cell, of->step, &of->turn_cosine[lane], &of->turn_sine[lane]);
@@ -281,6 +297,7 @@ bool vi_lane_take_many(vi_lane_group *g, int lane, const vi_lanes_plan *plan, co
     }
     take_point(g, lane, VI_LANES_CONTACTS, modes, 1.0, 0.0, observed);
     take_tilts(g, lane, modes, bound);
+    take_waves(g, lane, modes, bound);
     vi_lane_put_level(g, lane, modes, plan->contacts);
     return true;
 }

@@ -1,38 +1,18 @@
 /* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the search finds.
  * Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
-#include "lanes/many_search.h"
+#include "lanes/many_extremes.h"
 #include "lanes/many_tables.h"
 
 /* Result of a search for the lanes. */
 typedef struct {
-    mask hits, careful, arrives, leaves;
-    vector half, share; /* passed shortest cells, and the share of one more */
-    vector number;      /* of the contact that is hit */
+    mask hits, careful, arrives;
+    vector half;   /* passed shortest cells; `first` has the share of one more */
+    meeting first;
 } search_result;
 
-/* Rebound at the hit contacts; returns the lanes that leave lockstep. */
-LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, mask hits, const meeting *first,
-                               vector p[])
-{
-    const vector approach = first->approach * load(g->cell_rate + at);
-    const vector after = restitution_of(g, at, contacts, hits, first->number, approach) * approach;
-    const vector fastest = larger(load(g->fastest_impact + at), only(hits, approach));
-    const vector resolution = 2.0 * 2.220446049250313e-16 * (first->pull * first->size);
-    for (int c = 0; c < contacts; ++c) {
-        const vector change = only(hits & (first->number == (double)(c + 1)), approach + after);
-        for (int j = 0; j < modes; ++j) {
-            p[j] -= load(g->many.kick[c][j] + at) * change;
-        }
-    }
-    store(g->fastest_impact + at, fastest);
-    store(g->hit + at, only(hits, first->number));
-    store(g->approach + at, only(hits, approach));
-    return hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
-}
-
 /* Search the lanes whose next cell may have a contact, or has the goal; the lanes move on as far as is sure. */
-LANES_INLINE search_result search_many(vi_lane_group *g, int at, int modes, int contacts, const vector amplitude[],
-                                       mask searched, certified_flight *s)
+LANES_INLINE search_result search_many(const vi_lane_group *g, int at, int modes, int contacts,
+                                       const vector amplitude[], mask searched, certified_flight *s)
 {
     const vector to_goal = seconds_to_goal(g, at) * load(g->cell_rate + at), none = all(0.0);
     searched_cell cell;
@@ -41,26 +21,44 @@ LANES_INLINE search_result search_many(vi_lane_group *g, int at, int modes, int 
     cell.amplitude = amplitude;
     choose_half(g, at, modes, contacts, s, to_goal - s->passed * load(g->many.present.cells + at), &cell);
     expand_modes(g, at, modes, &cell.start, &d);
-    meeting first = {cell.length, none, none, none != none, none, none};
+    search_result r = {.half = only(searched, cell.half), .first = {cell.length, none, none, none != none, none, none}};
     for (int c = 0; c < contacts; ++c) {
         const mask met = searched & s->met[c];
         if (any(met)) {
-            meet(g, at, modes, c, met, &cell, &d, &first);
+            meet(g, at, modes, c, met, &cell, &d, &r.first);
         }
     }
-    search_result r = {.careful = first.careful, .half = only(searched, cell.half)};
-    const mask moves = searched & ~first.careful;
-    r.hits = moves & (first.number > 0.0);
+    const mask moves = searched & ~r.first.careful;
+    r.careful = r.first.careful;
+    r.hits = moves & (r.first.number > 0.0);
     r.arrives = moves & cell.goal & ~r.hits;
-    r.share = only(moves, first.share);
-    r.number = only(r.hits, first.number);
-    state_at(g, at, modes, &d, first.share, q, p);
-    r.leaves = rebound_many(g, at, modes, contacts, r.hits, &first, p);
+    r.first.number = only(r.hits, r.first.number);
+    state_at(g, at, modes, &d, r.first.share, q, p);
     for (int j = 0; j < modes; ++j) {
         s->now.q[j] = choose(moves, q[j], choose(searched, cell.start.q[j], s->now.q[j]));
         s->now.p[j] = choose(moves, p[j], choose(searched, cell.start.p[j], s->now.p[j]));
     }
+    r.first.share = only(moves, r.first.share);
     return r;
+}
+
+/* Rebound at the hit contacts; returns the lanes that leave lockstep. */
+LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, const search_result *r, vector p[])
+{
+    const vector approach = r->first.approach * load(g->cell_rate + at), number = r->first.number;
+    const vector after = restitution_of(g, at, contacts, r->hits, number, approach) * approach;
+    const vector fastest = larger(load(g->fastest_impact + at), only(r->hits, approach));
+    const vector resolution = 2.0 * 2.220446049250313e-16 * (r->first.pull * r->first.size);
+    for (int c = 0; c < contacts; ++c) {
+        const vector change = only(number == (double)(c + 1), approach + after);
+        for (int j = 0; j < modes; ++j) {
+            p[j] -= load(g->many.kick[c][j] + at) * change;
+        }
+    }
+    store(g->fastest_impact + at, fastest);
+    store(g->hit + at, number);
+    store(g->approach + at, only(r->hits, approach));
+    return r->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
 }
 
 /* Put the tables for the next round in place: longer cells after a whole round, shorter ones before a contact. */
@@ -99,16 +97,15 @@ LANES_INLINE void begin_round_many(vi_lane_group *g, int at, int modes, cells_ah
 /* Store the state at the end of a round. */
 LANES_INLINE void end_round_many(vi_lane_group *g, int at, int modes, const certified_flight *s, const search_result *r)
 {
-    const vector cells = s->passed * load(g->many.present.cells + at), share = r->half + r->share;
+    const vector passed = s->passed + (r->half + r->first.share);
     for (int j = 0; j < modes; ++j) {
         store(g->q[j] + at, s->now.q[j]);
         store(g->p[j] + at, s->now.p[j]);
     }
     store(g->passed + at, s->passed);
-    store(g->share + at, share);
+    store(g->share + at, r->half + r->first.share);
     store(g->impacts + at, load(g->impacts + at) + only(r->hits, all(1.0)));
-    store(g->on + at, choose(r->hits, r->number, only(cells + share == 0.0, load(g->on + at))));
-    move_clock(g, at, cells + r->half, r->share, r->arrives);
+    store(g->on + at, choose(r->hits, r->first.number, only(passed == 0.0, load(g->on + at))));
 }
 
 /* Turn the periods of lanes at their goals, as turn_periods. */
@@ -131,19 +128,19 @@ LANES_INLINE mask turn_periods_many(vi_lane_group *g, const vi_lanes_plan *plan,
 
 /* Record the round; true when a lane has an event. */
 LANES_INLINE bool record_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
-                                    certified_flight *s, const search_result *r)
+                                    mask leaves, certified_flight *s, const search_result *r)
 {
-    store(g->record.doubtful + at, load(g->record.extremes + at));
-    const mask written = r->hits & ~r->leaves & (load(g->record.impacts + at) > 0.0);
+    const mask written = r->hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {
         write_impacts(g, points, at, plan->contacts, written);
     }
     const mask turns = any(r->arrives) ? turn_periods_many(g, plan, points, at, s, r->arrives) : r->arrives;
     vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(r->hits & (load(g->impacts + at) >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT), event);
+    event = choose(r->hits & (load(g->impacts + at) >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT),
+                   event);
     event = choose(r->arrives & ~turns, all((double)VI_EVENT_GOAL), event);
     event = choose(r->careful, all((double)VI_EVENT_CELL), event);
-    event = choose(r->leaves, all((double)VI_EVENT_LEAVE), event);
+    event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
     return any(event > 0.0);
 }
@@ -155,18 +152,24 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
     certified_flight s;
     vector amplitude[VI_LANES_MODES];
     begin_round_many(g, at, modes, &ahead, amplitude);
-    const vector to_goal = seconds_to_goal(g, at) * load(g->many.present.rate + at);
-    const vector most = whole_part(smaller(larger(to_goal, all(0.0)), all((double)VI_CELLS)));
+    const vector to_goal = seconds_to_goal(g, at) * load(g->many.present.rate + at), none = all(0.0);
+    const vector most = whole_part(smaller(larger(to_goal, none), all((double)VI_CELLS)));
     fly(g, at, modes, contacts, amplitude, most, &ahead, &s);
-    const mask whole = s.passed == (double)VI_CELLS;
+    const mask whole = s.passed == (double)VI_CELLS, never = none != none;
     const mask searched = ~whole & (load(g->many.level + at) == load(g->many.last + at));
-    const mask never = s.passed != s.passed;
-    search_result r = {never, never, never, never, all(0.0), all(0.0), all(0.0)};
+    search_result r = {never, never, never, none, {none, none, none, never, none, none}};
     if (any(searched)) {
         r = search_many(g, at, modes, contacts, amplitude, searched, &s);
     }
+    move_clock(g, at, s.passed * load(g->many.present.cells + at) + r.half, r.first.share, r.arrives);
+    mask doubtful = never;
+    if (any(load(g->record.extremes + at) > 0.0)) {
+        doubtful = extend_range(g, at, modes, amplitude, &ahead, &s.now, s.passed, r.half + r.first.share);
+    }
+    store(g->record.doubtful + at, only(doubtful, all(1.0)));
+    const mask leaves = any(r.hits) ? rebound_many(g, at, modes, contacts, &r, s.now.p) : never;
     end_round_many(g, at, modes, &s, &r);
-    const bool found = record_round_many(g, plan, points, at, &s, &r);
+    const bool found = record_round_many(g, plan, points, at, leaves, &s, &r);
     change_level(g, at, modes, contacts, whole);
     return found;
 }
