@@ -65,8 +65,8 @@ typedef struct {
     vi_lane_array two[VI_LANES_MODES][4], two_cosine, two_sine; /* the same over two shortest cells */
     /* largest deviations of the observed displacement and velocity from a line over a cell, for unit amplitudes */
     vi_lane_array sag[VI_LEVELS][VI_LANES_MODES + 1], tilt[VI_LEVELS][VI_LANES_MODES + 1];
-    /* largest deviation of the observed displacement from a cubic over cells of n shortest cells: the smaller of n^4 wave
-     * and flat + n rise, for unit amplitudes of the modes, then for the force */
+    /* Largest deviation of the observed displacement from a cubic over n shortest cells. It is the smaller of n^4 wave
+     * and flat + n rise, for unit amplitudes of the modes, then for the force. */
     vi_lane_array wave[VI_LANES_MODES + 1], flat[VI_LANES_MODES + 1], rise[VI_LANES_MODES + 1];
     vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
     vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level minus stop */

@@ -71,8 +71,8 @@ static bool take_levels(vi_lane_group *g, int lane, double fastest)
         return false;
     }
     int last = 0;
-    for (double longer = 2.0 * VI_LEVEL_RATIO * cell; last < VI_LEVELS - 1 && longer <= longest;
-         longer *= VI_LEVEL_RATIO) {
+    for (double longer = 2.0 * (double)VI_LEVEL_RATIO * cell; last < VI_LEVELS - 1 && longer <= longest;
+         longer *= (double)VI_LEVEL_RATIO) {
         last += 1;
     }
     g->cell[lane] = cell;
@@ -83,7 +83,7 @@ static bool take_levels(vi_lane_group *g, int lane, double fastest)
     for (int level = last; level >= 0; --level) {
         many->rows[level].cells[lane] = cells;
         many->rows[level].rate[lane] = 1.0 / (cells * cell);
-        cells *= VI_LEVEL_RATIO;
+        cells *= (double)VI_LEVEL_RATIO;
     }
     return true;
 }
