@@ -88,16 +88,16 @@ LANES_INLINE mask extend_by_crest(const vi_lane_group *g, int at, int modes, con
     const vector third = expand_contact(g, at, modes, VI_LANES_CONTACTS, &middle, &d, term), second = 2.0 * term[2];
     const mask concave = -second > third, convex = second > third;
     const vector low = all(-1.0), high = length - 1.0;
-    const vector first_slope = evaluate(term, VI_LANE_ORDER, low).slope;
-    const vector last_slope = evaluate(term, VI_LANE_ORDER, high).slope;
+    const vector first_slope = motion_by(term, VI_LANE_ORDER, low).slope;
+    const vector last_slope = motion_by(term, VI_LANE_ORDER, high).slope;
     const mask inside = (concave & (first_slope > 0.0) & (last_slope < 0.0))
                         | (convex & (first_slope < 0.0) & (last_slope > 0.0));
     vector share = low + length * (first_slope / (first_slope - last_slope));
     for (int i = 0; i < 2; ++i) {
-        const motion_at near = evaluate(term, NEAR_ORDER, share);
+        const motion_at near = motion_by(term, NEAR_ORDER, share);
         share = smaller(larger(share - near.slope / (2.0 * near.bend), low), high);
     }
-    const motion_at m = evaluate(term, VI_LANE_ORDER, share);
+    const motion_at m = motion_by(term, VI_LANE_ORDER, share);
     const vector step = -(m.slope / (2.0 * m.bend));
     /* the last step moves on a parabola */
     const vector x = (term[0] + m.added) + 0.5 * (m.slope * step);

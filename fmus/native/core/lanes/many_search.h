@@ -137,7 +137,7 @@ typedef struct {
 } motion_at;
 
 /* The motion by its Taylor terms up to the order `last`. */
-LANES_INLINE motion_at evaluate(const vector term[], int last, vector s)
+LANES_INLINE motion_at motion_by(const vector term[], int last, vector s)
 {
     const vector square = s * s, fourth = square * square;
     vector slope[VI_LANE_ORDER], bend[VI_LANE_ORDER];
@@ -185,11 +185,11 @@ LANES_INLINE vector within(vector share, vector length)
 LANES_INLINE mask go_to_zero(const vector term[], vector y, vector third, vector length, mask hits, vector *share,
                              vector *slope)
 {
-    motion_at m = evaluate(term, FIRST_ORDER, *share);
+    motion_at m = motion_by(term, FIRST_ORDER, *share);
     vector at = within(*share + step_to_zero(&m, y), length);
     mask done = ~hits;
     for (int i = 0; i < MOST_STEPS && any(~done); ++i) {
-        m = evaluate(term, VI_LANE_ORDER, at);
+        m = motion_by(term, VI_LANE_ORDER, at);
         const vector step = step_to_zero(&m, y), change = m.bend * step, after = m.slope + 2.0 * change;
         at = within(at + step, length);
         *share = choose(done, *share, at);
@@ -216,7 +216,7 @@ LANES_INLINE void meet(const vi_lane_group *g, int at, int modes, int c, mask me
     const vector noise = ROUNDING * size;
     const mask leaves = cell->on == (double)(c + 1);
     const vector y = only(~leaves, term[0]), up = term[1];
-    const motion_at end = evaluate(term, VI_LANE_ORDER, length);
+    const motion_at end = motion_by(term, VI_LANE_ORDER, length);
     const vector end_y = y + end.added, spread = third * length, second = 2.0 * term[2];
     const mask crosses = met & (end_y > 0.0), apart = leaves | (y < -noise);
     const mask rises = (smaller(up, end.slope) > 0.125 * (spread * length)) & (y <= noise);
