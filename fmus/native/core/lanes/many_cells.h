@@ -117,17 +117,20 @@ LANES_INLINE vector bulge_of(const vi_lane_group *g, int at, int modes, int c, c
 
 /* ---- the certificate ---- */
 
-/* Is a contact certainly not met in a cell? The control points of the cubic through its ends, plus the deviation from
- * the cubic, stay below the stop. `third` is a third of the cell. A contact just left (`here`) comes away if its mean
- * velocity since then stays negative: the same points over the time, and the deviation over the time. */
-LANES_INLINE mask is_clear(const contact_motion *from, vector end_y, vector end_v, vector third, vector bulge,
-                           mask here)
+/* Does a contact certainly stay below its stop in a cell? The control points of the cubic through the ends of the cell do,
+ * by more than the deviation from the cubic. `third` is a third of the cell. */
+LANES_INLINE mask stays_below(const contact_motion *from, vector end_y, vector end_v, vector third, vector bulge)
 {
-    const vector rise = third * from->v, before = end_y - third * end_v, limit = -bulge;
-    const mask below = (from->y < limit) & (from->y + rise < limit) & (before < limit) & (end_y < limit);
-    const vector lower = 2.4 * limit; /* 384 / 162 < 2.4: largest s (1 - s)^2 over largest s^2 (1 - s)^2 */
-    const mask left = here & (3.0 * rise < lower) & (1.5 * before < lower) & (end_y < lower);
-    return left | (below & ~here);
+    const vector limit = -bulge;
+    return (from->y < limit) & (from->y + third * from->v < limit) & (end_y - third * end_v < limit) & (end_y < limit);
+}
+
+/* Does a contact just left certainly come away in a cell? Its mean velocity since then stays negative: the same points
+ * over the time, and the deviation over the time. */
+LANES_INLINE mask comes_away(const contact_motion *from, vector end_y, vector end_v, vector third, vector bulge)
+{
+    const vector limit = -2.4 * bulge; /* 384 / 162 < 2.4: largest s (1 - s)^2 over largest s^2 (1 - s)^2 */
+    return (3.0 * (third * from->v) < limit) & (1.5 * (end_y - third * end_v) < limit) & (end_y < limit);
 }
 
 /* Count the cells that each lane certainly passes, up to `most`. */
@@ -145,11 +148,13 @@ LANES_INLINE void count_cells(const vi_lane_group *g, int at, int contacts, cons
     for (int i = 1; i <= VI_CELLS; ++i) {
         mask clear = ~never;
         for (int c = 0; c < contacts; ++c) {
-            const mask here = (on == (double)(c + 1)) & (i == 1 ? ~never : never);
             const contact_motion from = {ahead->y[c][i - 1], ahead->v[c][i - 1], s->contact[c].bulge};
-            mask passes = is_clear(&from, ahead->y[c][i], ahead->v[c][i], third, from.bulge, here);
-            if (i == 1) {
-                passes &= ~here | shortest; /* deviations over the time hold for the shortest cells alone */
+            const vector end_y = ahead->y[c][i], end_v = ahead->v[c][i];
+            mask passes = stays_below(&from, end_y, end_v, third, from.bulge);
+            if (i == 1) { /* deviations over the time hold for the shortest cells alone */
+                const mask here = on == (double)(c + 1);
+                const mask away = comes_away(&from, end_y, end_v, third, from.bulge) & shortest;
+                passes = (passes & ~here) | (away & here);
             }
             s->met[c] |= goes & ~passes;
             clear &= passes;

@@ -55,7 +55,10 @@ LANES_INLINE void choose_half(const vi_lane_group *g, int at, int modes, int con
         vector y, v;
         contact_at(g, at, modes, c, &middle, &y, &v);
         /* the deviation is a sixteenth of the whole cell's; its rounding stays */
-        clear &= is_clear(&s->contact[c], y, v, third, 0.25 * s->contact[c].bulge, on == (double)(c + 1));
+        const vector bulge = 0.25 * s->contact[c].bulge;
+        const mask here = on == (double)(c + 1);
+        clear &= (stays_below(&s->contact[c], y, v, third, bulge) & ~here)
+                 | (comes_away(&s->contact[c], y, v, third, bulge) & here);
     }
     for (int j = 0; j < modes; ++j) {
         cell->start.q[j] = choose(clear, middle.q[j], s->now.q[j]);
