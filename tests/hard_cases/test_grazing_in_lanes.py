@@ -81,6 +81,22 @@ def test_a_peak_of_many_modes_over_the_stop_is_an_impact_however_little_it_is(
             assert rows[0, 3] == pytest.approx(math.sqrt(2.0 * curve * over), rel=allowed)
 
 
+@pytest.mark.parametrize("fast", [5.0, 21.0])
+def test_the_first_of_three_crossings_close_to_each_other_is_the_impact(fast: float) -> None:
+    # sin(t) - b sin(fast t) near t = 0, where its slope is -dip: three zeros within a cell
+    for dip in np.geomspace(1e-5, 0.03, 24):
+        start = np.array([-1.0, (1.0 + dip) / fast])
+        points = undamped(np.array([1.0, fast]), np.array([1.0, 1.0]), start, [0.0], 2.0)
+        found = run(points, impact_limit=1)
+        with follow_alone(points, 0) as body:
+            expected = body.impacts[0]
+        if dip >= 1e-4 or found.has_run[0]:  # rounding decides the others; the lanes may leave them
+            first = found.rows[0][0]
+            assert first[1] < 0.5 * math.pi
+            assert abs(first[1] - expected[1]) <= 2e-15 / dip
+            assert first[3] == pytest.approx(expected[3], rel=1e-14 / dip**1.5)
+
+
 @pytest.mark.parametrize("modes", [1, 2, 5, 8])
 def test_the_largest_displacement_of_a_period_is_the_crest_to_rounding(modes: int) -> None:
     # the length of the period moves the cells of the lanes against the crest
