@@ -60,8 +60,8 @@ CHOSEN = {
     ),
     "lanes look at the curve of a cell too boldly": (
         "core/lanes/rounds.h",
-        "const vector bulge = 0.125 * s->second;",
-        "const vector bulge = 0.0125 * s->second;",
+        "0.125 * smaller(smaller(curve, end_curve) - error, none);",
+        "0.0125 * smaller(smaller(curve, end_curve) - error, none);",
     ),
     "lanes of several modes take every rise for a steady one": (
         "core/lanes/many_search.h",
@@ -79,9 +79,9 @@ CHOSEN = {
         "restitution / root(root(approach / yields * (1.0 + 4e-9)))",
     ),
     "the phase of a cell in lanes turns the other way": (
-        "core/lanes/rounds.h",
-        "cell->sine = s->sine * c + s->cosine * n;",
-        "cell->sine = s->sine * c - s->cosine * n;",
+        "core/lanes/cells.h",
+        "return (state){q, p, s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};",
+        "return (state){q, p, s->cosine * c - s->sine * n, s->sine * c - s->cosine * n};",
     ),
     "the low part of the period is lost": (
         "core/motion/clock.c",

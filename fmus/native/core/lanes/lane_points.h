@@ -7,8 +7,8 @@
 /* Most modes and contacts of a body, and most contacts of a body of one mode. */
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
-/* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
- * duration (s), largest force (N; NaN at a rigid stop). */
+/* Columns of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution. Then
+ * duration (s) and largest force (N), 0 and NaN at a rigid stop. */
 enum { VI_IMPACT_WIDTH = 8 };
 /* Columns of a period, over its points: largest and smallest displacement (m), displacement (m) and velocity (m/s) at
  * its start, number of impacts. */

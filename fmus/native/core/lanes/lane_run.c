@@ -305,6 +305,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     run->recording = run->goal_is_period = run->period_open = false;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
     g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
+    g->hit_cells[lane] = -1.0;
     g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;
     g->record.last_turn[lane] = -1.0;
     g->record.point[lane] = (double)point;

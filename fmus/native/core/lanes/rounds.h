@@ -4,6 +4,11 @@
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
+/* Largest difference between the first guess of a contact and the share of the cell that ended the last flight. That
+ * share is a better guess then: periodic motion repeats. */
+#define ALIKE 1e-3
+/* Step of third order below which its error is a rounding. */
+#define EXACT_FROM 4e-6
 /* Most times in a row that a lane goes through all its cells in one round, and most strobes that it passes there. */
 enum { MOST_JUMPS = 3, MOST_STROBES = 1 };
 
@@ -42,38 +47,47 @@ LANES_INLINE flight begin_round(const vi_lane_group *g, int at)
     return f;
 }
 
-/* Count the cells in which each contact is surely not met. q[]: at the ends of the cells. */
-LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const flight *f, vector count[], vector q[])
+/* Displacements at the ends of the cells ahead. */
+LANES_INLINE void ends_of_cells(const vi_lane_group *g, int at, const flight *f, vector q[])
 {
-    vector before[VI_LANES_CONTACTS], sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS];
-    mask clear[VI_LANES_CONTACTS];
-    const vector bulge = 0.125 * f->second;
     q[0] = f->now.q;
-    for (int c = 0; c < contacts; ++c) {
-        sign[c] = load(g->sign[c] + at);
-        limit[c] = load(g->limit[c] + at);
-        before[c] = sign[c] * q[0] - limit[c];
-        count[c] = all(0.0);
-        clear[c] = before[c] == before[c];
-    }
 #pragma GCC unroll 8
     for (int i = 1; i <= VI_CELLS; ++i) {
         q[i] = linear(g->one.end_q[i], at, &f->now);
-        for (int c = 0; c < contacts; ++c) {
-            const vector y = sign[c] * q[i] - limit[c];
-            mask passes = larger(before[c], y) + bulge < 0.0;
-            if (i == 1) {
-                /* just left: the mean velocity since then, which is smooth, stays negative */
-                const vector leaving = sign[c] * (f->now.p * load(g->cell + at));
-                const mask left = larger(leaving, y) + f->third * (1.0 / 24.0) < 0.0;
-                const mask here = f->on == (double)(c + 1);
-                passes = (passes & ~here) | (left & here);
-            }
-            clear[c] &= passes;
-            count[c] += only(clear[c], all(1.0));
-            before[c] = y;
-        }
     }
+}
+
+/* Count the cells in which a contact is surely not met. q[]: at the ends of the cells; bend: q'' now, over a cell.
+ *
+ * The motion exceeds the line over a cell by at most an eighth of its largest -y''. Second differences give y'' at the
+ * ends of cells to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it. */
+LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const flight *f, const vector q[], vector bend)
+{
+    const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
+    const vector error = f->fourth * (1.0 / 12.0 + 1.0 / 8.0), none = all(0.0);
+    vector before = sign * q[0] - limit, here = sign * q[1] - limit, curve = sign * bend;
+    mask clear = before == before, counted = (mask)all(WHOLE);
+#pragma GCC unroll 8
+    for (int i = 1; i <= VI_CELLS; ++i) {
+        vector next = here, end_curve = curve - f->third;
+        if (i < VI_CELLS) {
+            next = sign * q[i + 1] - limit;
+            end_curve = (next - here) - (here - before);
+        }
+        mask passes = larger(before, here) < 0.125 * smaller(smaller(curve, end_curve) - error, none);
+        if (i == 1) {
+            /* just left: the mean velocity since then, which is smooth, stays negative */
+            const vector leaving = sign * (f->now.p * load(g->cell + at));
+            const mask left = larger(leaving, here) + f->third * (1.0 / 24.0) < 0.0, on = f->on == (double)(c + 1);
+            passes = (passes & ~on) | (left & on);
+        }
+        clear &= passes;
+        counted -= clear;
+        before = here;
+        here = next;
+        curve = end_curve;
+    }
+    return (vector)counted - WHOLE;
 }
 
 /* Whole cells that a lane surely passes: no contact in them, and not beyond the goal. */
@@ -156,7 +170,11 @@ LANES_INLINE candidate choose_cell(vi_lane_group *g, const vi_lanes_plan *plan, 
     const vector last = load(g->record.last_turn + at);
     mask fresh = e->follows, on_strobe = load(g->goal_periods + at) < last;
     for (int i = 0; i <= (MOST_STROBES + 1) * (MOST_JUMPS + 1); ++i) {
-        scan(g, at, contacts, f, count, q);
+        ends_of_cells(g, at, f, q);
+        const vector bend = 2.0 * linear(g->one.taylor[2], at, &f->now);
+        for (int c = 0; c < contacts; ++c) {
+            count[c] = count_clear(g, at, c, f, q, bend);
+        }
         cell.passed = sure_cells(f, contacts, count, &cleared);
         if (follows) {
             follow_cells(g, at, e, fresh, f, q, cell.passed);
@@ -203,6 +221,22 @@ LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector sh
     return share - step * (1.0 + step * (bend * inverse));
 }
 
+/* Share of the cell at which the rising motion y + sign * (added value) of some lanes meets its contact. */
+LANES_INLINE vector find_contact(const vi_lane_group *g, int at, mask hits, const flight *f, const candidate *cell,
+                                 const vector term[], vector y, vector slope, vector end_y, vector end_slope)
+{
+    const vector guess = first_guess(y, slope, end_y, end_slope, cell->length), last = load(g->hit_share + at);
+    const mask repeats = (f->jumped + cell->passed == load(g->hit_cells + at)) & (size_of(last - guess) < ALIKE);
+    const vector from = choose(repeats, last, guess);
+    const vector near = smaller(larger(closer(term, y, cell->sign, from), all(0.0)), cell->length);
+    const mask found = size_of(near - from) < EXACT_FROM;
+    if (!any(hits & ~found)) {
+        return near;
+    }
+    const vector nearer = smaller(larger(closer(term, y, cell->sign, near), all(0.0)), cell->length);
+    return choose(found, near, nearer);
+}
+
 /* Result of a round for the lanes. */
 typedef struct {
     vector share; /* passed share of the cell */
@@ -231,11 +265,7 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, con
     a.careful = cell->searched & ~a.hits & (cell->twofold | ~(below | (rises & (end_y <= 0.0))));
     a.share = length;
     if (any(a.hits)) {
-        vector share = first_guess(y, first, end_y, end_slope, length);
-        for (int i = 0; i < 2; ++i) {
-            share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
-        }
-        a.share = choose(a.hits, share, length);
+        a.share = choose(a.hits, find_contact(g, at, a.hits, f, cell, term, y, first, end_y, end_slope), length);
         evaluate(term, a.share, &added, &slope);
         const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
         a.hits &= ~lost;
@@ -342,6 +372,8 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     store(g->start_cosine + at, f.start.cosine);
     store(g->start_sine + at, f.start.sine);
     store(g->jumped + at, f.jumped);
+    store(g->hit_cells + at, choose(a.hits, f.jumped + cell.passed, load(g->hit_cells + at)));
+    store(g->hit_share + at, choose(a.hits, a.share, load(g->hit_share + at)));
     store(g->passed + at, cell.passed);
     store(g->share + at, share);
     store(g->impacts + at, impacts);
