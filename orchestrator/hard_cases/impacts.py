@@ -192,6 +192,14 @@ def _dead_stop() -> Found:
     )
 
 
+def _errors_in_lanes(**tables: Any) -> list[float]:
+    """Return the largest relative error of each point's impacts in lanes; inf where their number differs."""
+    pairs = zip(impacts_of_points("auto", **tables), impacts_of_points("fused", **tables), strict=True)
+    return [
+        largest(relative(lanes, alone)) if lanes.shape == alone.shape else math.inf for lanes, alone in pairs
+    ]
+
+
 def _in_lanes() -> Found:
     """Sweeps of the starts of one mass, a chain and a beam, in lanes of the vector registers and one by one."""
     starts = {"start": -0.9, "stop": 0.1, "points": 20}
@@ -220,19 +228,39 @@ def _in_lanes() -> Found:
     )
     errors = []
     for body, forcing, key in bodies:
-        tables = {
+        errors += _errors_in_lanes(
             **{"body": body, "forcing": forcing, "stop": [restitution(0.3, 0.7)]},
             **{"record": {"recorded_periods": 12}, "sweep": {key: starts}},
-        }
-        pairs = zip(impacts_of_points("auto", **tables), impacts_of_points("fused", **tables), strict=True)
-        errors += [
-            largest(relative(lanes, alone)) if lanes.shape == alone.shape else math.inf
-            for lanes, alone in pairs
-        ]
+        )
     off = np.array(errors)
     return Found(
         largest(off), Curve(np.arange(1.0, 61.0), off, "points of mass, chain, beam", "relative error (-)")
     )
+
+
+def _four_stops_in_lanes() -> Found:
+    """Sweep of the start of a beam between two pairs of stops, in lanes and one by one."""
+    body = {
+        **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0},
+        **{"modes": 4, "damping_ratio": 0.05, "displacement_start": [0.0, 0.0, 0.0, 0.0]},
+    }
+    stops = [
+        restitution(sign * 0.3 * place, 0.8, side="upper" if sign > 0.0 else "lower", location=place)
+        for place in (0.6, 1.0)
+        for sign in (1.0, -1.0)
+    ]
+    starts = {"start": -0.02, "stop": 0.02, "points": 20}
+    off = np.array(
+        _errors_in_lanes(
+            body=body,
+            forcing={"amplitude": 1.0, "angular_frequency": 3.5, "location": 1.0},
+            stop=stops,
+            record={"recorded_periods": 2},
+            sweep={"body.displacement_start[1]": starts},
+        )
+    )
+    start = np.linspace(-0.02, 0.02, 20)
+    return Found(largest(off), Curve(start, off, "start of the first mode (-)", "relative error (-)"))
 
 
 CASES = (
@@ -315,5 +343,15 @@ CASES = (
         "relative error of times and speeds",
         7e-14,
         _in_lanes,
+    ),
+    HardCase(
+        "four-stops-in-lanes",
+        THEME,
+        "20 points of a beam between two pairs of stops, computed together",
+        "have the same impacts as one by one, slow ones too",
+        "each point alone",
+        "relative error of times and speeds",
+        4e-11,
+        _four_stops_in_lanes,
     ),
 )

@@ -103,7 +103,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
     return {
         "measuring chain": scene.is_measured or scene.exciter is not None,
         "time series": scene.record.time_series is not None,
-        "many contacts": len(scene.stops) > core.MOST_CONTACTS,
+        "many contacts": len(scene.stops) > core.most_contacts(body.kept_modes),
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),
         "residual vectors": body.has_residual_vectors,

@@ -156,7 +156,7 @@ def cases(periods: int) -> dict[str, Case]:
         },
         "chaos": counted(oscillators(periods // 10, 1, start_p=0.1, **chaos)),
     }
-    for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2)):
+    for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2), (8, 4)):
         bodies = drawn(200, modes, contacts, seed=3, transient=60, recorded=1)
         found[f"random bodies: {modes} modes, {contacts} contacts"] = counted(bodies)
     return found

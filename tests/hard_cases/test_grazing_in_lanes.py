@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from support.lane_points import IMPACT, TURN, Columns, follow_alone, oscillators, run
+from support.lane_points import IMPACT, PERIOD, TURN, Columns, follow_alone, oscillators, run
 from support.structure import peaking
 from support.tolerance import SEQUENCE
 
@@ -79,6 +79,34 @@ def test_a_peak_of_many_modes_over_the_stop_is_an_impact_however_little_it_is(
         for rows, over in zip(impacts[:5], LEVELS[:5], strict=True):
             allowed = bend / curve**2 * over + 4e-16 / over
             assert rows[0, 3] == pytest.approx(math.sqrt(2.0 * curve * over), rel=allowed)
+
+
+@pytest.mark.parametrize("fast", [5.0, 21.0])
+def test_the_first_of_three_crossings_close_to_each_other_is_the_impact(fast: float) -> None:
+    # sin(t) - b sin(fast t) near t = 0, where its slope is -dip: three zeros within a cell
+    for dip in np.geomspace(1e-5, 0.03, 24):
+        start = np.array([-1.0, (1.0 + dip) / fast])
+        points = undamped(np.array([1.0, fast]), np.array([1.0, 1.0]), start, [0.0], 2.0)
+        found = run(points, impact_limit=1)
+        with follow_alone(points, 0) as body:
+            expected = body.impacts[0]
+        if dip >= 1e-4 or found.has_run[0]:  # rounding decides the others; the lanes may leave them
+            first = found.rows[0][0]
+            assert first[1] < 0.5 * math.pi
+            assert abs(first[1] - expected[1]) <= 2e-15 / dip
+            assert first[3] == pytest.approx(expected[3], rel=1e-14 / dip**1.5)
+
+
+@pytest.mark.parametrize("modes", [1, 2, 5, 8])
+def test_the_largest_displacement_of_a_period_is_the_crest_to_rounding(modes: int) -> None:
+    # the length of the period moves the cells of the lanes against the crest
+    natural, shape, start = peaking(modes)
+    for end in np.linspace(3.5, 9.0, 12):
+        found = run(undamped(natural, shape, start, [2.0], float(end)))
+        largest, smallest = found.rows[0][found.rows[0][:, 0] == PERIOD][0, 2:4]
+        assert abs(largest - 1.0) <= 40.0 * np.finfo(float).eps
+        if end >= 2.0 * math.pi:  # the start is the trough that mirrors the crest
+            assert abs(smallest + 1.0) <= 40.0 * np.finfo(float).eps
 
 
 @pytest.mark.parametrize(("ripple", "fast"), [(1e-2, 211.0), (1e-3, 211.0), (1e-1, 61.0), (1e-2, 61.0)])

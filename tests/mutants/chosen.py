@@ -63,6 +63,16 @@ CHOSEN = {
         "0.125 * smaller(smaller(curve, end_curve) - error, none);",
         "0.0125 * smaller(smaller(curve, end_curve) - error, none);",
     ),
+    "lanes of several modes take every rise for a steady one": (
+        "core/lanes/many_search.h",
+        "0.125 * (spread * length)",
+        "0.0 * (spread * length)",
+    ),
+    "lanes of several modes look at the cubic of a cell too boldly": (
+        "core/lanes/many_tables.c",
+        "vi_min(fourth * (square * square) / 384.0, ",
+        "vi_min(fourth * (square * square) / 384000.0, ",
+    ),
     "restitution that falls with speed is off by 1e-9 in lanes": (
         "core/lanes/rounds.h",
         "restitution / root(root(approach / yields))",

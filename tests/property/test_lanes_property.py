@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.component_fmu import OscillatorFmu, forced, stop
 from support.lane_points import IMPACT, PERIOD, Columns, Results, drawn, follow_alone, oscillators, run, taken
 from support.tolerance import LONG_PHASE, ORBIT
@@ -11,11 +13,13 @@ from support.tolerance import LONG_PHASE, ORBIT
 from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, instructions
 from vibroimpact.fmus.errors import UsageError
 
-SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1)]
+SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1), (2, 4), (5, 3)]
 #: Largest difference of a point: a rounding after some dozen impacts, each of which may multiply it.
 FLIGHTS = 1e-9
 #: Largest difference after ten impacts of chaos, each of which multiplies a rounding by ten or so at most.
 CHAOS = 1e-10
+#: Number of impacts that are compared between many stops, and their largest difference.
+FIRST, NEAR = 5, 1e-8
 #: Most events of one point: elastic bodies between two stops would go on for long.
 MOST = 300
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
@@ -90,6 +94,23 @@ def test_one_row_for_all_periods_reduces_the_rows_of_each(modes: int, contacts: 
             last = periods[-1, 4:6]
             expected = [periods[:, 2].max(), periods[:, 3].min(), *last, periods[:, 6].sum() / len(periods)]
             assert found.tolist() == expected
+
+
+@settings(max_examples=10)
+@given(modes=st.integers(2, 8), contacts=st.integers(0, 4), light=st.booleans(), seed=st.integers(0, 10**6))
+def test_the_first_impacts_between_many_stops_are_those_of_the_scalar_engine(
+    modes: int, contacts: int, light: bool, seed: int
+) -> None:
+    points = drawn(8, modes, contacts, seed, transient=0)
+    points["decay"] *= 1e-3 if light else 1.0
+    found = run(points, impact_limit=MOST)
+    for place in np.flatnonzero(found.has_run):
+        own = found.rows[place][found.rows[place][:, 0] == IMPACT]
+        with follow_alone(points, int(place), impact_limit=MOST) as body:
+            first = body.impacts[body.impacts[:, 1] >= points["begin"][place] * (1.0 - 1e-12)][:FIRST]
+        assert len(first) == min(len(own), FIRST)
+        assert own[:FIRST, 5].tolist() == first[:, 5].tolist()
+        assert np.abs(own[:FIRST, [1, 3]] - first[:, [1, 3]]).max(initial=0.0) <= NEAR
 
 
 def test_rows_that_find_no_room_are_asked_for() -> None:

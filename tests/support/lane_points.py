@@ -170,7 +170,9 @@ def drawn(
     ratio[strong] = random.choice([0.0, 0.9999, 1.0, 1.3, 2.5], strong.sum())
     shape = random.uniform(0.4, 1.2, (max(contacts, 1), modes, count))
     shape[:, 1:] *= random.choice([-1.0, 1.0], (max(contacts, 1), modes - 1, count))
-    position = np.array([[1.0], [-1.0]])[:contacts] * random.uniform(0.2, 1.5, (contacts, count))
+    position = np.array([[1.0], [-1.0], [1.0], [-1.0]])[:contacts] * random.uniform(
+        0.2, 1.5, (contacts, count)
+    )
     frequency = np.exp(random.uniform(-1.0, 1.2, count))
     phase = np.where(random.random(count) < 0.5, 0.0, random.uniform(-4.0, 4.0, count))
     first = transient + (phase % TURN > 0.0)

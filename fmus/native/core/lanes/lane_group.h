@@ -43,23 +43,40 @@ typedef struct {
 } vi_one_mode;
 
 /* Lengths of cells for bodies of several modes: each level has a quarter of the length of the one before. */
-enum { VI_LEVELS = 5, VI_POINTS = VI_LANES_CONTACTS + 1 };
+enum { VI_LEVELS = 5, VI_LEVEL_RATIO = 4, VI_POINTS = VI_LANES_CONTACTS + 1 };
+
+/* Rows of the tables for one length of cells. */
+typedef struct {
+    vi_lane_array step[VI_LANES_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
+    vi_lane_array turn_cosine, turn_sine;  /* turn of the force over a cell */
+    vi_lane_array cells, rate;             /* length of a cell in shortest cells; its reciprocal, 1/s */
+    /* largest deviation of a contact's displacement from a cubic over a cell: for unit amplitudes of the modes, then for
+     * the force and rounding */
+    vi_lane_array bulge[VI_LANES_CONTACTS][VI_LANES_MODES + 1];
+} vi_level_rows;
 
 /* Tables of a body of several modes. Its motion is the steady response plus the unforced motion of each mode. Rows of
  * points: the contacts, towards their stops, then the observed point. */
 typedef struct {
-    vi_lane_array step[VI_LEVELS][VI_LANES_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
-    vi_lane_array turn_cosine[VI_LEVELS], turn_sine[VI_LEVELS];
-    vi_lane_array cells[VI_LEVELS], rate[VI_LEVELS];  /* length of a cell in shortest cells; 1/s */
-    /* largest deviation of a displacement from a line over a cell, for unit amplitudes of the modes and of the force */
-    vi_lane_array bulge[VI_LEVELS][VI_POINTS][VI_LANES_MODES + 1];
-    vi_lane_array tilt[VI_LEVELS][VI_LANES_MODES + 1]; /* the same for the observed velocity */
-    vi_lane_array leaving[VI_LANES_CONTACTS][VI_LANES_MODES + 1]; /* third derivative / 24 over a shortest cell's cube */
+    vi_level_rows rows[VI_LEVELS];                    /* of each level: the longest cells, ..., two shortest cells */
+    vi_level_rows present;                            /* of the lane's level */
+    vi_lane_array half[VI_LANES_MODES][4];            /* as `step`, over one shortest cell */
+    vi_lane_array half_cosine, half_sine;
+    vi_lane_array two[VI_LANES_MODES][4], two_cosine, two_sine; /* the same over two shortest cells */
+    /* largest deviations of the observed displacement and velocity from a line over a cell, for unit amplitudes */
+    vi_lane_array sag[VI_LEVELS][VI_LANES_MODES + 1], tilt[VI_LEVELS][VI_LANES_MODES + 1];
+    /* Largest deviation of the observed displacement from a cubic over n shortest cells. It is the smaller of n^4 wave
+     * and flat + n rise, for unit amplitudes of the modes, then for the force. */
+    vi_lane_array wave[VI_LANES_MODES + 1], flat[VI_LANES_MODES + 1], rise[VI_LANES_MODES + 1];
     vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
     vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level minus stop */
     vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude <= |q| + |p + mix q| reach */
     vi_lane_array level, start_level, last;           /* level: present; in the last round; shortest */
-    /* for the careful search */
+    /* for the search */
+    vi_lane_array drag[VI_LANES_MODES], spring[VI_LANES_MODES]; /* q'' + drag q' + spring q = 0 over a shortest cell */
+    vi_lane_array turn;                               /* of the force over a shortest cell, rad */
+    vi_lane_array pull[VI_LANES_MODES];               /* bound of the acceleration for unit amplitude, 1/s^2 */
+    vi_lane_array steady_pull[VI_LANES_CONTACTS];     /* bound of the acceleration of the steady response, m/s^2 */
     vi_lane_array stiffness[VI_LANES_MODES], decay[VI_LANES_MODES];
     vi_lane_array steady_cosine[VI_LANES_MODES], steady_sine[VI_LANES_MODES], rest[VI_LANES_MODES];
     vi_lane_array kick[VI_LANES_CONTACTS][VI_LANES_MODES]; /* modal velocities that take away a unit of approach */

@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
+/* Most modes and contacts of a body, and most contacts of a body of one mode. */
+enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
 /* Columns of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution. Then
  * duration (s) and largest force (N), 0 and NaN at a rigid stop. */
@@ -28,7 +29,7 @@ enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_A
 /* Common parameters of all points. */
 typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
-    int32_t contacts; /* 0 to VI_LANES_CONTACTS; each a rigid stop */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS, of one mode to VI_ONE_MODE_CONTACTS; each a rigid stop */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;

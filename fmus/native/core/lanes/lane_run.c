@@ -212,7 +212,7 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
     vi_lane_group *g = w->group;
     w->run[lane].point = -1;
-    g->cell_rate[lane] = g->period[lane] = g->many.rate[0][lane] = 1.0;
+    g->cell_rate[lane] = g->period[lane] = g->many.present.rate[lane] = 1.0;
     g->goal_periods[lane] = 1e300;
     g->most_impacts[lane] = HUGE_VAL;
     for (int c = 0; c < VI_LANES_CONTACTS; ++c) {

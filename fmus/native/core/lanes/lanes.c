@@ -28,7 +28,8 @@ static kept_state *aligned(void *memory)
 
 static bool is_plan(const vi_lanes_plan *plan)
 {
-    return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
+    const int most = plan->modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS;
+    return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= most
            && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 

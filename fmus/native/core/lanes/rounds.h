@@ -277,21 +277,32 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, con
     return a;
 }
 
+/* Restitution of an impact at this speed of approach, for the contact that each lane hits. */
+LANES_INLINE vector restitution_of(const vi_lane_group *g, int at, int contacts, mask hits, vector number,
+                                   vector approach)
+{
+    vector restitution = all(0.0), yields = all(0.0);
+    for (int c = 0; c < contacts; ++c) {
+        const mask here = number == (double)(c + 1);
+        restitution = choose(here, load(g->restitution[c] + at), restitution);
+        yields = choose(here, load(g->yield_velocity[c] + at), yields);
+    }
+    const mask softer = hits & (yields > 0.0) & (approach > yields);
+    if (any(softer)) {
+        restitution = choose(softer, restitution / root(root(approach / yields)), restitution);
+    }
+    return restitution;
+}
+
 /* Rebound at the hit contacts; returns the lanes that leave lockstep. */
 LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *cell, arrival *a)
 {
     const vector approach = cell->sign * a->p;
-    vector restitution = all(0.0), yields = all(0.0), resolution = all(0.0);
+    vector resolution = all(0.0);
     for (int c = 0; c < contacts; ++c) {
-        const mask here = cell->number == (double)(c + 1);
-        restitution = choose(here, load(g->restitution[c] + at), restitution);
-        yields = choose(here, load(g->yield_velocity[c] + at), yields);
-        resolution = choose(here, load(g->resolution[c] + at), resolution);
+        resolution = choose(cell->number == (double)(c + 1), load(g->resolution[c] + at), resolution);
     }
-    const mask softer = a->hits & (yields > 0.0) & (approach > yields);
-    if (any(softer)) {
-        restitution = choose(softer, restitution / root(root(approach / yields)), restitution);
-    }
+    const vector restitution = restitution_of(g, at, contacts, a->hits, cell->number, approach);
     const vector after = restitution * approach;
     const vector fastest = larger(load(g->fastest_impact + at), only(a->hits, approach));
     const mask leaves = a->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));

@@ -1,164 +1,185 @@
-/* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the careful search
- * finds. Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
-#include "lanes/rounds.h"
+/* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the search finds.
+ * Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
+#include "lanes/many_extremes.h"
+#include "lanes/many_tables.h"
 
-/* Rows of the tables for the present cell lengths of the lanes. */
+/* Result of a search for the lanes. */
 typedef struct {
-    vector step[VI_LANES_MODES][4], bulge[VI_LANES_CONTACTS];
-    vector turn_cosine, turn_sine, cells, rate;
-} level_rows;
+    mask hits, careful, arrives;
+    vector half;   /* passed shortest cells; `first` has the share of one more */
+    meeting first;
+} search_result;
 
-LANES_INLINE level_rows rows_of(const vi_lane_group *g, int at, int modes, int contacts, const vector amplitude[])
+/* Search the lanes whose next cell may have a contact, or has the goal; the lanes move on as far as is sure. */
+LANES_INLINE search_result search_many(const vi_lane_group *g, int at, int modes, int contacts,
+                                       const vector amplitude[], mask searched, certified_flight *s)
 {
-    const vi_many_modes *many = &g->many;
-    level_rows rows;
-    int row[VI_WIDTH];
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)many->level[at + i];
-    }
-    for (int j = 0; j < modes; ++j) {
-        for (int i = 0; i < 4; ++i) {
-            rows.step[j][i] = gather(&many->step[0][j][i], VI_LANES_MODES * 4, at, row);
-        }
-    }
+    const vector to_goal = seconds_to_goal(g, at) * load(g->cell_rate + at), none = all(0.0);
+    searched_cell cell;
+    derivatives d;
+    vector q[VI_LANES_MODES], p[VI_LANES_MODES];
+    cell.amplitude = amplitude;
+    choose_half(g, at, modes, contacts, s, to_goal - s->passed * load(g->many.present.cells + at), &cell);
+    expand_modes(g, at, modes, &cell.start, &d);
+    search_result r = {.half = only(searched, cell.half), .first = {cell.length, none, none, none != none, none, none}};
     for (int c = 0; c < contacts; ++c) {
-        const int stride = VI_POINTS * (VI_LANES_MODES + 1);
-        rows.bulge[c] = gather(&many->bulge[0][c][VI_LANES_MODES], stride, at, row);
-        for (int j = 0; j < modes; ++j) {
-            rows.bulge[c] += gather(&many->bulge[0][c][j], stride, at, row) * amplitude[j];
+        const mask met = searched & s->met[c];
+        if (any(met)) {
+            meet(g, at, modes, c, met, &cell, &d, &r.first);
         }
     }
-    rows.turn_cosine = gather(many->turn_cosine, 1, at, row);
-    rows.turn_sine = gather(many->turn_sine, 1, at, row);
-    rows.cells = gather(many->cells, 1, at, row);
-    rows.rate = gather(many->rate, 1, at, row);
-    return rows;
-}
-
-/* Displacement of a point from its stop, positive towards the stop. */
-LANES_INLINE vector point_at(const vi_lane_group *g, int at, int modes, int point, const vector q[], vector cosine,
-                             vector sine)
-{
-    const vi_many_modes *many = &g->many;
-    vector y = (load(many->cosine[point] + at) * cosine + load(many->sine[point] + at) * sine)
-               + load(many->offset[point] + at);
+    const mask moves = searched & ~r.first.careful;
+    r.careful = r.first.careful;
+    r.hits = moves & (r.first.number > 0.0);
+    r.arrives = moves & cell.goal & ~r.hits;
+    r.first.number = only(r.hits, r.first.number);
+    state_at(g, at, modes, &d, r.first.share, q, p);
     for (int j = 0; j < modes; ++j) {
-        y += load(many->shape[point][j] + at) * q[j];
+        s->now.q[j] = choose(moves, q[j], choose(searched, cell.start.q[j], s->now.q[j]));
+        s->now.p[j] = choose(moves, p[j], choose(searched, cell.start.p[j], s->now.p[j]));
     }
-    return y;
+    r.first.share = only(moves, r.first.share);
+    return r;
 }
 
-/* Has a contact just left come away over a shortest cell? Its mean velocity since then stays negative. */
-LANES_INLINE mask comes_away(const vi_lane_group *g, int at, int modes, int c, const vector p[], const vector amplitude[],
-                             vector cosine, vector sine, vector y)
+/* Rebound at the hit contacts; returns the lanes that leave lockstep. */
+LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, const search_result *r, vector p[])
 {
-    const vi_many_modes *many = &g->many;
-    vector speed = load(g->angular_frequency + at)
-                   * (load(many->sine[c] + at) * cosine - load(many->cosine[c] + at) * sine);
-    vector bound = load(many->leaving[c][VI_LANES_MODES] + at);
-    for (int j = 0; j < modes; ++j) {
-        speed += load(many->shape[c][j] + at) * p[j];
-        bound += load(many->leaving[c][j] + at) * amplitude[j];
-    }
-    return (larger(speed * load(g->cell + at), y) + bound < 0.0) & (load(many->level + at) == load(many->last + at));
-}
-
-/* The state after each cell, and the number of cells in which no contact is met. */
-typedef struct {
-    vector q[VI_CELLS + 1][VI_LANES_MODES], p[VI_CELLS + 1][VI_LANES_MODES];
-    vector count;
-} cells_ahead;
-
-LANES_INLINE void scan_many(const vi_lane_group *g, int at, int modes, int contacts, const level_rows *rows,
-                            const vector amplitude[], vector cosine, vector sine, cells_ahead *ahead)
-{
-    vector before[VI_LANES_CONTACTS];
-    mask clear = cosine == cosine;
-    const vector on = load(g->on + at);
-    const vector start_cosine = cosine, start_sine = sine;
+    const vector approach = r->first.approach * load(g->cell_rate + at), number = r->first.number;
+    const vector after = restitution_of(g, at, contacts, r->hits, number, approach) * approach;
+    const vector fastest = larger(load(g->fastest_impact + at), only(r->hits, approach));
+    const vector resolution = 2.0 * 2.220446049250313e-16 * (r->first.pull * r->first.size);
     for (int c = 0; c < contacts; ++c) {
-        before[c] = point_at(g, at, modes, c, ahead->q[0], cosine, sine);
-    }
-    ahead->count = all(0.0);
-    for (int i = 1; i <= VI_CELLS; ++i) {
-        const vector *q = ahead->q[i - 1], *p = ahead->p[i - 1];
+        const vector change = only(number == (double)(c + 1), approach + after);
         for (int j = 0; j < modes; ++j) {
-            ahead->q[i][j] = rows->step[j][0] * q[j] + rows->step[j][1] * p[j];
-            ahead->p[i][j] = rows->step[j][2] * q[j] + rows->step[j][3] * p[j];
+            p[j] -= load(g->many.kick[c][j] + at) * change;
         }
-        const vector turned = cosine * rows->turn_cosine - sine * rows->turn_sine;
-        sine = sine * rows->turn_cosine + cosine * rows->turn_sine;
-        cosine = turned;
-        for (int c = 0; c < contacts; ++c) {
-            const vector y = point_at(g, at, modes, c, ahead->q[i], cosine, sine);
-            mask passes = larger(before[c], y) + rows->bulge[c] < 0.0;
-            if (i == 1) {
-                const mask here = on == (double)(c + 1);
-                const mask left = comes_away(g, at, modes, c, ahead->p[0], amplitude, start_cosine, start_sine, y);
-                passes = (passes & ~here) | (left & here);
-            }
-            clear &= passes;
-            before[c] = y;
-        }
-        ahead->count += only(clear, all(1.0));
     }
+    store(g->fastest_impact + at, fastest);
+    store(g->hit + at, number);
+    store(g->approach + at, only(r->hits, approach));
+    return r->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
 }
 
-LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contacts)
+/* Put the tables for the next round in place: longer cells after a whole round, shorter ones before a contact. */
+LANES_INLINE void change_level(vi_lane_group *g, int at, int modes, int contacts, mask whole)
 {
-    const vi_many_modes *many = &g->many;
-    cells_ahead ahead;
-    vector amplitude[VI_LANES_MODES], cosine, sine;
-    turn(load(g->angular_frequency + at) * load(g->rest + at), &cosine, &sine);
-    for (int j = 0; j < modes; ++j) {
-        const vector q = ahead.q[0][j] = load(g->q[j] + at), p = ahead.p[0][j] = load(g->p[j] + at);
-        amplitude[j] = size_of(q) + size_of(p + load(many->mix[j] + at) * q) * load(many->reach[j] + at);
-    }
-    const level_rows rows = rows_of(g, at, modes, contacts, amplitude);
-    scan_many(g, at, modes, contacts, &rows, amplitude, cosine, sine, &ahead);
-    const vector to_goal = seconds_to_goal(g, at) * rows.rate;
-    const vector before_goal = whole_part(smaller(larger(to_goal, all(0.0)), all((double)VI_CELLS)));
-    const vector passed = smaller(ahead.count, before_goal), level = load(many->level + at);
-    const mask whole = passed == (double)VI_CELLS, shortest = level == load(many->last + at);
-    int row[VI_WIDTH];
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)passed[i];
-    }
-    store(g->start_cosine + at, cosine);
-    store(g->start_sine + at, sine);
-    store(g->passed + at, passed);
-    store(g->share + at, all(0.0));
+    const vector level = load(g->many.level + at), last = load(g->many.last + at);
+    const vector next = choose(whole, larger(level - 1.0, all(0.0)), smaller(level + 1.0, last));
     store(g->many.start_level + at, level);
-    for (int j = 0; j < modes; ++j) {
-        store(g->start_q[j] + at, ahead.q[0][j]);
-        store(g->start_p[j] + at, ahead.p[0][j]);
-        vector q, p;
-#pragma GCC unroll 8
+    store(g->many.level + at, next);
+    const mask changed = next != level;
+    if (any(changed)) {
         for (int i = 0; i < VI_WIDTH; ++i) {
-            q[i] = ahead.q[row[i]][j][i];
-            p[i] = ahead.p[row[i]][j][i];
+            if (changed[i]) {
+                vi_lane_put_level(g, at + i, modes, contacts);
+            }
         }
-        store(g->q[j] + at, q);
-        store(g->p[j] + at, p);
     }
-    store(g->on + at, only(passed == 0.0, load(g->on + at)));
-    store(g->many.level + at, choose(whole, larger(level - 1.0, all(0.0)), smaller(level + 1.0, load(many->last + at))));
-    move_clock(g, at, passed * rows.cells, all(0.0), passed != passed);
-    store(g->record.doubtful + at, load(g->record.extremes + at));
+}
+
+/* Read the state at the start of a round, and bound the amplitudes of the modes from there on. */
+LANES_INLINE void begin_round_many(vi_lane_group *g, int at, int modes, cells_ahead *ahead, vector amplitude[])
+{
+    const vi_many_modes *many = &g->many;
+    vector cosine, sine;
+    turn(load(g->angular_frequency + at) * load(g->rest + at), &cosine, &sine);
+    store(g->start_cosine + at, ahead->cosine[0] = cosine);
+    store(g->start_sine + at, ahead->sine[0] = sine);
+    for (int j = 0; j < modes; ++j) {
+        const vector q = load(g->q[j] + at), p = load(g->p[j] + at);
+        amplitude[j] = size_of(q) + size_of(p + load(many->mix[j] + at) * q) * load(many->reach[j] + at);
+        store(g->start_q[j] + at, ahead->q[j][0] = q);
+        store(g->start_p[j] + at, ahead->p[j][0] = p);
+    }
+}
+
+/* Store the state at the end of a round. */
+LANES_INLINE void end_round_many(vi_lane_group *g, int at, int modes, const certified_flight *s, const search_result *r)
+{
+    const vector passed = s->passed + (r->half + r->first.share);
+    for (int j = 0; j < modes; ++j) {
+        store(g->q[j] + at, s->now.q[j]);
+        store(g->p[j] + at, s->now.p[j]);
+    }
+    store(g->passed + at, s->passed);
+    store(g->share + at, r->half + r->first.share);
+    store(g->impacts + at, load(g->impacts + at) + only(r->hits, all(1.0)));
+    store(g->on + at, choose(r->hits, r->first.number, only(passed == 0.0, load(g->on + at))));
+}
+
+/* Turn the periods of lanes at their goals, as turn_periods. */
+LANES_INLINE mask turn_periods_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                    certified_flight *s, mask arrives)
+{
+    const vector goal = load(g->goal_periods + at), last = load(g->record.last_turn + at);
+    const mask turns = arrives & (goal < last) & (load(g->record.doubtful + at) == 0.0);
+    if (any(turns)) {
+        vector displacement, velocity;
+        s->now.cosine = all(1.0);
+        s->now.sine = all(0.0);
+        contact_at(g, at, plan->modes, VI_LANES_CONTACTS, &s->now, &displacement, &velocity);
+        end_periods(g, plan, points, at, turns);
+        begin_periods(g, at, turns, displacement, velocity);
+        store(g->goal_periods + at, goal + only(turns, all(1.0)));
+    }
+    return turns;
+}
+
+/* Record the round; true when a lane has an event. */
+LANES_INLINE bool record_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                    mask leaves, certified_flight *s, const search_result *r)
+{
+    const mask written = r->hits & ~leaves & (load(g->record.impacts + at) > 0.0);
+    if (any(written)) {
+        write_impacts(g, points, at, plan->contacts, written);
+    }
+    const mask turns = any(r->arrives) ? turn_periods_many(g, plan, points, at, s, r->arrives) : r->arrives;
     vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(~whole & shortest, all((double)VI_EVENT_CELL), event);
+    event = choose(r->hits & (load(g->impacts + at) >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT),
+                   event);
+    event = choose(r->arrives & ~turns, all((double)VI_EVENT_GOAL), event);
+    event = choose(r->careful, all((double)VI_EVENT_CELL), event);
+    event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
     return any(event > 0.0);
 }
 
-LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
+LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
+{
+    const int modes = plan->modes, contacts = plan->contacts;
+    cells_ahead ahead;
+    certified_flight s;
+    vector amplitude[VI_LANES_MODES];
+    begin_round_many(g, at, modes, &ahead, amplitude);
+    const vector to_goal = seconds_to_goal(g, at) * load(g->many.present.rate + at), none = all(0.0);
+    const vector most = whole_part(smaller(larger(to_goal, none), all((double)VI_CELLS)));
+    fly(g, at, modes, contacts, amplitude, most, &ahead, &s);
+    const mask whole = s.passed == (double)VI_CELLS, never = none != none;
+    const mask searched = ~whole & (load(g->many.level + at) == load(g->many.last + at));
+    search_result r = {never, never, never, none, {none, none, none, never, none, none}};
+    if (any(searched)) {
+        r = search_many(g, at, modes, contacts, amplitude, searched, &s);
+    }
+    move_clock(g, at, s.passed * load(g->many.present.cells + at) + r.half, r.first.share, r.arrives);
+    mask doubtful = never;
+    if (any(load(g->record.extremes + at) > 0.0)) {
+        doubtful = extend_range(g, at, modes, amplitude, &ahead, &s.now, s.passed, r.half + r.first.share);
+    }
+    store(g->record.doubtful + at, only(doubtful, all(1.0)));
+    const mask leaves = any(r.hits) ? rebound_many(g, at, modes, contacts, &r, s.now.p) : never;
+    end_round_many(g, at, modes, &s, &r);
+    const bool found = record_round_many(g, plan, points, at, leaves, &s, &r);
+    change_level(g, at, modes, contacts, whole);
+    return found;
+}
+
+LANES_INLINE void run_rounds_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
     bool found = false;
     for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= one_round_many(g, at, modes, contacts);
+            found |= one_round_many(g, plan, points, at);
         }
     }
 }
@@ -166,7 +187,7 @@ LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
 void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
     if (plan->modes > 1) {
-        run_rounds_many(g, plan->modes, plan->contacts);
+        run_rounds_many(g, plan, points);
     } else if (plan->contacts < 2) {
         run_rounds(g, plan, points, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
     } else {

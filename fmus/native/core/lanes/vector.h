@@ -78,12 +78,22 @@ LANES_INLINE vector smaller(vector a, vector b)
 
 LANES_INLINE bool any(mask where)
 {
+#if VI_WIDTH == 4 /* halves of a register are joined before numbers are */
+    typedef int64_t pair __attribute__((vector_size(16)));
+    const union {
+        mask whole;
+        pair half[2];
+    } parts = {where};
+    const pair found = parts.half[0] | parts.half[1];
+    return (found[0] | found[1]) != 0;
+#else
     int64_t found = 0;
 #pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
         found |= where[i];
     }
     return found != 0;
+#endif
 }
 #endif
 

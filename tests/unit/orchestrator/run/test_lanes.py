@@ -23,6 +23,13 @@ def scene(body: str = OSCILLATOR, *, stop: str = STOP, record: str = RECORD, res
 
 
 TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
+ALONG = [
+    f'[[stop]]\nposition = {sign}1.0\nside = "{side}"\nlocation = {place}\nrestitution = 0.5\n'
+    for place in (0.6, 0.8, 1.0)
+    for sign, side in (("", "upper"), ("-", "lower"))
+]
+"""Stops of a beam."""
+FOUR = TWO + TWO.replace("restitution", "mass = 1\nrestitution")
 
 
 @pytest.mark.parametrize(
@@ -31,6 +38,10 @@ TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
         (scene(), True),
         (scene(stop=TWO), True),
         (scene(CHAIN), True),
+        (scene(CHAIN, stop=FOUR), True),
+        (scene(BEAM.format(modes=2), stop="".join(ALONG[:4])), True),
+        (scene(BEAM.format(modes=2), stop="".join(ALONG[:5])), False),
+        (scene(BEAM.format(modes=1), stop="".join(ALONG[:3])), False),
         (scene(BEAM.format(modes=8)), True),
         (scene(rest=SWEEP + PATH), True),
         (scene(BEAM.format(modes=2), rest=SWEEP + PATH), True),
