@@ -55,6 +55,7 @@ class LanesPlan(Structure):
     _fields_ = [
         *((name, c_int32) for name in ("modes", "contacts", "impacts", "extrema", "periods", "instructions")),
         ("impact_limit", c_int64),
+        ("yielding", c_int64),
     ]
 
 
@@ -63,7 +64,8 @@ class LanesPoints(Structure):
 
     GIVEN = (
         "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "observed",
-        "position", "direction", "restitution", "yield_velocity", "start_q", "start_p", "begin", "end", "first",
+        "position", "direction", "restitution", "yield_velocity", "contact_stiffness", "contact_damping",
+        "start_q", "start_p", "begin", "end", "first",
     )  # fmt: skip
     RESULTS = (
         "state", "outcome", "reached", "displacement", "velocity", "final_q", "final_p", "rows_of", "rows", "owner",

@@ -27,7 +27,10 @@ TURN = 2.0 * math.pi
 WIDTH = 8
 IMPACT, PERIOD = 1.0, 3.0
 OF_MODES = ("stiffness", "decay", "force", "held", "observed", "start_q", "start_p")
-OF_CONTACTS = ("position", "direction", "restitution", "yield_velocity")
+OF_CONTACTS = (
+    *("position", "direction", "restitution", "yield_velocity"),
+    *("contact_stiffness", "contact_damping"),
+)
 
 
 @dataclass
@@ -94,7 +97,8 @@ def run(
         **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
     }
     block: Columns = {"rows": np.zeros((room, WIDTH)), "owner": np.zeros(room, np.int64)}
-    plan = LanesPlan(modes, contacts, impacts, extrema, periods, instructions, impact_limit)
+    yields = (points["contact_stiffness"] != 0.0).any(axis=1) @ 2 ** np.arange(contacts)
+    plan = LanesPlan(modes, contacts, impacts, extrema, periods, instructions, impact_limit, int(yields))
     state = LanesPoints(count=count, rows_room=room, most_seconds=most_seconds)
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
     for name, array in (given | results | block).items():
@@ -162,12 +166,30 @@ def drawn(
         "direction": np.sign(position),
         "restitution": random.uniform(0.3, 1.0, (contacts, count)),
         "yield_velocity": random.choice([0.0, 0.0, 0.4], (contacts, count)),
+        "contact_stiffness": np.zeros((contacts, count)),
+        "contact_damping": np.zeros((contacts, count)),
         "start_q": random.uniform(-0.05, 0.05, (modes, count)),
         "start_p": random.uniform(-0.5, 0.5, (modes, count)),
         "begin": first * (TURN / frequency) - lag,
         "end": (first + recorded) * (TURN / frequency) - lag,
         "first": np.ones(count, np.uint8),
     }
+
+
+def drawn_yielding(count: int, contacts: int, seed: int, *, rigid: bool = False, recorded: int = 4) -> Columns:
+    """Draw points of one mode with Kelvin-Voigt stops, softer than the body to 1e8 as stiff, damped up to twice critical.
+
+    A fifth of the stops have no damping. With `rigid`, the second stop stays rigid.
+    """
+    random = np.random.default_rng(seed)
+    points = drawn(count, 1, contacts, seed, recorded=recorded)
+    soft = contacts - rigid
+    mobility = (points["shape"] * points["impulse"])[:soft, 0]
+    rate = points["stiffness"] * 10.0 ** random.uniform(-0.5, 8.0, (soft, count))
+    ratio = random.choice([0.0, 0.02, 0.1, 0.5, 1.0, 2.0], (soft, count), p=[0.2, 0.2, 0.2, 0.2, 0.1, 0.1])
+    points["contact_stiffness"][:soft] = rate / mobility
+    points["contact_damping"][:soft] = 2.0 * ratio * np.sqrt(rate) / mobility
+    return points
 
 
 def oscillators(count: int, transient: int, recorded: int, **values: object) -> Columns:
@@ -193,6 +215,9 @@ def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Struc
             restitution=float(p["restitution"][k]),
             yield_velocity=float(p["yield_velocity"][k]),
             impulse=p["impulse"][k],
+            law="kelvin_voigt" if p["contact_stiffness"][k] > 0.0 else "restitution",
+            stiffness=float(p["contact_stiffness"][k]),
+            damping=float(p["contact_damping"][k]),
         )
         for k in range(len(p["position"]))
     ]

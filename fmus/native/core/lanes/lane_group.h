@@ -43,6 +43,28 @@ typedef struct {
     vi_lane_array observed;                   /* shape of the observed point */
 } vi_one_mode;
 
+/* Cells after which a lane leaves a body that stays on a stop that yields: the scalar engine follows a long rest at once. */
+#define VI_MOST_PRESSED 4096.0
+
+/* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */
+typedef struct {
+    vi_one_mode pressed[VI_LANES_CONTACTS];   /* tables of the depth while the stop is pressed */
+    /* depth + lag * rate after whole cells: it has the sign of the force. The same of q, free, beyond the stop */
+    vi_lane_array pressed_end[VI_LANES_CONTACTS][VI_CELLS + 1][VI_PARTS];
+    vi_lane_array receding_end[VI_LANES_CONTACTS][VI_CELLS + 1][VI_PARTS];
+    vi_lane_array cell[VI_LANES_CONTACTS + 1], cell_rate[VI_LANES_CONTACTS + 1]; /* free; on each stop, s and 1/s */
+    vi_lane_array lag[VI_LANES_CONTACTS];     /* damping / stiffness of the stop, s */
+    vi_lane_array yields[VI_LANES_CONTACTS];  /* 1: the stop yields */
+    vi_lane_array force[VI_LANES_CONTACTS];   /* of the stop for depth + lag * rate = 1, N */
+    vi_lane_array pressed_stop;               /* number of the stop that is pressed, from 1; 0: none */
+    vi_lane_array receding;                   /* number of the stop beyond whose rest position the body flies; 0: none */
+    vi_lane_array start_pressed;              /* pressed_stop in the last round */
+    vi_lane_array cells_pressed;              /* since the touch-down */
+    vi_lane_array depth;                      /* at the separation of the last round */
+    vi_lane_array open;                       /* 1: the present contact is recorded */
+    vi_lane_array touch_periods, touch_rest, touch_rest_low, touch_cosine, touch_sine, touch_approach;
+} vi_yielding;
+
 /* Lengths of cells for bodies of several modes: each level has a quarter of the length of the one before. */
 enum { VI_LEVELS = 5, VI_POINTS = VI_LANES_CONTACTS + 1 };
 
@@ -88,10 +110,11 @@ typedef struct {
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_one_mode one;
+    vi_yielding yielding;
     vi_many_modes many;
 } vi_lane_group;
 
 /* Move all lanes on together, round after round, until a lane has an event or some hundred rounds have passed. */
-typedef void (*vi_lanes_rounds)(vi_lane_group *group, int modes, int contacts);
+typedef void (*vi_lanes_rounds)(vi_lane_group *group, const vi_lanes_plan *plan);
 
 #endif

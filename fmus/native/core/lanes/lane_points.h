@@ -21,10 +21,11 @@ enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_A
 /* Common parameters of all points. */
 typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
-    int32_t contacts; /* 0 to VI_LANES_CONTACTS; each a rigid stop */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */
+    int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
 } vi_lanes_plan;
 
 /* The points. Arrays are [point], [mode][point], [contact][point] or [contact][mode][point], in SI units.
@@ -41,6 +42,7 @@ typedef struct {
     const double *observed;                         /* [mode][point] shape of the observed point */
     const double *position, *direction;             /* [contact][point] of the stop, m; +1: above the motion, -1: below */
     const double *restitution, *yield_velocity;     /* [contact][point] as in contact_law.h */
+    const double *contact_stiffness, *contact_damping; /* [contact][point] of a stop that yields: N/m, N s/m */
     const double *start_q, *start_p;                /* [mode][point]; of the points that begin a branch */
     const double *begin, *end;                      /* of the recording, s */
     /* Is the point the first of a branch? Independent points all are, and so is point 0. A later point starts at time 0

@@ -7,6 +7,7 @@
 #include "body/record.h"
 #include "contact/contact_law.h"
 #include "door/runs.h"
+#include "lanes/yielding.h"
 #include "motion/majorant.h"
 
 /* Least stiffness and, its reciprocal, largest stiffness and decay: squares of rates and of cells stay in range. */
@@ -42,11 +43,30 @@ static void append(const vi_lanes_work *w, int lane, const double row[VI_RECORD_
     p->rows_used += 1;
 }
 
+/* Write the rows of a contact with a stop that yields at its end; at its beginning, note it. */
+static void tell_contact(const vi_lanes_work *w, int lane, int contact)
+{
+    vi_lane_group *g = w->group;
+    const vi_lane_run *run = &w->run[lane];
+    double rows[2][VI_RECORD_WIDTH];
+    if (g->yielding.pressed_stop[lane] > 0.0) {
+        vi_yielding_touch_down(g, lane, instant_of(g, lane));
+        return;
+    }
+    vi_yielding_rows(g, lane, &run->clock, instant_of(g, lane), run->unit[contact], run->impulse[contact], rows);
+    append(w, lane, rows[0]);
+    append(w, lane, rows[1]);
+}
+
 static void tell_impact(const vi_lanes_work *w, int lane)
 {
     const vi_lane_group *g = w->group;
     const vi_lane_run *run = &w->run[lane];
     const int contact = (int)g->hit[lane] - 1;
+    if (g->yielding.yields[contact][lane] > 0.0) {
+        tell_contact(w, lane, contact);
+        return;
+    }
     const double speed = g->approach[lane] * run->unit[contact];
     const vi_contact_law law = {.restitution = g->restitution[contact][lane],
                                 .yield_velocity = g->yield_velocity[contact][lane] * run->unit[contact]};
@@ -115,6 +135,12 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     if (!isfinite(displacement) || !isfinite(velocity)) {
         leave(w, lane);
         return;
+    }
+    if (vi_yielding_is_open(w->group, lane)) {
+        const int contact = (int)w->group->yielding.pressed_stop[lane] - 1;
+        double row[VI_RECORD_WIDTH];
+        vi_yielding_open_row(w->group, lane, &w->run[lane].clock, w->run[lane].unit[contact], row);
+        append(w, lane, row);
     }
     points->outcome[point] = (int8_t)outcome;
     points->reached[point] = reached;
@@ -197,18 +223,21 @@ static int search(const vi_lanes_work *w, int lane)
     const vi_instant now = instant_of(g, lane);
     const vi_instant goal = {(int64_t)g->goal_periods[lane], g->goal_rest[lane], g->goal_rest_low[lane]};
     const double length = vi_clock_elapsed(clock, now, goal) * g->cell_rate[lane];
-    double share = vi_max(0.0, vi_min(length, 1.0));
+    double share = vi_max(0.0, vi_min(length, 1.0)), cell = g->cell[lane];
     vi_lane_meeting met;
     const vi_cell_result result = w->body->search(g, lane, w->plan->modes, w->plan->contacts, &share, &met);
     if (result == VI_CELL_UNDECIDED) {
         return VI_EVENT_LEAVE;
     }
-    g->on[lane] = 0.0;
+    g->on[lane] = result == VI_CELL_ACTED ? g->on[lane] : 0.0;
     if (result == VI_CELL_CLEAR && length <= 1.0) {
         put_instant(g, lane, goal);
         return VI_EVENT_GOAL;
     }
-    put_instant(g, lane, vi_clock_after(clock, now, share * g->cell[lane]));
+    put_instant(g, lane, vi_clock_after(clock, now, share * cell));
+    if (result == VI_CELL_ACTED) {
+        return (int)g->event[lane];
+    }
     return result == VI_CELL_HIT ? bounce(w, lane, &met) : VI_EVENT_NONE;
 }
 
@@ -251,7 +280,7 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
     vi_lane_group *g = w->group;
     w->run[lane].point = -1;
-    g->cell_rate[lane] = g->period[lane] = g->many.rate[0][lane] = 1.0;
+    g->cell_rate[lane] = g->period[lane] = g->many.rate[0][lane] = g->yielding.cell_rate[0][lane] = 1.0;
     g->goal_periods[lane] = 1e300;
     g->most_impacts[lane] = HUGE_VAL;
     for (int c = 0; c < VI_LANES_CONTACTS; ++c) {

@@ -5,6 +5,7 @@
 #include "door/seconds.h"
 #include "lanes/instructions.h"
 #include "lanes/lane_run.h"
+#include "lanes/yielding.h"
 
 /* Rounds of attending the lanes between two readings of the clock. */
 enum { ROUNDS_BETWEEN_READINGS = 64 };
@@ -29,6 +30,7 @@ static kept_state *aligned(void *memory)
 static bool is_plan(const vi_lanes_plan *plan)
 {
     return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
+           && plan->yielding >= 0 && plan->yielding < (plan->modes == 1 ? 1 << plan->contacts : 1)
            && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 
@@ -77,6 +79,14 @@ static void begin(vi_lanes_work *work, kept_state *memory)
     }
 }
 
+static const vi_lane_body *body_of(const vi_lanes_plan *plan)
+{
+    if (plan->yielding) {
+        return &vi_lane_yielding;
+    }
+    return plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes;
+}
+
 VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory)
 {
     if (!is_plan(plan) || points->rows_room < VI_LANES_LEAST_ROOM) {
@@ -85,7 +95,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
     const double call = vi_seconds_now();
     const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
     kept_state *now = aligned(memory);
-    vi_lanes_work work = {plan, plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes, points, &now->group, now->run, 0};
+    vi_lanes_work work = {plan, body_of(plan), points, &now->group, now->run, 0};
     begin(&work, now);
     for (int rounds_done = 0;; ++rounds_done) {
         if (points->rows_room - points->rows_used < MOST_ROWS) {
@@ -101,7 +111,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
         if (!works(&work)) {
             break;
         }
-        rounds(&now->group, plan->modes, plan->contacts);
+        rounds(&now->group, plan);
         for (int lane = 0; lane < VI_LANES; ++lane) {
             vi_lane_attend(&work, lane);
         }

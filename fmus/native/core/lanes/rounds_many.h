@@ -1,6 +1,7 @@
 /* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the careful search
  * finds. Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
 #include "lanes/rounds.h"
+#include "lanes/rounds_yielding.h"
 
 /* Rows of the tables for the present cell lengths of the lanes. */
 typedef struct {
@@ -162,12 +163,17 @@ LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
     }
 }
 
-void VI_ROUNDS(vi_lane_group *g, int modes, int contacts)
+void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan)
 {
-    if (modes > 1) {
-        run_rounds_many(g, modes, contacts);
-    } else if (contacts < 2) {
-        run_rounds(g, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
+    /* a body without a contact has tables of an idle lane there: nothing meets it */
+    if (plan->modes > 1) {
+        run_rounds_many(g, plan->modes, plan->contacts);
+    } else if (plan->yielding && plan->contacts < 2) {
+        run_phase_rounds(g, 1);
+    } else if (plan->yielding) {
+        run_phase_rounds(g, 2);
+    } else if (plan->contacts < 2) {
+        run_rounds(g, 1);
     } else {
         run_rounds(g, 2);
     }
