@@ -43,9 +43,6 @@ typedef struct {
     vi_lane_array observed;                   /* shape of the observed point */
 } vi_one_mode;
 
-/* Cells after which a lane leaves a body that stays on a stop that yields: the scalar engine follows a long rest at once. */
-#define VI_MOST_PRESSED 4096.0
-
 /* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */
 typedef struct {
     vi_one_mode pressed[VI_LANES_CONTACTS];   /* tables of the depth while the stop is pressed */
@@ -59,7 +56,7 @@ typedef struct {
     vi_lane_array pressed_stop;               /* number of the stop that is pressed, from 1; 0: none */
     vi_lane_array receding;                   /* number of the stop beyond whose rest position the body flies; 0: none */
     vi_lane_array start_pressed;              /* pressed_stop in the last round */
-    vi_lane_array cells_pressed;              /* since the touch-down */
+    vi_lane_array cells_pressed, most_pressed; /* cells since the touch-down; number above which the point is left */
     vi_lane_array depth;                      /* at the separation of the last round */
     vi_lane_array open;                       /* 1: the present contact is recorded */
     vi_lane_array touch_periods, touch_rest, touch_rest_low, touch_cosine, touch_sine, touch_approach;

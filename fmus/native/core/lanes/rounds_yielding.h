@@ -341,7 +341,7 @@ LANES_INLINE mask change_phase(vi_lane_group *g, int at, int contacts, const pha
     a->p = choose(touches, approach, choose(parts, side * a->p, a->p));
     const vector now = choose(touches, cell->number, only(~parts, load(yielding->pressed_stop + at)));
     const vector cells = only(pressed, (load(yielding->cells_pressed + at) + s->jumped) + cell->passed);
-    leaves |= cells > VI_MOST_PRESSED;
+    leaves |= cells > load(yielding->most_pressed + at);
     vector away = all(0.0);
     for (int c = 0; c < contacts; ++c) {
         away = choose(s->recedes[c] & ~back, all((double)(c + 1)), away);

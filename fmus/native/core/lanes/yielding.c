@@ -11,6 +11,10 @@
 /* Largest stiffness (1/s^2) and damping (1/s) of a stop: squares of rates and of cells stay in range. */
 static const double LARGEST = 1e60;
 
+/* Cells of a contact above which a point is left, if they are shorter than free cells by more than this ratio. The scalar
+ * engine follows a long rest on a stiff stop in closed form; lanes would go through its cells one by one. */
+static const double MOST_PRESSED = 512.0, MUCH_SHORTER = 8.0;
+
 /* ---- the motion of a phase ---- */
 
 /* Tables of the motion while stop `pressed`, from 1, is pressed; 0: free. */
@@ -448,10 +452,14 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     yielding->cell_rate[0][lane] = g->cell_rate[lane];
     yielding->pressed_stop[lane] = yielding->receding[lane] = yielding->start_pressed[lane] = 0.0;
     yielding->cells_pressed[lane] = yielding->open[lane] = 0.0;
+    yielding->most_pressed[lane] = HUGE_VAL;
     for (int c = 0; c < plan->contacts; ++c) {
         yielding->yields[c][lane] = yielding->lag[c][lane] = 0.0;
         if (((plan->yielding >> c) & 1) != 0 && !take_stop(g, lane, c, points, point)) {
             return false;
+        }
+        if (yielding->yields[c][lane] > 0.0 && yielding->cell[c + 1][lane] * MUCH_SHORTER < yielding->cell[0][lane]) {
+            yielding->most_pressed[lane] = MOST_PRESSED;
         }
     }
     return true;
