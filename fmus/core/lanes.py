@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Sequence
 from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_size_t, c_void_p
 from enum import IntEnum
 from functools import cache
@@ -17,6 +18,9 @@ from vibroimpact.fmus.errors import UsageError
 
 MOST_MODES = 8
 MOST_CONTACTS = 2
+IMPACT_WIDTH = 8
+PERIOD_WIDTH = 5
+"""Numbers of columns of an impact and of a period, see `lanes/lane_points.h`."""
 
 CHOICE = "VIBROIMPACT_INSTRUCTIONS"
 
@@ -53,7 +57,10 @@ class LanesPlan(Structure):
     """The plan, common to all points; the fields are explained in `lanes/lanes.h`."""
 
     _fields_ = [
-        *((name, c_int32) for name in ("modes", "contacts", "impacts", "extrema", "periods", "instructions")),
+        *(
+            (name, c_int32)
+            for name in ("modes", "contacts", "impacts", "extrema", "periods", "each_period", "instructions")
+        ),
         ("impact_limit", c_int64),
         ("yielding", c_int64),
     ]
@@ -68,27 +75,31 @@ class LanesPoints(Structure):
         "start_q", "start_p", "begin", "end", "first",
     )  # fmt: skip
     RESULTS = (
-        "state", "outcome", "reached", "displacement", "velocity", "final_q", "final_p", "rows_of", "rows", "owner",
+        "state", "outcome", "reached", "displacement", "velocity", "final_q", "final_p", "periods", "periods_of",
     )  # fmt: skip
+    OF_ROWS = ("rows_of", "rows", "owner")
     _fields_ = [
         ("count", c_int64),
         *((name, c_void_p) for name in (*GIVEN, *RESULTS)),
-        *((name, c_int64) for name in ("rows_room", "rows_used", "finished")),
+        ("most_periods", c_int64),
+        *((name, c_void_p) for name in OF_ROWS),
+        *((name, c_int64) for name in ("rows_room", "rows_used", "begun_below", "finished")),
         ("most_seconds", c_double),
     ]
 
 
 @cache
-def _functions() -> tuple[Any, Any, Any]:
+def _functions() -> tuple[Any, Any, Any, Any]:
     library = core_library()
-    run, memory, instructions = (
-        getattr(library, name)
-        for name in ("vi_door_lanes", "vi_door_lanes_memory", "vi_door_lanes_instructions")
+    run, memory, instructions, impacts = (
+        getattr(library, f"vi_door_lanes{name}") for name in ("", "_memory", "_instructions", "_impacts")
     )
     run.argtypes = [POINTER(LanesPlan), POINTER(LanesPoints), c_void_p]
     memory.argtypes, memory.restype = [POINTER(LanesPlan)], c_size_t
     instructions.argtypes = [ctypes.c_int]
-    return run, memory, instructions
+    impacts.argtypes = [c_void_p, c_void_p, c_int64, c_void_p, c_int64, c_void_p]
+    impacts.restype = None
+    return run, memory, instructions, impacts
 
 
 def instructions() -> Instructions:
@@ -144,3 +155,25 @@ def run_lanes(plan: LanesPlan, points: LanesPoints, memory: NDArray[np.uint8]) -
         continues.
     """
     return LanesEnd(_functions()[0](plan, points, memory.ctypes.data))
+
+
+def impacts_by_point(
+    blocks: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]], count: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the impacts of the points, point by point, shape (impact, `IMPACT_WIDTH`); each column is contiguous.
+
+    Parameters
+    ----------
+    blocks : sequence of tuple of ndarray
+        Rows of impacts, and the point of each, in the order in which C wrote them.
+    count : ndarray of int64, shape (point,)
+        Number of impacts of each point; 0 for a point whose impacts are left out.
+    """
+    total = int(count.sum())
+    places = np.where(count > 0, np.cumsum(count) - count, -1)
+    columns = np.empty((IMPACT_WIDTH, total))
+    for rows, owner in blocks:
+        _functions()[3](
+            rows.ctypes.data, owner.ctypes.data, len(owner), places.ctypes.data, total, columns.ctypes.data
+        )
+    return columns.T

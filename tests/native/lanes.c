@@ -7,11 +7,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "body/record.h"
 #include "check.h"
 #include "lanes/lane_turn.h"
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
+enum { MOST_PERIODS = 40, OF_PERIODS = POINTS * MOST_PERIODS }; /* room of a point, of a column */
 
 /* Arrays of points. */
 typedef struct {
@@ -28,14 +28,15 @@ typedef struct {
     uint8_t state[POINTS];
     int8_t outcome[POINTS];
     double reached[POINTS], displacement[POINTS], velocity[POINTS], final_q[STATES], final_p[STATES];
-    int64_t rows_of[POINTS];
-    double sum_of_rows[POINTS]; /* sum of all numbers in a point's rows, in their order */
+    int64_t rows_of[POINTS], periods_of[POINTS];
+    double sum_of_rows[POINTS]; /* sum of all numbers of a point's impacts, in their order */
+    double periods[VI_PERIOD_WIDTH * OF_PERIODS];
 } results;
 
 static const double TURN = 6.283185307179586;
 /* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
  * change. */
-static const uint64_t BITS = 0x278ed239e40a0061u;
+static const uint64_t BITS = 0x99702f6b7eb5e435u;
 
 static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed)
 {
@@ -80,8 +81,8 @@ static void spoil(sample *s, int i, uint64_t *seed)
 static void take_rows(vi_lanes_points *p, results *r)
 {
     for (int64_t row = 0; row < p->rows_used; ++row) {
-        for (int i = 0; i < VI_RECORD_WIDTH; ++i) {
-            const double value = p->rows[row * VI_RECORD_WIDTH + i];
+        for (int i = 0; i < VI_IMPACT_WIDTH; ++i) {
+            const double value = p->rows[row * VI_IMPACT_WIDTH + i];
             r->sum_of_rows[p->owner[row]] += isnan(value) ? 0.0 : value * (1.0 + i);
         }
     }
@@ -116,10 +117,14 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .velocity = r->velocity,
                              .final_q = r->final_q,
                              .final_p = r->final_p,
+                             .periods = r->periods,
+                             .periods_of = r->periods_of,
+                             .most_periods = MOST_PERIODS,
                              .rows_of = r->rows_of,
                              .rows = rows,
                              .owner = owner,
                              .rows_room = ROOM,
+                             .begun_below = POINTS,
                              .most_seconds = seconds};
 }
 
@@ -138,7 +143,7 @@ static void answer(vi_lanes_points *p, int modes)
 
 static void run(const sample *s, results *r, const vi_lanes_plan *plan, double seconds)
 {
-    static double rows[ROOM * VI_RECORD_WIDTH];
+    static double rows[ROOM * VI_IMPACT_WIDTH];
     static int64_t owner[ROOM];
     memset(r, 0, sizeof *r);
     vi_lanes_points p = points_of(s, r, rows, owner, seconds);
@@ -157,13 +162,48 @@ static void run(const sample *s, results *r, const vi_lanes_plan *plan, double s
     free(memory);
 }
 
+/* A column of a point's periods. */
+static const double *period_of(const results *r, int i, int column)
+{
+    return &r->periods[column * OF_PERIODS + i * MOST_PERIODS];
+}
+
+/* One row for all periods of a point: extremes, the last strobe and the mean number of impacts. */
+static void compare_reduced(const results *whole, const results *reduced, int i)
+{
+    const int64_t count = whole->periods_of[i];
+    double largest = -HUGE_VAL, smallest = HUGE_VAL, impacts = 0.0;
+    CHECK(reduced->state[i] == whole->state[i] && reduced->periods_of[i] == count, "the periods of %d", i);
+    if (whole->state[i] != VI_POINT_HAS_RUN || count == 0) {
+        return;
+    }
+    for (int64_t n = 0; n < count; ++n) {
+        largest = fmax(largest, period_of(whole, i, VI_OF_LARGEST)[n]);
+        smallest = fmin(smallest, period_of(whole, i, VI_OF_SMALLEST)[n]);
+        impacts += period_of(whole, i, VI_OF_IMPACTS)[n];
+    }
+    const double expected[VI_PERIOD_WIDTH] = {largest, smallest, period_of(whole, i, VI_OF_STROBE)[count - 1],
+                                              period_of(whole, i, VI_OF_STROBE_VELOCITY)[count - 1],
+                                              impacts / (double)count};
+    for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
+        const double found = period_of(reduced, i, column)[0];
+        CHECK(found == expected[column], "column %d of all periods of %d to be %.17g, got %.17g", column, i,
+              expected[column], found);
+    }
+}
+
 static void compare(const results *a, const results *b, int i, const char *what)
 {
     CHECK(a->state[i] == b->state[i], "one state of point %d by %s", i, what);
     if (a->state[i] == VI_POINT_HAS_RUN) {
         CHECK(memcmp(&a->final_q[i], &b->final_q[i], sizeof a->final_q[i]) == 0, "one end of point %d by %s", i, what);
-        CHECK(a->sum_of_rows[i] == b->sum_of_rows[i] && a->rows_of[i] == b->rows_of[i], "the rows of %d by %s", i,
+        CHECK(a->sum_of_rows[i] == b->sum_of_rows[i] && a->rows_of[i] == b->rows_of[i], "the impacts of %d by %s", i,
               what);
+        CHECK(a->periods_of[i] == b->periods_of[i], "the number of periods of %d by %s", i, what);
+        for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
+            CHECK(memcmp(period_of(a, i, column), period_of(b, i, column), sizeof(double[MOST_PERIODS])) == 0,
+                  "one column %d of the periods of %d by %s", column, i, what);
+        }
         CHECK(isfinite(a->displacement[i]) && isfinite(a->velocity[i]), "numbers at the end of point %d", i);
     }
 }
@@ -186,6 +226,9 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
             continue;
         }
         hash = hashed(hash, &r->sum_of_rows[i], sizeof r->sum_of_rows[i]);
+        for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
+            hash = hashed(hash, period_of(r, i, column), (size_t)r->periods_of[i] * sizeof(double));
+        }
         for (int j = 0; j < modes; ++j) {
             hash = hashed(hash, &r->final_q[j * POINTS + i], sizeof(double));
             hash = hashed(hash, &r->final_p[j * POINTS + i], sizeof(double));
@@ -198,7 +241,7 @@ static void check_sizes(int modes, int contacts, uint64_t *seed, uint64_t *hash)
 {
     static sample good, bad;
     static results whole, other;
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, modes, contacts, seed);
         good.first[i] = choice(seed, 3) != 0;
@@ -214,6 +257,12 @@ static void check_sizes(int modes, int contacts, uint64_t *seed, uint64_t *hash)
             }
         }
     }
+    plan.each_period = 0;
+    run(&good, &other, &plan, 1e9);
+    for (int i = 0; i < POINTS; ++i) {
+        compare_reduced(&whole, &other, i);
+    }
+    plan.each_period = 1;
     memset(good.first, 1, sizeof good.first);
     run(&good, &whole, &plan, 1e9);
     bad = good;

@@ -30,7 +30,7 @@ def differences(points: Columns, found: Results, place: int) -> float:
         impacts, periods = impacts[impacts[:, 1] >= begin], periods[periods[:, 1] >= begin]
         own = [rows[rows[:, 0] == kind] for kind in (IMPACT, PERIOD)]
         assert [len(each) for each in own] == [len(impacts), len(periods)]
-        pairs = [(own[0], impacts), (own[1], periods)]
+        pairs = [(own[0], impacts), (own[1][:, 2:], periods[:, 2:])]
         pairs += [(found.columns["final_q"][:, place], body.displacement)]
         return max((float(np.abs(one - other).max()) for one, other in pairs if len(one)), default=0.0)
 
@@ -167,7 +167,9 @@ def test_a_run_ends_at_its_limit_of_impacts() -> None:
     found = run(points, impact_limit=7)
     assert list(found.columns["outcome"]) == [2, 2, 2]
     assert all(np.count_nonzero(rows[:, 0] == IMPACT) == 7 for rows in found.rows)
-    assert np.array_equal(found.columns["reached"], [rows[-1, 1] for rows in found.rows])
+    assert np.array_equal(
+        found.columns["reached"], [rows[rows[:, 0] == IMPACT][-1, 1] for rows in found.rows]
+    )
 
 
 def test_an_instruction_set_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

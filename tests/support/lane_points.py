@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from support.structure import Modes, Stop, Structure
 from vibroimpact.fmus.core.lanes import (
+    IMPACT_WIDTH,
+    PERIOD_WIDTH,
     Instructions,
     LanesEnd,
     LanesPlan,
     LanesPoints,
     PointState,
+    impacts_by_point,
     lanes_memory,
     run_lanes,
 )
@@ -24,8 +27,7 @@ from vibroimpact.fmus.core.runs import address
 Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 TURN = 2.0 * math.pi
-WIDTH = 8
-IMPACT, PERIOD = 1.0, 3.0
+IMPACT, PERIOD, PEAK = 1.0, 3.0, 4.0
 OF_MODES = ("stiffness", "decay", "force", "held", "observed", "start_q", "start_p")
 OF_CONTACTS = (
     *("position", "direction", "restitution", "yield_velocity"),
@@ -35,7 +37,10 @@ OF_CONTACTS = (
 
 @dataclass
 class Results:
-    """Results of the lanes: columns of `LanesPoints`, and the rows of each point that has run."""
+    """Results of the lanes: columns of `LanesPoints`, and the rows of each point that has run.
+
+    Rows have the layout of `core/body/record.h`: impacts first, then periods, whose time is 0 here.
+    """
 
     columns: Columns
     rows: list[Array]
@@ -66,6 +71,7 @@ def run(
     impacts: bool = True,
     extrema: bool = True,
     periods: bool = True,
+    each_period: bool = True,
     impact_limit: int = 0,
     instructions: Instructions = Instructions.best,
     room: int = 4096,
@@ -77,7 +83,7 @@ def run(
     ----------
     points : dict of str to ndarray
         Arrays of `LanesPoints.GIVEN`, the last axis over the points.
-    impacts, extrema, periods, impact_limit, instructions
+    impacts, extrema, periods, each_period, impact_limit, instructions
         Fields of the plan.
     room : int
         Number of rows that fit into one call.
@@ -93,15 +99,20 @@ def run(
         "state": np.zeros(count, np.uint8),
         "outcome": np.zeros(count, np.int8),
         "rows_of": np.zeros(count, np.int64),
+        "periods_of": np.zeros(count, np.int64),
         **{name: np.full(count, np.nan) for name in ("reached", "displacement", "velocity")},
         **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
     }
-    block: Columns = {"rows": np.zeros((room, WIDTH)), "owner": np.zeros(room, np.int64)}
-    yields = (points["contact_stiffness"] != 0.0).any(axis=1) @ 2 ** np.arange(contacts)
-    plan = LanesPlan(modes, contacts, impacts, extrema, periods, instructions, impact_limit, int(yields))
-    state = LanesPoints(count=count, rows_room=room, most_seconds=most_seconds)
+    block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
+    yields = int((points["contact_stiffness"] != 0.0).any(axis=1) @ 2 ** np.arange(contacts))
+    plan = LanesPlan(modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields)
+    most = _most_periods(points) if each_period else 1
+    table = np.full((PERIOD_WIDTH, count, most), np.nan)
+    state = LanesPoints(
+        count=count, begun_below=count, most_periods=most, rows_room=room, most_seconds=most_seconds
+    )
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
-    for name, array in (given | results | block).items():
+    for name, array in (given | results | block | {"periods": table}).items():
         setattr(state, name, address(array))
     memory = lanes_memory(plan)
     ends: list[LanesEnd] = []
@@ -112,13 +123,35 @@ def run(
         rows.append(block["rows"][: state.rows_used].copy())
         owners.append(block["owner"][: state.rows_used].copy())
         state.rows_used = 0
-    all_rows, all_owners = np.concatenate(rows), np.concatenate(owners)
     ran = results["state"] == PointState.has_run
-    own: list[Array] = [
-        all_rows[all_owners == point] if ran[point] else all_rows[:0] for point in range(count)
+    found = impacts_by_point(list(zip(rows, owners, strict=True)), results["rows_of"])
+    own = [
+        np.concatenate([_written(IMPACT, impacts[:, :-1]), _written(PERIOD, periods), _peaks(impacts)])
+        for impacts, periods in zip(
+            np.split(found, np.cumsum(results["rows_of"])[:-1]),
+            (table[:, point, : results["periods_of"][point]].T for point in range(count)),
+            strict=True,
+        )
     ]
-    assert [len(each) for each in own] == list(results["rows_of"] * ran)
+    assert not results["rows_of"][~ran].any()
     return Results(results, own, ends)
+
+
+def _most_periods(points: Columns) -> int:
+    turns = (points["end"] - points["begin"]) * points["angular_frequency"] / TURN
+    return math.ceil(np.max(turns, initial=0.0, where=np.isfinite(turns)) + 1.0)
+
+
+def _written(kind: float, values: Array) -> Array:
+    """Return rows of a kind as a body writes them; a period has no time."""
+    columns = values if kind == IMPACT else np.insert(values, 0, 0.0, axis=1)
+    return np.pad(np.insert(columns, 0, kind, axis=1), ((0, 0), (0, 8 - columns.shape[1] - 1)))
+
+
+def _peaks(impacts: Array) -> Array:
+    """Return the rows of the largest forces of ended contacts, as a body writes them."""
+    ended = impacts[~np.isnan(impacts[:, -1])]
+    return np.pad(np.insert(ended[:, [0, 4, 7]], 0, PEAK, axis=1), ((0, 0), (0, 4)))
 
 
 def taken(points: Columns, places: NDArray[np.int64]) -> Columns:

@@ -62,6 +62,7 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         impacts=record.impacts,
         extrema=record.extrema,
         periods=points.periods,
+        each_period=record.each_period,
         instructions=core.instructions(),
         impact_limit=scene.execution.impact_limit,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,18 +19,19 @@ from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues
 from vibroimpact.orchestrator.run.many_points.loop_rows import (
     LISTEN_SECONDS,
     final_phases,
-    period_table,
-    ragged_of,
     run_loop,
 )
 from vibroimpact.orchestrator.run.parameters import free_state
 from vibroimpact.orchestrator.run.points import State
-from vibroimpact.orchestrator.run.record import ROW_IMPACT, ROW_WIDTH, impact_rows, refuse_abandoned
+from vibroimpact.orchestrator.run.record import refuse_abandoned
 from vibroimpact.orchestrator.run.runner import CARRYING, next_start
-from vibroimpact.orchestrator.run.window import limit_message
+from vibroimpact.orchestrator.run.window import TWO_PI, limit_message
 
 ROWS_ROOM = 65_536
-"""Number of rows of impacts and periods that the lanes can write before Python takes them."""
+"""Number of impacts that the lanes can write before Python takes them."""
+
+ROUNDING = 1e-9
+"""Relative excess of a recording over a whole number of periods that counts as rounding."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -127,20 +129,28 @@ class _LaneRun:
         self._outcome = np.zeros(count, dtype=np.int8)
         self._reached, self._displacement, self._velocity = np.zeros((3, count))
         self._final_q, self._final_p = np.zeros((2, modes, count))
-        self._rows, self._owner = np.empty((ROWS_ROOM, ROW_WIDTH)), np.empty(ROWS_ROOM, dtype=np.int64)
+        self._periods, self._periods_of = self._period_table(), np.zeros(count, dtype=np.int64)
+        self._rows_of = np.zeros(count, dtype=np.int64)
         results = {
             "state": self._state, "outcome": self._outcome, "reached": self._reached,
             "displacement": self._displacement, "velocity": self._velocity,
             "final_q": self._final_q, "final_p": self._final_p,
-            "first": self._first.astype(np.uint8), "rows_of": np.zeros(count, dtype=np.int64),
-            "rows": self._rows, "owner": self._owner,
+            "periods": self._periods, "periods_of": self._periods_of,
+            "first": self._first.astype(np.uint8), "rows_of": self._rows_of,
         }  # fmt: skip
         self._kept = {**self._given, **results}  # keeps the arrays alive while C uses them
-        self._c = core.LanesPoints(count=count, rows_room=ROWS_ROOM, most_seconds=LISTEN_SECONDS)
+        self._c = core.LanesPoints(
+            count=count,
+            begun_below=count,
+            most_periods=self._periods.shape[2],
+            rows_room=ROWS_ROOM,
+            most_seconds=LISTEN_SECONDS,
+        )
         for name, array in self._kept.items():
             setattr(self._c, name, address(array))
         self._memory = core.lanes_memory(self._plan)
         self._blocks: list[tuple[Floats, Ints]] = []
+        self._give_room()
         self._scalar: list[tuple[Ints, RunColumns]] = []
         self._seconds = 0.0
 
@@ -170,17 +180,21 @@ class _LaneRun:
             self._take_rows()
         return end
 
+    def _give_room(self) -> None:
+        self._rows, self._owner = np.empty((ROWS_ROOM, core.IMPACT_WIDTH)), np.empty(ROWS_ROOM, np.int64)
+        self._c.rows, self._c.owner, self._c.rows_used = address(self._rows), address(self._owner), 0
+
     def _take_rows(self) -> None:
         used = self._c.rows_used
-        self._blocks.append((self._rows[:used].copy(), self._owner[:used].copy()))
-        self._c.rows_used = 0
+        self._blocks.append((self._rows[:used], self._owner[:used]))
+        self._give_room()
 
     def _begin_no_more(self) -> None:
         """Restrict the run to the points, or the branches, that have begun."""
         last = int(np.flatnonzero(self._state).max(initial=0))
-        later = np.flatnonzero(self._first[last + 1 : self._c.count])
+        later = np.flatnonzero(self._first[last + 1 : self._c.begun_below])
         if later.size:
-            self._c.count = last + 1 + int(later[0])
+            self._c.begun_below = last + 1 + int(later[0])
 
     def _done(self) -> int:
         """Return the number of points that have run without a gap, from the first on."""
@@ -293,17 +307,11 @@ class _LaneRun:
         """Return the records of the points at these places, from their lanes."""
         record, points = self._loop.scene.record, self._points
         outcome, reached = self._outcome[run], self._reached[run]
-        rows, owner = self._rows_of(run)
         message = np.full(len(run), "", dtype=object)
         for number in np.flatnonzero(outcome == Outcome.impact_limit):
             message[number] = limit_message(self._loop.scene.execution.impact_limit, float(reached[number]))
         frequency, phase = (self._given[name][run] for name in ("angular_frequency", "phase"))
         no_sticks = Ragged(np.zeros(len(run), dtype=np.int64), np.empty((0, len(STICK_COLUMNS))))
-        impacts = (
-            ragged_of(impact_rows(rows), owner[rows[:, 0] == ROW_IMPACT], len(run))
-            if record.impacts
-            else None
-        )
         return RunColumns(
             outcome=outcome,
             message=message,
@@ -314,17 +322,35 @@ class _LaneRun:
             if points.forced
             else np.full(len(run), np.nan),
             final_state=self._modal.states(self._final_q, self._final_p, run),
-            periods=period_table(rows, owner, len(run)) if points.periods else None,
-            impacts=impacts,
+            periods=self._periods_at(run) if points.periods else None,
+            impacts=self._impacts_at(run) if record.impacts else None,
             sticks=no_sticks if record.impacts else None,
         )
 
-    def _rows_of(self, run: Ints) -> tuple[Floats, Ints]:
-        """Return the rows of some points, point by point, and the number of the point of each row."""
-        number = np.full(len(self._state), -1, dtype=np.int64)
-        number[run] = np.arange(len(run))
-        owner = number[np.concatenate([owners for _, owners in self._blocks])]
-        order = np.argsort(owner.astype(np.int16) if len(run) < 2**15 else owner, kind="stable")
-        order = order[int((owner < 0).sum()) :]  # without rows of points left out, or not done
-        rows = np.concatenate([block for block, _ in self._blocks])
-        return rows[order], owner[order]
+    def _period_table(self) -> Floats:
+        """Return room for the periods of the points, shape (column, point, period); with one for all, NaN."""
+        points, count = self._points, len(self._values)
+        if not points.periods:
+            return np.empty((core.PERIOD_WIDTH, count, 0))
+        if not self._plan.each_period:
+            return np.full((core.PERIOD_WIDTH, count, 1), np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):  # C leaves a point with an infinite period
+            turns = (points.end - points.begin) * self._given["angular_frequency"] / TWO_PI
+        most = turns[np.isfinite(turns)].max(initial=0.0)
+        return np.empty((core.PERIOD_WIDTH, count, math.ceil(most * (1.0 - ROUNDING))))
+
+    def _periods_at(self, run: Ints) -> Floats:
+        """Return the table of periods of some points, shape (point, period, 5); missing periods of a point are NaN."""
+        count = np.minimum(self._periods_of[run], self._periods.shape[2])
+        most = int(count.max(initial=0))
+        whole = len(run) == self._periods.shape[1]
+        table = (self._periods if whole else self._periods[:, run])[:, :, :most]
+        if (count < most).any():
+            table[:, np.arange(most) >= count[:, None]] = np.nan
+        return np.moveaxis(table, 0, -1)
+
+    def _impacts_at(self, run: Ints) -> Ragged:
+        """Return the impacts of some points."""
+        count = np.zeros_like(self._rows_of)
+        count[run] = self._rows_of[run]
+        return Ragged(count[run], core.impacts_by_point(self._blocks, count))

@@ -20,9 +20,10 @@ typedef struct {
     vi_cell_result (*search)(vi_lane_group *group, int lane, int modes, int contacts, double *share, vi_lane_meeting *met);
     /* Turn the velocity of a contact just met into a rebound at this speed; false for a touch that may be no impact. */
     bool (*rebound)(vi_lane_group *group, int lane, int modes, const vi_lane_meeting *met, double after);
-    /* Extend the range of the observed displacement over the lane's last round. */
-    void (*extremes)(const vi_lane_group *group, int lane, int modes, int contacts, double *highest, double *lowest);
-    /* The observed displacement and velocity; a body of one mode beyond its stop by rounding is put on it. */
+    /* Extend `most` and `least` of the record over the lane's last round. */
+    void (*extremes)(vi_lane_group *group, int lane, int modes, int contacts);
+    /* The observed displacement and velocity, in units of the record; a body of one mode beyond its stop by rounding is
+     * put on it. */
     void (*observe)(vi_lane_group *group, int lane, int modes, int contacts, double *displacement, double *velocity);
     /* Modal displacements and velocities. */
     void (*state)(const vi_lane_group *group, int lane, int modes, double q[], double p[]);

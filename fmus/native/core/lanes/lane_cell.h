@@ -14,7 +14,7 @@ typedef enum {
     VI_CELL_CLEAR,
     VI_CELL_HIT,
     VI_CELL_UNDECIDED,
-    VI_CELL_ACTED /* the body has acted on an event, and the lane's event is set */
+    VI_CELL_ACTED /* the body has acted on an event of its own */
 } vi_cell_result;
 
 /* Displacement and its slope over the share, at a share of the cell. */

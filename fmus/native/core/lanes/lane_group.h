@@ -23,11 +23,11 @@ enum { VI_OF_Q, VI_OF_P, VI_OF_COSINE, VI_OF_SINE, VI_OF_ONE, VI_PARTS };
 /* Events of a lane that need more than lockstep. */
 enum {
     VI_EVENT_NONE = 0,
-    VI_EVENT_IMPACT = 1, /* an impact to be recorded, or at the impact limit */
-    VI_EVENT_GOAL = 2,   /* the lane has reached its goal */
+    VI_EVENT_IMPACT = 1, /* an impact at the impact limit */
+    VI_EVENT_GOAL = 2,   /* the lane has reached its goal, which is not the start of another whole recorded period */
     VI_EVENT_CELL = 3,   /* the cell that begins here needs the careful search */
     VI_EVENT_LEAVE = 4,  /* the point is left to the scalar engine */
-    VI_EVENT_FLIGHT = 5  /* no event, but extremes are followed */
+    VI_EVENT_FLIGHT = 5  /* no event, but the extremes of the round are doubtful */
 };
 
 typedef double vi_lane_array[VI_LANES];
@@ -40,7 +40,6 @@ typedef struct {
     vi_lane_array stiffness, drag, root_rate; /* 2 decay, 2 decay + natural */
     vi_lane_array load;                       /* |force| + |held| */
     vi_lane_array span;                       /* VI_CELLS cells, s */
-    vi_lane_array observed;                   /* shape of the observed point */
 } vi_one_mode;
 
 /* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */
@@ -58,8 +57,9 @@ typedef struct {
     vi_lane_array start_pressed;              /* pressed_stop in the last round */
     vi_lane_array cells_pressed, most_pressed; /* cells since the touch-down; number above which the point is left */
     vi_lane_array depth;                      /* at the separation of the last round */
-    vi_lane_array open;                       /* 1: the present contact is recorded */
-    vi_lane_array touch_periods, touch_rest, touch_rest_low, touch_cosine, touch_sine, touch_approach;
+    /* the touch-down of the present contact, if it is recorded (open = 1): instant, time, phases, speed of approach */
+    vi_lane_array open, touch_periods, touch_rest, touch_rest_low, touch_time, touch_phase;
+    vi_lane_array touch_cosine, touch_sine, touch_approach;
 } vi_yielding;
 
 /* Lengths of cells for bodies of several modes: each level has a quarter of the length of the one before. */
@@ -86,6 +86,23 @@ typedef struct {
     vi_lane_array size[VI_LANES_CONTACTS];            /* of the terms of a clearance that do not move, m */
 } vi_many_modes;
 
+/* The record of the lanes, in units of the group: the observed displacement is `scale` times such a number. */
+typedef struct {
+    vi_lane_array scale;                      /* m per unit of the group, of any sign */
+    vi_lane_array unit[VI_LANES_CONTACTS];    /* m/s per unit of speed of the contact */
+    vi_lane_array impulse[VI_LANES_CONTACTS]; /* N s for a change of the contact's speed by 1 m/s */
+    vi_lane_array origin, origin_low;         /* of the clock */
+    vi_lane_array point;                      /* number of the point */
+    vi_lane_array impacts;                    /* 1: each impact is recorded */
+    vi_lane_array extremes;                   /* 1: extremes are followed */
+    vi_lane_array last_turn;                  /* whole periods of the clock at the last recorded strobe; -1: none */
+    /* the open period */
+    vi_lane_array most, least;                /* so far */
+    vi_lane_array strobe, strobe_velocity;    /* at its start */
+    vi_lane_array impacts_before;             /* number of impacts at its start */
+    vi_lane_array doubtful;                   /* 1: `most` and `least` lack the last round, see `extremes` of the body */
+} vi_lane_record;
+
 typedef struct {
     /* the body */
     vi_lane_array cell, cell_rate;            /* shortest cell, s; its reciprocal, 1/s */
@@ -100,18 +117,21 @@ typedef struct {
     vi_lane_array goal_periods, goal_rest, goal_rest_low;
     vi_lane_array on;                         /* number of the contact just left, from 1; 0: none */
     vi_lane_array fastest_impact, impacts;
-    vi_lane_array reports, follows;           /* 1: each impact is an event; extremes are followed */
     /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
     vi_lane_array passed, share;
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
+    vi_lane_record record;
     vi_one_mode one;
     vi_yielding yielding;
     vi_many_modes many;
 } vi_lane_group;
 
-/* Move all lanes on together, round after round, until a lane has an event or some hundred rounds have passed. */
-typedef void (*vi_lanes_rounds)(vi_lane_group *group, const vi_lanes_plan *plan);
+/* Most rounds in a row, each of which writes at most one impact of a lane. */
+enum { VI_MOST_ROUNDS = 256 };
+
+/* Move all lanes on together, round after round, until a lane has an event or VI_MOST_ROUNDS have passed. */
+typedef void (*vi_lanes_rounds)(vi_lane_group *group, const vi_lanes_plan *plan, vi_lanes_points *points);
 
 #endif

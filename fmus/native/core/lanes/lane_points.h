@@ -6,6 +6,14 @@
 
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
 
+/* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
+ * duration (s), largest force (N; NaN at a rigid stop). A contact that is open at the end of its run has NaN for its
+ * impulse, restitution, duration and largest force. */
+enum { VI_IMPACT_WIDTH = 8 };
+/* Columns of a period, over its points: largest and smallest displacement (m), displacement (m) and velocity (m/s) at
+ * its start, number of impacts. */
+enum { VI_OF_LARGEST, VI_OF_SMALLEST, VI_OF_STROBE, VI_OF_STROBE_VELOCITY, VI_OF_IMPACTS, VI_PERIOD_WIDTH };
+
 /* State of a point. */
 enum {
     VI_POINT_WAITS = 0,
@@ -23,6 +31,7 @@ typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
     int32_t contacts; /* 0 to VI_LANES_CONTACTS */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
+    int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */
     int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
@@ -53,11 +62,17 @@ typedef struct {
     double *reached;             /* time of the end, s */
     double *displacement, *velocity; /* at the end, of the observed point */
     double *final_q, *final_p;   /* at the end, [mode][point] */
-    int64_t *rows_of;            /* number of rows of each point; 0 again once it is left */
-    /* Rows as in record.h. Rows of one point are in the order of time, mixed with rows of others. */
-    double *rows;                /* [rows_room][VI_RECORD_WIDTH] */
+    /* Periods of each point, as far as they have ended. Without each_period row 0 has the extremes of all periods, the
+     * start of the last one and the mean number of impacts. A point with more than most_periods is left. */
+    double *periods;             /* [VI_PERIOD_WIDTH][point][most_periods] */
+    int64_t *periods_of;         /* number of ended periods of each point; 0 again once it is left */
+    int64_t most_periods;
+    int64_t *rows_of;            /* number of impacts of each point; 0 again once it is left */
+    /* Impacts of one point are in the order of time, mixed with impacts of others. */
+    double *rows;                /* [rows_room][VI_IMPACT_WIDTH] */
     int64_t *owner;              /* [rows_room] point of each row */
     int64_t rows_room, rows_used; /* rows_room >= VI_LANES_LEAST_ROOM; the caller takes rows by rows_used = 0 */
+    int64_t begun_below;         /* only points below this number begin; `count` unless the caller stops early */
     int64_t finished;            /* points that have run or are left since the first call */
     double most_seconds;         /* of one call */
 } vi_lanes_points;

@@ -4,9 +4,9 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "body/record.h"
 #include "contact/contact_law.h"
 #include "door/runs.h"
+#include "lanes/lane_record.h"
 #include "lanes/yielding.h"
 #include "motion/majorant.h"
 
@@ -25,75 +25,6 @@ static void put_instant(vi_lane_group *g, int lane, vi_instant now)
     g->periods[lane] = (double)now.periods;
     g->rest[lane] = now.rest;
     g->rest_low[lane] = now.rest_low;
-}
-
-static double time_of(const vi_lanes_work *w, int lane)
-{
-    return vi_clock_time(&w->run[lane].clock, instant_of(w->group, lane));
-}
-
-/* ---- the rows ---- */
-
-static void append(const vi_lanes_work *w, int lane, const double row[VI_RECORD_WIDTH])
-{
-    vi_lanes_points *p = w->points;
-    memcpy(p->rows + p->rows_used * VI_RECORD_WIDTH, row, VI_RECORD_WIDTH * sizeof row[0]);
-    p->owner[p->rows_used] = w->run[lane].point;
-    p->rows_of[w->run[lane].point] += 1;
-    p->rows_used += 1;
-}
-
-/* Write the rows of a contact with a stop that yields at its end; at its beginning, note it. */
-static void tell_contact(const vi_lanes_work *w, int lane, int contact)
-{
-    vi_lane_group *g = w->group;
-    const vi_lane_run *run = &w->run[lane];
-    double rows[2][VI_RECORD_WIDTH];
-    if (g->yielding.pressed_stop[lane] > 0.0) {
-        vi_yielding_touch_down(g, lane, instant_of(g, lane));
-        return;
-    }
-    vi_yielding_rows(g, lane, &run->clock, instant_of(g, lane), run->unit[contact], run->impulse[contact], rows);
-    append(w, lane, rows[0]);
-    append(w, lane, rows[1]);
-}
-
-static void tell_impact(const vi_lanes_work *w, int lane)
-{
-    const vi_lane_group *g = w->group;
-    const vi_lane_run *run = &w->run[lane];
-    const int contact = (int)g->hit[lane] - 1;
-    if (g->yielding.yields[contact][lane] > 0.0) {
-        tell_contact(w, lane, contact);
-        return;
-    }
-    const double speed = g->approach[lane] * run->unit[contact];
-    const vi_contact_law law = {.restitution = g->restitution[contact][lane],
-                                .yield_velocity = g->yield_velocity[contact][lane] * run->unit[contact]};
-    const double restitution = vi_contact_law_restitution(&law, speed);
-    const double impulse = (1.0 + restitution) * speed * run->impulse[contact];
-    const double row[] = {VI_ROW_IMPACT, time_of(w, lane), vi_clock_phase(&run->clock, instant_of(g, lane)), speed,
-                          impulse, contact + 1.0, restitution, 0.0};
-    append(w, lane, row);
-}
-
-/* A period begins: write the row of the period that ends. */
-static void turn_period(const vi_lanes_work *w, int lane, double displacement, double velocity)
-{
-    const vi_lane_group *g = w->group;
-    vi_lane_run *run = &w->run[lane];
-    if (run->period_open) {
-        const bool extrema = w->plan->extrema != 0;
-        const double row[] = {VI_ROW_PERIOD, run->period_start, extrema ? run->highest : NAN,
-                              extrema ? run->lowest : NAN, run->strobe_displacement, run->strobe_velocity,
-                              g->impacts[lane] - run->impacts_before, 0.0};
-        append(w, lane, row);
-    }
-    run->period_open = true;
-    run->period_start = time_of(w, lane);
-    run->strobe_displacement = run->highest = run->lowest = displacement;
-    run->strobe_velocity = velocity;
-    run->impacts_before = g->impacts[lane];
 }
 
 /* ---- the goals of a run ---- */
@@ -119,7 +50,7 @@ static void leave(vi_lanes_work *w, int lane)
 {
     const int64_t point = w->run[lane].point;
     w->points->state[point] = VI_POINT_IS_LEFT;
-    w->points->rows_of[point] = 0;
+    w->points->rows_of[point] = w->points->periods_of[point] = 0;
     w->points->finished += 1;
     w->run[lane].point = -1;
 }
@@ -136,16 +67,15 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
         leave(w, lane);
         return;
     }
-    if (vi_yielding_is_open(w->group, lane)) {
-        const int contact = (int)w->group->yielding.pressed_stop[lane] - 1;
-        double row[VI_RECORD_WIDTH];
-        vi_yielding_open_row(w->group, lane, &w->run[lane].clock, w->run[lane].unit[contact], row);
-        append(w, lane, row);
+    if (!w->plan->each_period && points->periods_of[point] > 0) {
+        const int64_t place = (VI_OF_IMPACTS * points->count + point) * points->most_periods;
+        points->periods[place] /= (double)points->periods_of[point];
     }
+    vi_yielding_write_open(w->group, points, lane);
     points->outcome[point] = (int8_t)outcome;
     points->reached[point] = reached;
-    points->displacement[point] = displacement;
-    points->velocity[point] = velocity;
+    points->displacement[point] = w->group->record.scale[lane] * displacement;
+    points->velocity[point] = w->group->record.scale[lane] * velocity;
     for (int j = 0; j < w->plan->modes; ++j) {
         points->final_q[j * points->count + point] = q[j];
         points->final_p[j * points->count + point] = p[j];
@@ -154,6 +84,18 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     points->finished += 1;
     w->run[lane].point = -1;
     w->run[lane].following = point + 1;
+}
+
+/* A period begins, and the open one ends. */
+static void turn_period(const vi_lanes_work *w, int lane, double displacement, double velocity)
+{
+    vi_lane_run *run = &w->run[lane];
+    if (run->period_open) {
+        vi_lane_end_period(w->group, w->plan, w->points, lane);
+    }
+    run->period_open = true;
+    w->group->record.last_turn[lane] = (double)run->end.periods;
+    vi_lane_begin_period(w->group, lane, displacement, velocity);
 }
 
 /* Act at an instant without contact: begin to record, turn the period, or end. */
@@ -168,9 +110,9 @@ static void arrive(vi_lanes_work *w, int lane)
     }
     if (!run->recording) {
         run->recording = true;
-        g->reports[lane] = w->plan->impacts ? 1.0 : 0.0;
-        g->follows[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
-        run->highest = run->lowest = displacement;
+        g->record.impacts[lane] = w->plan->impacts ? 1.0 : 0.0;
+        g->record.extremes[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
+        vi_lane_begin_period(g, lane, displacement, velocity);
         if (w->plan->periods && g->rest[lane] == 0.0) {
             turn_period(w, lane, displacement, velocity);
         }
@@ -182,16 +124,13 @@ static void arrive(vi_lanes_work *w, int lane)
     }
 }
 
-/* Act on an impact: write its row, and end at the impact limit. */
-static void hit(vi_lanes_work *w, int lane)
+/* Act on the impact at the limit: the run ends, unless the impact is at its end. */
+static void stop_at_limit(vi_lanes_work *w, int lane)
 {
-    vi_lane_group *g = w->group;
-    if (w->run[lane].recording && w->plan->impacts) {
-        tell_impact(w, lane);
-    }
-    const bool over = vi_clock_elapsed(&w->run[lane].clock, instant_of(g, lane), w->run[lane].end) > 0.0;
-    if (over && g->impacts[lane] >= g->most_impacts[lane]) {
-        finish(w, lane, VI_RUN_IMPACT_LIMIT, time_of(w, lane));
+    const vi_clock *clock = &w->run[lane].clock;
+    const vi_instant now = instant_of(w->group, lane);
+    if (vi_clock_elapsed(clock, now, w->run[lane].end) > 0.0) {
+        finish(w, lane, VI_RUN_IMPACT_LIMIT, vi_clock_time(clock, now));
     }
 }
 
@@ -211,8 +150,10 @@ static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
     g->on[lane] = g->hit[lane] = c + 1.0;
     g->approach[lane] = met->approach;
     g->impacts[lane] += 1.0;
-    const bool reports = g->reports[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
-    return reports ? VI_EVENT_IMPACT : VI_EVENT_NONE;
+    if (g->record.impacts[lane] > 0.0) {
+        vi_lane_write_impact(g, w->plan, w->points, lane);
+    }
+    return g->impacts[lane] >= g->most_impacts[lane] ? VI_EVENT_IMPACT : VI_EVENT_NONE;
 }
 
 /* Search the cell that lockstep could not decide. Returns the resulting event. */
@@ -236,29 +177,25 @@ static int search(const vi_lanes_work *w, int lane)
     }
     put_instant(g, lane, vi_clock_after(clock, now, share * cell));
     if (result == VI_CELL_ACTED) {
-        return (int)g->event[lane];
+        return vi_yielding_record(g, w->points, lane);
     }
     return result == VI_CELL_HIT ? bounce(w, lane, &met) : VI_EVENT_NONE;
 }
 
-static void follow_extremes(const vi_lanes_work *w, int lane)
-{
-    if (w->group->follows[lane] > 0.0) {
-        w->body->extremes(w->group, lane, w->plan->modes, w->plan->contacts, &w->run[lane].highest, &w->run[lane].lowest);
-    }
-}
-
 void vi_lane_attend(vi_lanes_work *w, int lane)
 {
-    int event = (int)w->group->event[lane];
+    vi_lane_group *g = w->group;
+    int event = (int)g->event[lane];
     if (event == VI_EVENT_NONE) {
         return;
     }
-    follow_extremes(w, lane);
+    if (g->record.doubtful[lane] > 0.0) {
+        w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
+    }
     if (event == VI_EVENT_CELL) {
         event = search(w, lane);
-        if (event != VI_EVENT_LEAVE) {
-            follow_extremes(w, lane);
+        if (event != VI_EVENT_LEAVE && g->record.extremes[lane] > 0.0) {
+            w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
         }
     }
     if (event == VI_EVENT_LEAVE) {
@@ -266,7 +203,7 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
     } else if (event == VI_EVENT_GOAL) {
         arrive(w, lane);
     } else if (event == VI_EVENT_IMPACT) {
-        hit(w, lane);
+        stop_at_limit(w, lane);
     }
 }
 
@@ -301,13 +238,16 @@ static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
         || !vi_clock_start(&run->clock, frequency, phase, sqrt(p->stiffness[point]))
         || !vi_clock_instant(&run->clock, 0.0, 0.0, &start)
         || !vi_clock_instant(&run->clock, p->begin[point], 0.0, &run->begin)
-        || !vi_clock_instant(&run->clock, p->end[point], 0.0, &run->end)) {
+        || !vi_clock_instant(&run->clock, p->end[point], 0.0, &run->end)
+        || (w->plan->periods && w->plan->each_period && run->end.periods - run->begin.periods > p->most_periods)) {
         return false;
     }
     put_instant(w->group, lane, start);
     w->group->angular_frequency[lane] = frequency;
     w->group->period[lane] = run->clock.period;
     w->group->period_low[lane] = run->clock.period_low;
+    w->group->record.origin[lane] = run->clock.origin;
+    w->group->record.origin_low[lane] = run->clock.origin_low;
     return true;
 }
 
@@ -348,15 +288,15 @@ static bool take_start(const vi_lanes_work *w, int64_t point, double q[], double
 static void take_units(const vi_lanes_work *w, int lane, int64_t point)
 {
     const vi_lanes_points *p = w->points;
-    vi_lane_run *run = &w->run[lane];
+    vi_lane_record *record = &w->group->record;
     for (int c = 0; c < w->plan->contacts; ++c) {
         double mobility = 0.0;
         for (int j = 0; j < w->plan->modes; ++j) {
             const int64_t i = (c * w->plan->modes + j) * p->count + point;
             mobility += p->shape[i] * p->impulse[i];
         }
-        run->impulse[c] = 1.0 / mobility;
-        run->unit[c] = w->plan->modes == 1 ? fabs(p->shape[c * p->count + point]) : 1.0;
+        record->impulse[c][lane] = 1.0 / mobility;
+        record->unit[c][lane] = w->plan->modes == 1 ? fabs(p->shape[c * p->count + point]) : 1.0;
     }
 }
 
@@ -368,8 +308,12 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     double q[VI_LANES_MODES], p[VI_LANES_MODES];
     run->point = point;
     run->recording = run->goal_is_period = run->period_open = false;
-    w->points->rows_of[point] = 0;
-    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = g->reports[lane] = g->follows[lane] = 0.0;
+    w->points->rows_of[point] = w->points->periods_of[point] = 0;
+    g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
+    g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;
+    g->record.last_turn[lane] = -1.0;
+    g->record.point[lane] = (double)point;
+    g->record.scale[lane] = 1.0;
     g->most_impacts[lane] = w->plan->impact_limit > 0 ? (double)w->plan->impact_limit : HUGE_VAL;
     if (!take_start(w, point, q, p) || !take_modes(w, point) || !take_time(w, lane, point)
         || !w->body->take(g, lane, w->plan, w->points, point, q, p)) {
@@ -387,7 +331,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
 
 static bool can_begin(const vi_lanes_points *p, int64_t point)
 {
-    if (point >= p->count || p->state[point] != VI_POINT_WAITS) {
+    if (point >= p->begun_below || p->state[point] != VI_POINT_WAITS) {
         return false;
     }
     const uint8_t before = point == 0 || p->first[point] ? VI_POINT_HAS_RUN : p->state[point - 1];
@@ -401,7 +345,7 @@ bool vi_lane_take(vi_lanes_work *w, int lane)
         begin_point(w, lane, following);
         return true;
     }
-    for (; w->next < w->points->count; ++w->next) {
+    for (; w->next < w->points->begun_below; ++w->next) {
         if (can_begin(w->points, w->next)) {
             begin_point(w, lane, w->next);
             return true;

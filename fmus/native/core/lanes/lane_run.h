@@ -14,11 +14,7 @@ typedef struct {
     vi_clock clock;
     vi_instant begin, end;  /* of the recording */
     bool recording, goal_is_period;
-    double unit[VI_LANES_CONTACTS];    /* m/s per unit of speed in the group: |shape| of one mode */
-    double impulse[VI_LANES_CONTACTS]; /* N s for a change of a contact's speed by 1 m/s */
     bool period_open;
-    double period_start, strobe_displacement, strobe_velocity, impacts_before; /* of the open period */
-    double highest, lowest; /* displacement in the open period */
 } vi_lane_run;
 
 /* Everything that a lane needs to run points, for the length of a call. */

@@ -9,8 +9,9 @@
 
 /* Rounds of attending the lanes between two readings of the clock. */
 enum { ROUNDS_BETWEEN_READINGS = 64 };
-/* Most rows written when all lanes are attended once. */
-enum { MOST_ROWS = 8 * VI_LANES };
+/* Most rows written between two checks of their room: by the rounds, when all lanes are attended once, and for contacts
+ * that are open at the end of their run. */
+enum { MOST_ROWS = (VI_MOST_ROUNDS + 2) * VI_LANES };
 
 /* State that is kept between two calls. */
 typedef struct {
@@ -42,6 +43,20 @@ VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)
 VI_DOOR int vi_door_lanes_instructions(int set)
 {
     return vi_lanes_instructions(set);
+}
+
+VI_DOOR void vi_door_lanes_impacts(const double *rows, const int64_t *owner, int64_t count, int64_t *next, int64_t total,
+                                   double *columns)
+{
+    for (int64_t i = 0; i < count; ++i) {
+        const int64_t place = next[owner[i]];
+        if (place >= 0) {
+            next[owner[i]] += 1;
+            for (int column = 0; column < VI_IMPACT_WIDTH; ++column) {
+                columns[column * total + place] = rows[i * VI_IMPACT_WIDTH + column];
+            }
+        }
+    }
 }
 
 static bool works(const vi_lanes_work *work)
@@ -111,12 +126,12 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
         if (!works(&work)) {
             break;
         }
-        rounds(&now->group, plan);
+        rounds(&now->group, plan, points);
         for (int lane = 0; lane < VI_LANES; ++lane) {
             vi_lane_attend(&work, lane);
         }
     }
-    for (int64_t i = 0; i < points->count; ++i) {
+    for (int64_t i = 0; i < points->begun_below; ++i) {
         if (points->state[i] != VI_POINT_HAS_RUN && points->state[i] != VI_POINT_IS_ANSWERED) {
             return VI_LANES_LEFT;
         }

@@ -34,6 +34,11 @@ VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan);
  * points afterwards; their arrays may move between calls. Returns one of VI_LANES_DONE to VI_LANES_REFUSED. */
 VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory);
 
+/* Put `count` impacts, as written in `rows` and `owner`, into columns[VI_IMPACT_WIDTH][total], point by point.
+ * next[point]: place of the point's next impact, counted on here; -1: its impacts are left out. */
+VI_DOOR void vi_door_lanes_impacts(const double *rows, const int64_t *owner, int64_t count, int64_t *next, int64_t total,
+                                   double *columns);
+
 /* The instruction set that runs when `set` is asked for: itself, or the best; 0 where the machine lacks it. */
 VI_DOOR int vi_door_lanes_instructions(int set);
 

@@ -220,9 +220,10 @@ static double extend(const vi_lane_group *g, int lane, int modes, double sign, i
     return most;
 }
 
-static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, double *highest, double *lowest)
+static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
 {
     (void)contacts;
+    double *highest = &g->record.most[lane], *lowest = &g->record.least[lane];
     const int level = (int)g->many.start_level[lane], cells = (int)g->passed[lane];
     place s = start_of(g, lane, modes);
     *highest = extend(g, lane, modes, 1.0, level, cells, s, *highest);

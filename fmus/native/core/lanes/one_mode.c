@@ -146,26 +146,20 @@ static double extend(const vi_lane_group *g, int lane, int contacts, double sign
     return most;
 }
 
-static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, double *highest, double *lowest)
+static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
 {
     (void)modes;
-    const double observed = g->one.observed[lane];
+    vi_lane_record *record = &g->record;
     const bulges bulge = bulges_of(g, lane);
     const int passed = (int)g->passed[lane];
     double edge[VI_CELLS + 2];
-    if (observed == 0.0) {
-        return;
-    }
     edge[0] = g->start_q[0][lane];
     for (int i = 1; i <= passed; ++i) {
         edge[i] = after_cells(g->one.end_q[i], g, lane);
     }
     edge[passed + 1] = g->q[0][lane];
-    const double above = observed > 0.0 ? *highest : *lowest, below = observed > 0.0 ? *lowest : *highest;
-    const double most = observed * extend(g, lane, contacts, 1.0, edge, &bulge, above / observed);
-    const double least = -observed * extend(g, lane, contacts, -1.0, edge, &bulge, -below / observed);
-    *highest = vi_max(*highest, vi_max(most, least));
-    *lowest = vi_min(*lowest, vi_min(most, least));
+    record->most[lane] = extend(g, lane, contacts, 1.0, edge, &bulge, record->most[lane]);
+    record->least[lane] = -extend(g, lane, contacts, -1.0, edge, &bulge, -record->least[lane]);
 }
 
 static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
@@ -176,8 +170,8 @@ static void observe(vi_lane_group *g, int lane, int modes, int contacts, double 
             g->q[0][lane] = g->sign[c][lane] * g->limit[c][lane];
         }
     }
-    *displacement = g->one.observed[lane] * g->q[0][lane];
-    *velocity = g->one.observed[lane] * g->p[0][lane];
+    *displacement = g->q[0][lane];
+    *velocity = g->p[0][lane];
 }
 
 static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
@@ -229,7 +223,7 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     g->cell_rate[lane] = 1.0 / cell;
     g->q[0][lane] = q[0];
     g->p[0][lane] = p[0];
-    one->observed[lane] = points->observed[point];
+    g->record.scale[lane] = points->observed[point];
     const double steady = LARGEST_STEADY * one->load[lane] / (fastest * fastest);
     return take_contacts(g, lane, plan->contacts, points, point, steady);
 }

@@ -1,9 +1,6 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
-#include "lanes/lane_group.h"
-#include "lanes/vector.h"
+#include "lanes/recording.h"
 
-/* Rounds after which the lanes return to the caller. */
-enum { MOST_ROUNDS = 256 };
 /* Most times that a lane goes through all its cells in one round. */
 enum { MOST_JUMPS = 3 };
 
@@ -171,7 +168,7 @@ LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts,
 {
     candidate cell;
     vector count[VI_LANES_CONTACTS], cleared;
-    const mask alone = load(g->follows + at) == 0.0;
+    const mask alone = load(g->record.extremes + at) == 0.0;
     for (int i = 0;; ++i) {
         scan(g, at, contacts, s, count);
         cell.passed = sure_cells(s, contacts, count, &cleared);
@@ -345,8 +342,29 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
     store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
 }
 
+/* Turn the periods of lanes at their goals. Returns these lanes, whose goal is now the end of the next period. */
+LANES_INLINE mask turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
+                               mask arrives)
+{
+    const vector goal = load(g->goal_periods + at), last = load(g->record.last_turn + at);
+    const mask turns = arrives & (goal < last) & (load(g->record.doubtful + at) == 0.0);
+    if (!any(turns)) {
+        return turns;
+    }
+    vector q = load(g->q[0] + at);
+    for (int c = 0; c < contacts; ++c) { /* beyond a stop by rounding: put on it */
+        const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
+        q = choose(turns & (sign * q > limit), sign * limit, q);
+    }
+    store(g->q[0] + at, q);
+    end_periods(g, plan, points, at, turns);
+    begin_periods(g, at, turns, q, load(g->p[0] + at));
+    store(g->goal_periods + at, goal + only(turns, all(1.0)));
+    return turns;
+}
+
 /* Do one round of a vector of lanes; true when one of them has an event. */
-LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
+LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts)
 {
     setting s = begin_round(g, at);
     const candidate cell = choose_cell(g, at, contacts, &s);
@@ -354,7 +372,6 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
     const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    const mask reports = (load(g->reports + at) > 0.0) | (impacts >= load(g->most_impacts + at));
     store(g->start_q[0] + at, s.q);
     store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
@@ -366,21 +383,27 @@ LANES_INLINE bool one_round(vi_lane_group *g, int at, int contacts)
     store(g->p[0] + at, choose(moves, a.p, cell.p));
     store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
-    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(a.hits & reports, all((double)VI_EVENT_IMPACT), event);
-    event = choose(arrives, all((double)VI_EVENT_GOAL), event);
+    store(g->record.doubtful + at, load(g->record.extremes + at));
+    const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
+    if (any(written)) {
+        write_impacts(g, points, at, contacts, written);
+    }
+    const mask turns = turn_periods(g, plan, points, at, contacts, arrives);
+    vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    event = choose(a.hits & (impacts >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT), event);
+    event = choose(arrives & ~turns, all((double)VI_EVENT_GOAL), event);
     event = choose(a.careful, all((double)VI_EVENT_CELL), event);
     event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
     return any(event > 0.0);
 }
 
-LANES_INLINE void run_rounds(vi_lane_group *g, int contacts)
+LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts)
 {
     bool found = false;
-    for (int i = 0; i < MOST_ROUNDS && !found; ++i) {
+    for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= one_round(g, at, contacts);
+            found |= one_round(g, plan, points, at, contacts);
         }
     }
 }

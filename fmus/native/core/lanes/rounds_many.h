@@ -147,7 +147,8 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contac
     store(g->on + at, only(passed == 0.0, load(g->on + at)));
     store(g->many.level + at, choose(whole, larger(level - 1.0, all(0.0)), smaller(level + 1.0, load(many->last + at))));
     move_clock(g, at, passed * rows.cells, all(0.0), passed != passed);
-    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    store(g->record.doubtful + at, load(g->record.extremes + at));
+    vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
     event = choose(~whole & shortest, all((double)VI_EVENT_CELL), event);
     store(g->event + at, event);
     return any(event > 0.0);
@@ -156,25 +157,25 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, int at, int modes, int contac
 LANES_INLINE void run_rounds_many(vi_lane_group *g, int modes, int contacts)
 {
     bool found = false;
-    for (int i = 0; i < MOST_ROUNDS && !found; ++i) {
+    for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
             found |= one_round_many(g, at, modes, contacts);
         }
     }
 }
 
-void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan)
+void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
     /* a body without a contact has tables of an idle lane there: nothing meets it */
     if (plan->modes > 1) {
         run_rounds_many(g, plan->modes, plan->contacts);
     } else if (plan->yielding && plan->contacts < 2) {
-        run_phase_rounds(g, 1);
+        run_phase_rounds(g, plan, points, 1);
     } else if (plan->yielding) {
-        run_phase_rounds(g, 2);
+        run_phase_rounds(g, plan, points, 2);
     } else if (plan->contacts < 2) {
-        run_rounds(g, 1);
+        run_rounds(g, plan, points, 1);
     } else {
-        run_rounds(g, 2);
+        run_rounds(g, plan, points, 2);
     }
 }

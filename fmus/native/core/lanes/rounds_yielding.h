@@ -4,8 +4,8 @@
  * which are blended lane by lane. While a stop is pressed, q and p are the depth and its rate: no rounding of the stop's
  * position enters the contact.
  */
-#include "lanes/lane_group.h"
-#include "lanes/vector.h"
+#include "lanes/touch_down.h"
+#include "lanes/yielding.h"
 
 /* Limit of a stop that is not met while another one is pressed. */
 #define NEVER 1e300
@@ -203,7 +203,7 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
 {
     phase_cell cell;
     vector count[VI_LANES_CONTACTS], cleared, length;
-    const mask alone = load(g->follows + at) == 0.0;
+    const mask alone = load(g->record.extremes + at) == 0.0;
     mask jumps;
     for (int i = 0;; ++i) {
         scan_phase(g, at, contacts, s, count);
@@ -372,8 +372,52 @@ LANES_INLINE void set_cells(vi_lane_group *g, int at, int contacts)
     store(g->cell_rate + at, rate);
 }
 
+/* Note the contacts that begin, and write those that end, where they are recorded. */
+LANES_INLINE void record_contacts(vi_lane_group *g, vi_lanes_points *points, int at, int contacts, mask bounces,
+                                  mask touches, mask parts)
+{
+    const mask records = load(g->record.impacts + at) > 0.0;
+    if (any(bounces & records)) {
+        write_impacts(g, points, at, contacts, bounces & records);
+    }
+    if (any(touches & records)) {
+        note_touch_downs(g, at, touches & records);
+    }
+    parts &= load(g->yielding.open + at) > 0.0;
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        if (parts[i]) {
+            vi_yielding_write(g, points, at + i);
+        }
+    }
+}
+
+/* Turn the periods of lanes at their goals. Returns these lanes, whose goal is now the end of the next period. */
+LANES_INLINE mask turn_phase_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                     int contacts, mask arrives)
+{
+    const vector goal = load(g->goal_periods + at), last = load(g->record.last_turn + at);
+    const mask turns = arrives & (goal < last) & (load(g->record.doubtful + at) == 0.0);
+    if (!any(turns)) {
+        return turns;
+    }
+    const vector state = load(g->q[0] + at), rate = load(g->p[0] + at), pressed = load(g->yielding.pressed_stop + at);
+    vector q = state, p = rate;
+    for (int c = 0; c < contacts; ++c) {
+        const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
+        const mask here = pressed == (double)(c + 1), rigid = turns & (load(g->yielding.yields[c] + at) == 0.0);
+        q = choose(here, sign * (limit + state), choose(rigid & (sign * q > limit), sign * limit, q));
+        p = choose(here, sign * rate, p);
+    }
+    store(g->q[0] + at, choose(pressed > 0.0, state, q));
+    end_periods(g, plan, points, at, turns);
+    begin_periods(g, at, turns, q, p);
+    store(g->goal_periods + at, goal + only(turns, all(1.0)));
+    return turns;
+}
+
 /* Do one round of a vector of lanes; true when one of them has an event. */
-LANES_INLINE bool one_phase_round(vi_lane_group *g, int at, int contacts)
+LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                  int contacts)
 {
     phase_setting s = begin_phase_round(g, at, contacts);
     const phase_cell cell = choose_phase_cell(g, at, contacts, &s);
@@ -384,8 +428,7 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, int at, int contacts)
     a.q = choose(moves, a.q, cell.q);
     a.p = choose(moves, a.p, cell.p);
     const mask leaves = change_phase(g, at, contacts, &s, &cell, &a);
-    const mask parts = a.hits & pressed, meets = a.hits & ~pressed;
-    const mask reports = (load(g->reports + at) > 0.0) | (load(g->impacts + at) >= load(g->most_impacts + at));
+    const mask touches = a.hits & ~pressed & (load(g->yielding.pressed_stop + at) > 0.0), kept = ~leaves;
     store(g->start_q[0] + at, s.q);
     store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
@@ -396,21 +439,25 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, int at, int contacts)
     store(g->p[0] + at, a.p);
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
     set_cells(g, at, contacts);
-    vector event = only(load(g->follows + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose((meets & reports) | (parts & (load(g->yielding.open + at) > 0.0)), all((double)VI_EVENT_IMPACT), event);
-    event = choose(arrives, all((double)VI_EVENT_GOAL), event);
+    store(g->record.doubtful + at, load(g->record.extremes + at));
+    record_contacts(g, points, at, contacts, a.hits & ~pressed & ~touches & kept, touches & kept, a.hits & pressed & kept);
+    const mask turns = turn_phase_periods(g, plan, points, at, contacts, arrives & kept);
+    const mask over = a.hits & ~pressed & (load(g->impacts + at) >= load(g->most_impacts + at));
+    vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
+    event = choose(over, all((double)VI_EVENT_IMPACT), event);
+    event = choose(arrives & ~turns, all((double)VI_EVENT_GOAL), event);
     event = choose(a.careful, all((double)VI_EVENT_CELL), event);
     event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
     return any(event > 0.0);
 }
 
-LANES_INLINE void run_phase_rounds(vi_lane_group *g, int contacts)
+LANES_INLINE void run_phase_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts)
 {
     bool found = false;
-    for (int i = 0; i < MOST_ROUNDS && !found; ++i) {
+    for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= one_phase_round(g, at, contacts);
+            found |= one_phase_round(g, plan, points, at, contacts);
         }
     }
 }

@@ -3,10 +3,14 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "lanes/lane_tables.h"
 #include "lanes/lane_turn.h"
 #include "motion/majorant.h"
+
+#define VI_WIDTH 1
+#include "lanes/touch_down.h"
 
 /* Largest stiffness (1/s^2) and damping (1/s) of a stop: squares of rates and of cells stay in range. */
 static const double LARGEST = 1e60;
@@ -84,10 +88,8 @@ static void touch(vi_lane_group *g, int lane, int c, double approach)
 {
     g->q[0][lane] = 0.0;
     g->p[0][lane] = g->approach[lane] = approach;
-    begin_phase(g, lane, c + 1);
     g->impacts[lane] += 1.0;
-    const bool reports = g->reports[lane] > 0.0 || g->impacts[lane] >= g->most_impacts[lane];
-    g->event[lane] = reports ? VI_EVENT_IMPACT : VI_EVENT_NONE;
+    begin_phase(g, lane, c + 1);
 }
 
 static void separate(vi_lane_group *g, int lane, int c)
@@ -99,7 +101,6 @@ static void separate(vi_lane_group *g, int lane, int c)
     g->p[0][lane] *= sign;
     begin_phase(g, lane, 0);
     g->yielding.receding[lane] = g->on[lane] = c + 1.0;
-    g->event[lane] = g->yielding.open[lane] > 0.0 ? VI_EVENT_IMPACT : VI_EVENT_NONE;
 }
 
 /* ---- the careful search ---- */
@@ -157,8 +158,8 @@ static vi_cell_result act(vi_lane_group *g, int lane, int c, vi_lane_meeting *me
         return VI_CELL_ACTED;
     }
     if (g->yielding.receding[lane] == c + 1) {
+        g->hit[lane] = 0.0;
         begin_phase(g, lane, 0);
-        g->event[lane] = VI_EVENT_NONE;
         return approach > 0.0 ? VI_CELL_ACTED : VI_CELL_UNDECIDED; /* it presses again */
     }
     if (g->yielding.yields[c][lane] > 0.0) {
@@ -257,26 +258,19 @@ static double rigid_on(const vi_lane_group *g, int lane, int contacts, double si
     return farthest;
 }
 
-static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, double *highest, double *lowest)
+static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
 {
     (void)modes;
-    const double observed = g->one.observed[lane];
+    vi_lane_record *record = &g->record;
     const int pressed = (int)g->yielding.start_pressed[lane];
     const vi_one_mode *tables = tables_of(g, pressed);
     const double side = pressed > 0 ? g->sign[pressed - 1][lane] : 1.0;
     const double level = pressed > 0 ? side * g->limit[pressed - 1][lane] : 0.0;
     const double length = g->yielding.cell[pressed][lane];
-    if (observed == 0.0) {
-        return;
-    }
-    const double above = (observed > 0.0 ? *highest : *lowest) / observed;
-    const double below = (observed > 0.0 ? *lowest : *highest) / observed;
-    double most = level + extend(tables, g, lane, side, length, above - level);
-    double least = level - extend(tables, g, lane, -side, length, level - below);
-    most = vi_min(most, rigid_on(g, lane, contacts, 1.0));
-    least = vi_max(least, -rigid_on(g, lane, contacts, -1.0));
-    *highest = vi_max(*highest, vi_max(observed * most, observed * least));
-    *lowest = vi_min(*lowest, vi_min(observed * most, observed * least));
+    const double most = level + extend(tables, g, lane, side, length, record->most[lane] - level);
+    const double least = level - extend(tables, g, lane, -side, length, level - record->least[lane]);
+    record->most[lane] = vi_max(record->most[lane], vi_min(most, rigid_on(g, lane, contacts, 1.0)));
+    record->least[lane] = vi_min(record->least[lane], vi_max(least, -rigid_on(g, lane, contacts, -1.0)));
 }
 
 /* ---- the state ---- */
@@ -284,16 +278,13 @@ static void extremes(const vi_lane_group *g, int lane, int modes, int contacts, 
 static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
 {
     (void)modes;
-    double q, p;
     for (int c = 0; c < contacts; ++c) {
         const bool rigid = g->yielding.pressed_stop[lane] == 0.0 && g->yielding.yields[c][lane] == 0.0;
         if (rigid && g->sign[c][lane] * g->q[0][lane] > g->limit[c][lane]) {
             g->q[0][lane] = g->sign[c][lane] * g->limit[c][lane];
         }
     }
-    modal(g, lane, &q, &p);
-    *displacement = g->one.observed[lane] * q;
-    *velocity = g->one.observed[lane] * p;
+    modal(g, lane, displacement, velocity);
 }
 
 static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
@@ -303,40 +294,6 @@ static void state(const vi_lane_group *g, int lane, int modes, double q[], doubl
 }
 
 /* ---- recorded contacts ---- */
-
-static vi_instant touched_at(const vi_lane_group *g, int lane)
-{
-    const vi_yielding *yielding = &g->yielding;
-    return (vi_instant){(int64_t)yielding->touch_periods[lane], yielding->touch_rest[lane],
-                        yielding->touch_rest_low[lane]};
-}
-
-void vi_yielding_touch_down(vi_lane_group *g, int lane, vi_instant now)
-{
-    vi_yielding *yielding = &g->yielding;
-    yielding->open[lane] = 1.0;
-    yielding->touch_periods[lane] = (double)now.periods;
-    yielding->touch_rest[lane] = now.rest;
-    yielding->touch_rest_low[lane] = now.rest_low;
-    yielding->touch_approach[lane] = g->approach[lane];
-    vi_lane_turn(g->angular_frequency[lane] * now.rest, &yielding->touch_cosine[lane], &yielding->touch_sine[lane]);
-}
-
-bool vi_yielding_is_open(const vi_lane_group *g, int lane)
-{
-    return g->yielding.open[lane] > 0.0;
-}
-
-void vi_yielding_open_row(const vi_lane_group *g, int lane, const vi_clock *clock, double unit,
-                          double row[VI_RECORD_WIDTH])
-{
-    const vi_instant at = touched_at(g, lane);
-    const double values[] = {VI_ROW_IMPACT, vi_clock_time(clock, at), vi_clock_phase(clock, at),
-                             g->yielding.touch_approach[lane] * unit, NAN, g->yielding.pressed_stop[lane], NAN, NAN};
-    for (int i = 0; i < VI_RECORD_WIDTH; ++i) {
-        row[i] = values[i];
-    }
-}
 
 /* Change of the speed of approach that the stop has taken since the touch-down: the balance of momentum. */
 static double taken(const vi_lane_group *g, int lane, int c, double duration, double sine)
@@ -378,26 +335,63 @@ static double peak(const vi_lane_group *g, int lane, int c, double duration)
     return most;
 }
 
-void vi_yielding_rows(vi_lane_group *g, int lane, const vi_clock *clock, vi_instant now, double unit, double impulse,
-                      double rows[2][VI_RECORD_WIDTH])
+static void write(const vi_lane_group *g, vi_lanes_points *points, int lane, const double row[VI_IMPACT_WIDTH])
+{
+    const int64_t point = (int64_t)g->record.point[lane];
+    memcpy(points->rows + points->rows_used * VI_IMPACT_WIDTH, row, VI_IMPACT_WIDTH * sizeof row[0]);
+    points->owner[points->rows_used++] = point;
+    points->rows_of[point] += 1;
+}
+
+void vi_yielding_write(vi_lane_group *g, vi_lanes_points *points, int lane)
 {
     vi_yielding *yielding = &g->yielding;
     const int c = (int)g->hit[lane] - 1;
-    const vi_instant at = touched_at(g, lane);
-    const double time = vi_clock_time(clock, at), duration = vi_clock_elapsed(clock, at, now);
-    const double approach = yielding->touch_approach[lane], restitution = vi_max(0.0, -g->approach[lane]) / approach;
+    const double whole = g->periods[lane] - yielding->touch_periods[lane];
+    const double duration = (whole * g->period[lane] + (g->rest[lane] - yielding->touch_rest[lane]))
+                            + (whole * g->period_low[lane] + (g->rest_low[lane] - yielding->touch_rest_low[lane]));
+    const double approach = yielding->touch_approach[lane], unit = g->record.unit[c][lane];
     double cosine, sine;
-    vi_lane_turn(g->angular_frequency[lane] * now.rest, &cosine, &sine);
-    const double change = taken(g, lane, c, duration, sine) * unit;
-    const double impact[] = {VI_ROW_IMPACT,    time,    vi_clock_phase(clock, at), approach * unit,
-                             change * impulse, c + 1.0, restitution,               duration};
-    const double largest[VI_RECORD_WIDTH] = {VI_ROW_PEAK, time, c + 1.0,
-                                             peak(g, lane, c, duration) * yielding->force[c][lane]};
-    for (int i = 0; i < VI_RECORD_WIDTH; ++i) {
-        rows[0][i] = impact[i];
-        rows[1][i] = largest[i];
-    }
+    vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &cosine, &sine);
+    const double row[VI_IMPACT_WIDTH] = {yielding->touch_time[lane],
+                                         yielding->touch_phase[lane],
+                                         approach * unit,
+                                         taken(g, lane, c, duration, sine) * unit * g->record.impulse[c][lane],
+                                         c + 1.0,
+                                         vi_max(0.0, -g->approach[lane]) / approach,
+                                         duration,
+                                         peak(g, lane, c, duration) * yielding->force[c][lane]};
+    write(g, points, lane, row);
     yielding->open[lane] = 0.0;
+}
+
+void vi_yielding_write_open(vi_lane_group *g, vi_lanes_points *points, int lane)
+{
+    vi_yielding *yielding = &g->yielding;
+    if (yielding->open[lane] > 0.0) {
+        const int c = (int)yielding->pressed_stop[lane] - 1;
+        const double row[VI_IMPACT_WIDTH] = {yielding->touch_time[lane],
+                                             yielding->touch_phase[lane],
+                                             yielding->touch_approach[lane] * g->record.unit[c][lane],
+                                             NAN,
+                                             c + 1.0,
+                                             NAN,
+                                             NAN,
+                                             NAN};
+        write(g, points, lane, row);
+        yielding->open[lane] = 0.0;
+    }
+}
+
+int vi_yielding_record(vi_lane_group *g, vi_lanes_points *points, int lane)
+{
+    const bool touches = g->hit[lane] > 0.0 && g->yielding.pressed_stop[lane] > 0.0;
+    if (touches && g->record.impacts[lane] > 0.0) {
+        note_touch_downs(g, lane, (mask){-1});
+    } else if (g->hit[lane] > 0.0 && !touches && g->yielding.open[lane] > 0.0) {
+        vi_yielding_write(g, points, lane);
+    }
+    return touches && g->impacts[lane] >= g->most_impacts[lane] ? VI_EVENT_IMPACT : VI_EVENT_NONE;
 }
 
 /* ---- the start ---- */

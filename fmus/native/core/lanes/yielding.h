@@ -1,28 +1,18 @@
-/* Contacts with stops that yield, in the rows of a record. */
+/* A body of one mode with stops that yield, and the rows of its contacts. */
 #ifndef VIBROIMPACT_LANE_YIELDING_H
 #define VIBROIMPACT_LANE_YIELDING_H
 
-#include <stdbool.h>
-
-#include "body/record.h"
 #include "lanes/lane_body.h"
-#include "motion/clock.h"
 
 extern const vi_lane_body vi_lane_yielding;
 
-/* Note the touch-down of a lane at this instant, whose contact is to be recorded. */
-void vi_yielding_touch_down(vi_lane_group *group, int lane, vi_instant now);
+/* Write the contact that has ended at the lane's instant. */
+void vi_yielding_write(vi_lane_group *group, vi_lanes_points *points, int lane);
 
-/* Is a contact under way that is to be recorded? */
-bool vi_yielding_is_open(const vi_lane_group *group, int lane);
+/* Write the contact that is open at the end of the lane's run, if it is to be recorded. */
+void vi_yielding_write_open(vi_lane_group *group, vi_lanes_points *points, int lane);
 
-/* Set the row of a contact that is still open; quantities known only at its end are NaN. */
-void vi_yielding_open_row(const vi_lane_group *group, int lane, const vi_clock *clock, double unit,
-                          double row[VI_RECORD_WIDTH]);
-
-/* Set the rows of the contact that has ended at this instant: the impact, and its largest force. The arguments are the
- * lane's clock, metres per unit of q, and the impulse for a unit change of the contact's speed, kg. */
-void vi_yielding_rows(vi_lane_group *group, int lane, const vi_clock *clock, vi_instant now, double unit, double impulse,
-                      double rows[2][VI_RECORD_WIDTH]);
+/* Note or write the contact that has just begun or ended in a careful search. Returns the lane's event. */
+int vi_yielding_record(vi_lane_group *group, vi_lanes_points *points, int lane);
 
 #endif

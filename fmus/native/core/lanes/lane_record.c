@@ -1,0 +1,21 @@
+#include "lanes/lane_record.h"
+
+#define VI_WIDTH 1
+#include "lanes/recording.h"
+
+static const mask HERE = {-1};
+
+void vi_lane_write_impact(const vi_lane_group *group, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
+{
+    write_impacts(group, points, lane, plan->contacts, HERE);
+}
+
+void vi_lane_end_period(const vi_lane_group *group, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
+{
+    end_periods(group, plan, points, lane, HERE);
+}
+
+void vi_lane_begin_period(vi_lane_group *group, int lane, double displacement, double velocity)
+{
+    begin_periods(group, lane, HERE, all(displacement), all(velocity));
+}
