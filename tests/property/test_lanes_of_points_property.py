@@ -22,6 +22,7 @@ from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 RIGID = tuple(law for law in LAWS if "kelvin_voigt" not in law)
+YIELDING = tuple(law for law in LAWS if "kelvin_voigt" in law)
 FIRST_IMPACTS = 10
 """Number of compared impacts of a point: later, chaotic motion multiplies rounding by any factor."""
 AGREEMENT = 1e-9
@@ -86,6 +87,21 @@ def with_execution(text: str, how: str) -> Scene:
 @given(text=oscillators("auto", RIGID), data=st.data())
 def test_points_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(text: str, data: Any) -> None:
     across = text + '"stop[1].restitution" = { values = [0.0, 0.5, 1.0] }\n'
+    scene = with_execution(across, "auto")
+    with open_scene(scene) as runner:
+        assert runner.execution == "lanes"
+    whole = rows_of(scene)
+    assert_agree(whole, rows_of(with_execution(across, "fused")))
+    cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
+    assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
+
+
+@settings(max_examples=15, deadline=None)
+@given(text=oscillators("auto", YIELDING), damping=st.sampled_from((0.5, 5.0, 40.0)), data=st.data())
+def test_points_on_kelvin_voigt_stops_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(
+    text: str, damping: float, data: Any
+) -> None:
+    across = text + f'"stop[1].damping" = {{ values = [0.0, {damping}] }}\n'
     scene = with_execution(across, "auto")
     with open_scene(scene) as runner:
         assert runner.execution == "lanes"
