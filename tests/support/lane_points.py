@@ -104,7 +104,7 @@ def run(
         **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
     }
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
-    yields = int((points["contact_stiffness"] != 0.0).any(axis=1) @ 2 ** np.arange(contacts))
+    yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
     plan = LanesPlan(modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields)
     most = _most_periods(points) if each_period else 1
     table = np.full((PERIOD_WIDTH, count, most), np.nan)

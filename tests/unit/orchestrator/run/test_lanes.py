@@ -22,6 +22,7 @@ def scene(body: str = OSCILLATOR, *, stop: str = STOP, record: str = RECORD, res
     return body + FORCING.format(amplitude=amplitude) + stop + record + rest
 
 
+VOIGT = '[[stop]]\nposition = 1.0\nlaw = "kelvin_voigt"\nstiffness = 10.0\n'
 TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
 
 
@@ -41,13 +42,20 @@ TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
         (scene(BEAM.format(modes=2) + 'impact_projection = "collocation"\n'), False),
         (scene(BEAM.format(modes=2), rest=SWEEP + '"body.modes" = { values = [1, 2] }\n'), False),
         (scene(stop='[[stop]]\nposition = 1.0\nlaw = "hertz"\nstiffness = 10.0\n'), False),
+        (scene(stop=VOIGT), True),
+        (scene(CHAIN + "modes = 1\n", stop=VOIGT), True),
+        (scene(CHAIN, stop=VOIGT), False),
+        (scene(BEAM.format(modes=1), stop=VOIGT), True),
+        (scene(stop=TWO.replace(STOP, VOIGT)), True),
+        (scene(stop=VOIGT + "relaxation_time = 0.1\n"), False),
+        (scene(stop=VOIGT, rest=SWEEP + '"stop[1].relaxation_time" = { values = [0.0, 0.1] }\n'), False),
         (scene(rest='[execution]\nhow = "fused"\n' + SWEEP), False),
         (scene(rest="[execution]\ndeadline = 1.0\n" + SWEEP), False),
         (scene(record=RECORD + "time_series = { rate = 10 }\n"), False),
         (scene(OSCILLATOR + "frequency_slope = 0.1\n"), False),
     ],
 )
-def test_lanes_take_few_modes_between_rigid_stops_that_can_run_beside_each_other(
+def test_lanes_take_few_modes_between_rigid_stops_or_one_on_stops_that_yield(
     text: str, *, expected: bool
 ) -> None:
     assert goes_by_lanes(parse_scene(text, "scene.toml")) is expected
