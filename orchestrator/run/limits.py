@@ -114,7 +114,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
 
 
 def _yields_in_lanes(scene: Scene) -> bool:
-    """Return whether lanes can follow stops that yield: Kelvin-Voigt stops of one mode, whose surfaces relax at once."""
+    """Return whether lanes can follow stops that yield: Kelvin-Voigt stops of one mode; surfaces relax at once."""
     stops = scene.stops
     relaxes = any(axis.key.endswith(".relaxation_time") for axis in scene.sweep) or any(
         getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in stops

@@ -105,7 +105,9 @@ def run(
     }
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
     yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
-    plan = LanesPlan(modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields)
+    plan = LanesPlan(
+        modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields
+    )
     most = _most_periods(points) if each_period else 1
     table = np.full((PERIOD_WIDTH, count, most), np.nan)
     state = LanesPoints(
@@ -209,10 +211,12 @@ def drawn(
     }
 
 
-def drawn_yielding(count: int, contacts: int, seed: int, *, rigid: bool = False, recorded: int = 4) -> Columns:
-    """Draw points of one mode with Kelvin-Voigt stops, softer than the body to 1e8 as stiff, damped up to twice critical.
+def drawn_yielding(
+    count: int, contacts: int, seed: int, *, rigid: bool = False, recorded: int = 4
+) -> Columns:
+    """Draw points of one mode with Kelvin-Voigt stops.
 
-    A fifth of the stops have no damping. With `rigid`, the second stop stays rigid.
+    Stiffnesses are 0.3 to 1e8 times the body's, dampings up to twice critical. A fifth of the stops have no damping. With `rigid`, the second stop stays rigid.
     """
     random = np.random.default_rng(seed)
     points = drawn(count, 1, contacts, seed, recorded=recorded)

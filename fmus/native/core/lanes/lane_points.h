@@ -7,7 +7,9 @@
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 2 }; /* most modes and contacts of a body */
 
 /* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
- * duration (s), largest force (N; NaN at a rigid stop). A contact that is open at the end of its run has NaN for its
+ * duration (s), largest force (N).
+ *
+ * The largest force is NaN at a rigid stop. A contact that is open at the end of its run has NaN for its
  * impulse, restitution, duration and largest force. */
 enum { VI_IMPACT_WIDTH = 8 };
 /* Columns of a period, over its points: largest and smallest displacement (m), displacement (m) and velocity (m/s) at

@@ -9,8 +9,8 @@
 
 /* Rounds of attending the lanes between two readings of the clock. */
 enum { ROUNDS_BETWEEN_READINGS = 64 };
-/* Most rows written between two checks of their room: by the rounds, when all lanes are attended once, and for contacts
- * that are open at the end of their run. */
+/* Most rows written between two checks of their room: by the rounds, and when all lanes are attended once. A run that
+ * ends may write its open contact too. */
 enum { MOST_ROWS = (VI_MOST_ROUNDS + 2) * VI_LANES };
 
 /* State that is kept between two calls. */
