@@ -216,7 +216,8 @@ def drawn_yielding(
 ) -> Columns:
     """Draw points of one mode with Kelvin-Voigt stops.
 
-    Stiffnesses are 0.3 to 1e8 times the body's, dampings up to twice critical. A fifth of the stops have no damping. With `rigid`, the second stop stays rigid.
+    Stiffnesses are 0.3 to 1e8 times the body's, dampings up to twice critical. A fifth of the stops have no damping.
+    With `rigid`, the second stop stays rigid.
     """
     random = np.random.default_rng(seed)
     points = drawn(count, 1, contacts, seed, recorded=recorded)
