@@ -63,6 +63,7 @@ class LanesPlan(Structure):
         ),
         ("impact_limit", c_int64),
         ("yielding", c_int64),
+        ("rate", c_double),
     ]
 
 
@@ -82,6 +83,9 @@ class LanesPoints(Structure):
         ("count", c_int64),
         *((name, c_void_p) for name in (*GIVEN, *RESULTS)),
         ("most_periods", c_int64),
+        ("samples", c_void_p),
+        ("samples_of", c_void_p),
+        ("most_samples", c_int64),
         *((name, c_void_p) for name in OF_ROWS),
         *((name, c_int64) for name in ("rows_room", "rows_used", "begun_below", "finished")),
         ("most_seconds", c_double),

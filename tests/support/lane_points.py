@@ -73,6 +73,7 @@ def run(
     periods: bool = True,
     each_period: bool = True,
     impact_limit: int = 0,
+    rate: float = 0.0,
     instructions: Instructions = Instructions.best,
     room: int = 4096,
     most_seconds: float = 1e9,
@@ -83,7 +84,7 @@ def run(
     ----------
     points : dict of str to ndarray
         Arrays of `LanesPoints.GIVEN`, the last axis over the points.
-    impacts, extrema, periods, each_period, impact_limit, instructions
+    impacts, extrema, periods, each_period, impact_limit, rate, instructions
         Fields of the plan.
     room : int
         Number of rows that fit into one call.
@@ -106,13 +107,18 @@ def run(
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
     yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
     plan = LanesPlan(
-        modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields
+        modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields, rate
     )
     most = _most_periods(points) if each_period else 1
     table = np.full((PERIOD_WIDTH, count, most), np.nan)
     state = LanesPoints(
         count=count, begun_below=count, most_periods=most, rows_room=room, most_seconds=most_seconds
     )
+    if rate:
+        longest = np.nanmax(points["end"] - points["begin"], initial=0.0)
+        results["samples_of"] = np.zeros(count, np.int64)
+        results["samples"] = np.full((2, count, math.floor(longest * rate) + 2), np.nan)
+        state.most_samples = results["samples"].shape[2]
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
     for name, array in (given | results | block | {"periods": table}).items():
         setattr(state, name, address(array))

@@ -103,6 +103,14 @@ typedef struct {
     vi_lane_array doubtful;                   /* 1: `most` and `least` lack the last round, see `extremes` of the body */
 } vi_lane_record;
 
+/* The time series of the lanes, for bodies of one mode. */
+typedef struct {
+    vi_lane_array next, count;                /* number of the next sample, from 0; of all samples of the point */
+    vi_lane_array periods, rest, rest_low;    /* instant of the next sample */
+    /* state and instant from which the next samples are taken: the start of the last round */
+    vi_lane_array from_q, from_p, from_cosine, from_sine, from_periods, from_rest, from_rest_low, from_pressed;
+} vi_lane_samples;
+
 typedef struct {
     /* the body */
     vi_lane_array cell, cell_rate;            /* shortest cell, s; its reciprocal, 1/s */
@@ -123,6 +131,7 @@ typedef struct {
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_lane_record record;
+    vi_lane_samples samples;
     vi_one_mode one;
     vi_yielding yielding;
     vi_many_modes many;

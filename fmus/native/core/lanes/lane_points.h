@@ -37,6 +37,7 @@ typedef struct {
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */
     int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
+    double rate;          /* samples per s of the time series, of one mode; 0: none */
 } vi_lanes_plan;
 
 /* The points. Arrays are [point], [mode][point], [contact][point] or [contact][mode][point], in SI units.
@@ -69,6 +70,11 @@ typedef struct {
     double *periods;             /* [VI_PERIOD_WIDTH][point][most_periods] */
     int64_t *periods_of;         /* number of ended periods of each point; 0 again once it is left */
     int64_t most_periods;
+    /* Samples of each point from `begin` on, as far as it has run: q and q' of its mode. A point with more than
+     * most_samples is left. */
+    double *samples;             /* [2][point][most_samples] */
+    int64_t *samples_of;         /* number of samples of each point; 0 again once it is left */
+    int64_t most_samples;
     int64_t *rows_of;            /* number of impacts of each point; 0 again once it is left */
     /* Impacts of one point are in the order of time, mixed with impacts of others. */
     double *rows;                /* [rows_room][VI_IMPACT_WIDTH] */

@@ -7,6 +7,7 @@
 #include "contact/contact_law.h"
 #include "door/runs.h"
 #include "lanes/lane_record.h"
+#include "lanes/sampling.h"
 #include "lanes/yielding.h"
 #include "motion/majorant.h"
 
@@ -51,6 +52,9 @@ static void leave(vi_lanes_work *w, int lane)
     const int64_t point = w->run[lane].point;
     w->points->state[point] = VI_POINT_IS_LEFT;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
+    if (w->plan->rate > 0.0) {
+        w->points->samples_of[point] = 0;
+    }
     w->points->finished += 1;
     w->run[lane].point = -1;
 }
@@ -115,6 +119,10 @@ static void arrive(vi_lanes_work *w, int lane)
         vi_lane_begin_period(g, lane, displacement, velocity);
         if (w->plan->periods && g->rest[lane] == 0.0) {
             turn_period(w, lane, displacement, velocity);
+        }
+        if (w->plan->rate > 0.0 && !vi_lane_begin_samples(g, w->plan, w->points, lane)) {
+            leave(w, lane);
+            return;
         }
     }
     if (vi_clock_elapsed(&run->clock, instant_of(g, lane), run->end) > 0.0) {
@@ -193,7 +201,13 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
         w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
     }
     if (event == VI_EVENT_CELL) {
+        if (w->plan->rate > 0.0) {
+            vi_lane_sample_from(g, lane);
+        }
         event = search(w, lane);
+        if (event != VI_EVENT_LEAVE && w->plan->rate > 0.0) {
+            vi_lane_take_samples(g, w->plan, w->points, lane);
+        }
         if (event != VI_EVENT_LEAVE && g->record.extremes[lane] > 0.0) {
             w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
         }
@@ -307,8 +321,12 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     vi_lane_run *run = &w->run[lane];
     double q[VI_LANES_MODES], p[VI_LANES_MODES];
     run->point = point;
+    w->group->samples.next[lane] = w->group->samples.count[lane] = 0.0;
     run->recording = run->goal_is_period = run->period_open = false;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
+    if (w->plan->rate > 0.0) {
+        w->points->samples_of[point] = 0;
+    }
     g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
     g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;
     g->record.last_turn[lane] = -1.0;

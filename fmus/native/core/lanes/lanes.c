@@ -1,5 +1,6 @@
 #include "lanes/lanes.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "door/seconds.h"
@@ -32,6 +33,7 @@ static bool is_plan(const vi_lanes_plan *plan)
 {
     return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= VI_LANES_CONTACTS
            && plan->yielding >= 0 && plan->yielding < (plan->modes == 1 ? 1 << plan->contacts : 1)
+           && (plan->rate == 0.0 || (plan->modes == 1 && plan->rate > 0.0 && isfinite(plan->rate)))
            && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 

@@ -1,5 +1,6 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
 #include "lanes/recording.h"
+#include "lanes/rounds_samples.h"
 
 /* Most times that a lane goes through all its cells in one round. */
 enum { MOST_JUMPS = 3 };
@@ -367,6 +368,9 @@ LANES_INLINE mask turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_l
 LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts)
 {
     setting s = begin_round(g, at);
+    if (plan->rate > 0.0) {
+        sample_from(g, at, s.q, s.p, s.cosine, s.sine);
+    }
     const candidate cell = choose_cell(g, at, contacts, &s);
     arrival a = search(g, at, &s, &cell);
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
@@ -383,6 +387,9 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     store(g->p[0] + at, choose(moves, a.p, cell.p));
     store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
+    if (plan->rate > 0.0) {
+        take_samples(g, plan, points, at);
+    }
     store(g->record.doubtful + at, load(g->record.extremes + at));
     const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {

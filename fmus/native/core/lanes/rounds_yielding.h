@@ -4,6 +4,7 @@
  * which are blended lane by lane. While a stop is pressed, q and p are the depth and its rate: no rounding of the stop's
  * position enters the contact.
  */
+#include "lanes/rounds_samples.h"
 #include "lanes/touch_down.h"
 #include "lanes/yielding.h"
 
@@ -420,6 +421,9 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
                                   int contacts)
 {
     phase_setting s = begin_phase_round(g, at, contacts);
+    if (plan->rate > 0.0) {
+        sample_from(g, at, s.q, s.p, s.cosine, s.sine);
+    }
     const phase_cell cell = choose_phase_cell(g, at, contacts, &s);
     phase_arrival a = search_phase(g, at, contacts, &s, &cell);
     const mask moves = ~a.careful, arrives = cell.goal & ~a.hits & moves;
@@ -438,6 +442,9 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
     store(g->q[0] + at, a.q);
     store(g->p[0] + at, a.p);
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
+    if (plan->rate > 0.0) {
+        take_samples(g, plan, points, at);
+    }
     set_cells(g, at, contacts);
     store(g->record.doubtful + at, load(g->record.extremes + at));
     record_contacts(g, points, at, contacts, a.hits & ~pressed & ~touches & kept, touches & kept, a.hits & pressed & kept);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "lanes/lane_state.h"
 #include "lanes/lane_tables.h"
 #include "lanes/lane_turn.h"
 #include "motion/majorant.h"
@@ -27,36 +28,9 @@ static const vi_one_mode *tables_of(const vi_lane_group *g, int pressed)
     return pressed > 0 ? &g->yielding.pressed[pressed - 1] : &g->one;
 }
 
-/* State of a lane at the start of a cell. */
-typedef struct {
-    double q, p, cosine, sine;
-} lane_state;
-
-static double row_at(const vi_lane_array row[VI_PARTS], int lane, const lane_state *s)
+static vi_lane_state start_of_round(const vi_lane_group *g, int lane)
 {
-    return (row[VI_OF_Q][lane] * s->q + row[VI_OF_P][lane] * s->p)
-           + ((row[VI_OF_COSINE][lane] * s->cosine + row[VI_OF_SINE][lane] * s->sine) + row[VI_OF_ONE][lane]);
-}
-
-static lane_state after_cells(const vi_one_mode *tables, int lane, const lane_state *s, int cells)
-{
-    const double turn = tables->turn_cosine[cells][lane], turn_sine = tables->turn_sine[cells][lane];
-    return (lane_state){row_at(tables->end_q[cells], lane, s), row_at(tables->end_p[cells], lane, s),
-                        s->cosine * turn - s->sine * turn_sine, s->sine * turn + s->cosine * turn_sine};
-}
-
-static vi_lane_cell cell_from(const vi_one_mode *tables, int lane, const lane_state *s, double length)
-{
-    vi_lane_cell cell = {{s->q, s->p * length}};
-    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
-        cell.term[n] = row_at(tables->taylor[n], lane, s);
-    }
-    return cell;
-}
-
-static lane_state start_of_round(const vi_lane_group *g, int lane)
-{
-    return (lane_state){g->start_q[0][lane], g->start_p[0][lane], g->start_cosine[lane], g->start_sine[lane]};
+    return (vi_lane_state){g->start_q[0][lane], g->start_p[0][lane], g->start_cosine[lane], g->start_sine[lane]};
 }
 
 /* Modal displacement and velocity of a lane. */
@@ -174,7 +148,7 @@ static vi_cell_result act(vi_lane_group *g, int lane, int c, vi_lane_meeting *me
 static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts, double *share, vi_lane_meeting *met)
 {
     (void)modes;
-    lane_state s = {g->q[0][lane], g->p[0][lane], 0.0, 0.0};
+    vi_lane_state s = {g->q[0][lane], g->p[0][lane], 0.0, 0.0};
     vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &s.cosine, &s.sine);
     g->start_q[0][lane] = s.q;
     g->start_p[0][lane] = s.p;
@@ -183,7 +157,7 @@ static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts
     g->passed[lane] = 0.0;
     g->yielding.start_pressed[lane] = g->yielding.pressed_stop[lane];
     const vi_one_mode *tables = tables_of(g, (int)g->yielding.pressed_stop[lane]);
-    const vi_lane_cell cell = cell_from(tables, lane, &s, g->cell[lane]);
+    const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &s, g->cell[lane]);
     double slope;
     int hit = -1;
     for (int c = 0; c < contacts; ++c) {
@@ -217,7 +191,7 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
 /* ---- extremes ---- */
 
 /* Largest deviation of q from a line over a cell ahead, as in the rounds. */
-static double bulge_of(const vi_one_mode *tables, int lane, const lane_state *s, double cell)
+static double bulge_of(const vi_one_mode *tables, int lane, const vi_lane_state *s, double cell)
 {
     const double k = tables->stiffness[lane], load = tables->load[lane];
     const double norm = sqrt(s->p * s->p + k * (s->q * s->q)) + load * tables->span[lane];
@@ -227,16 +201,16 @@ static double bulge_of(const vi_one_mode *tables, int lane, const lane_state *s,
 /* The largest sign * q of a phase over the last round, and so far (`most`). */
 static double extend(const vi_one_mode *tables, const vi_lane_group *g, int lane, double sign, double length, double most)
 {
-    const lane_state start = start_of_round(g, lane);
+    const vi_lane_state start = start_of_round(g, lane);
     const int passed = (int)g->passed[lane];
     const double bulge = bulge_of(tables, lane, &start, length), share = g->share[lane];
-    lane_state now = start;
+    vi_lane_state now = start;
     for (int i = 0; i <= passed; ++i) {
         const double end = i < passed ? 1.0 : share;
-        const lane_state next = i < VI_CELLS ? after_cells(tables, lane, &start, i + 1) : now;
+        const vi_lane_state next = i < VI_CELLS ? vi_lane_after_cells(tables, lane, &start, i + 1) : now;
         most = vi_max(most, sign * now.q);
         if (end > 0.0 && vi_max(sign * now.q, sign * next.q) + bulge > most) {
-            const vi_lane_cell cell = cell_from(tables, lane, &now, length);
+            const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &now, length);
             double q, slope;
             vi_lane_cell_at(&cell, end, &q, &slope);
             most = vi_max(most, vi_max(sign * q, vi_lane_cell_crest(&cell, sign, end)));
@@ -317,10 +291,10 @@ static double peak(const vi_lane_group *g, int lane, int c, double duration)
     const vi_yielding *yielding = &g->yielding;
     const vi_one_mode *tables = &yielding->pressed[c];
     const double length = yielding->cell[c + 1][lane], lag = yielding->lag[c][lane] * yielding->cell_rate[c + 1][lane];
-    lane_state now = {0.0, yielding->touch_approach[lane], yielding->touch_cosine[lane], yielding->touch_sine[lane]};
+    vi_lane_state now = {0.0, yielding->touch_approach[lane], yielding->touch_cosine[lane], yielding->touch_sine[lane]};
     double left = duration * yielding->cell_rate[c + 1][lane], most = 0.0;
     for (; left > 0.0; left -= 1.0) {
-        const vi_lane_cell cell = cell_from(tables, lane, &now, length);
+        const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &now, length);
         const double end = vi_min(left, 1.0);
         vi_lane_cell press;
         double value, slope;
@@ -330,7 +304,7 @@ static double peak(const vi_lane_group *g, int lane, int c, double duration)
         press.term[VI_LANE_ORDER] = cell.term[VI_LANE_ORDER];
         vi_lane_cell_at(&press, end, &value, &slope);
         most = vi_max(vi_max(most, press.term[0]), vi_max(value, vi_lane_cell_crest(&press, 1.0, end)));
-        now = after_cells(tables, lane, &now, 1);
+        now = vi_lane_after_cells(tables, lane, &now, 1);
     }
     return most;
 }
