@@ -106,7 +106,7 @@ typedef struct {
 /* The time series of the lanes, for bodies of one mode. */
 typedef struct {
     vi_lane_array next, count;                /* number of the next sample, from 0; of all samples of the point */
-    vi_lane_array periods, rest, rest_low;    /* instant of the next sample */
+    vi_lane_array time;                       /* of the next sample, s */
     /* state and instant from which the next samples are taken: the start of the last round */
     vi_lane_array from_q, from_p, from_cosine, from_sine, from_periods, from_rest, from_rest_low, from_pressed;
 } vi_lane_samples;

@@ -2,8 +2,8 @@
 #ifndef VIBROIMPACT_LANE_ROUNDS_SAMPLES_H
 #define VIBROIMPACT_LANE_ROUNDS_SAMPLES_H
 
+#include "lanes/recording.h"
 #include "lanes/sampling.h"
-#include "lanes/vector.h"
 
 /* Keep the states at the start of a round: its samples are taken from there on. */
 LANES_INLINE void sample_from(vi_lane_group *g, int at, vector q, vector p, vector cosine, vector sine)
@@ -22,7 +22,9 @@ LANES_INLINE void sample_from(vi_lane_group *g, int at, vector q, vector p, vect
 /* Take the samples of a round, after the clocks have moved. */
 LANES_INLINE void take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
 {
-    const mask samples = load(g->samples.next + at) < load(g->samples.count + at);
+    /* a sample at the end of the round may be after it by rounding */
+    const vector now = time_of(g, at) * (1.0 + 16.0 * 2.220446049250313e-16);
+    const mask samples = (load(g->samples.next + at) < load(g->samples.count + at)) & (load(g->samples.time + at) <= now);
     for (int i = 0; i < VI_WIDTH; ++i) {
         if (samples[i]) {
             vi_lane_take_samples(g, plan, points, at + i);

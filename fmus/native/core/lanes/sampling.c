@@ -1,5 +1,6 @@
 #include "lanes/sampling.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "lanes/lane_state.h"
@@ -9,6 +10,8 @@
 
 /* Relative excess over the last sample that counts as rounding of the recording's length. */
 static const double LAST = 1e-12;
+/* Rounding of a time, relative to its size: a sample so close after an event is taken before it. */
+static const double ROUNDING_OF_TIME = 4.0 * DBL_EPSILON;
 
 static vi_clock clock_of(const vi_lane_group *g, int lane)
 {
@@ -16,32 +19,26 @@ static vi_clock clock_of(const vi_lane_group *g, int lane)
                       g->record.origin_low[lane]};
 }
 
-/* Set the instant of the next sample. */
-static void set_next(vi_lane_group *g, const vi_lanes_plan *plan, const vi_lanes_points *points, int lane)
+/* Set the time of the next sample. */
+static void set_next(vi_lane_group *g, const vi_lanes_plan *plan, const vi_lanes_points *points, int lane, double number)
 {
-    vi_lane_samples *samples = &g->samples;
     const int64_t point = (int64_t)g->record.point[lane];
-    const vi_clock clock = clock_of(g, lane);
-    const double time = vi_min(points->begin[point] + samples->next[lane] / plan->rate, points->end[point]);
-    vi_instant at = {0, 0.0, 0.0};
-    if (!vi_clock_instant(&clock, time, 0.0, &at)) {
-        samples->count[lane] = 0.0;
-    }
-    samples->periods[lane] = (double)at.periods;
-    samples->rest[lane] = at.rest;
-    samples->rest_low[lane] = at.rest_low;
+    g->samples.next[lane] = number;
+    g->samples.time[lane] = vi_min(points->begin[point] + number / plan->rate, points->end[point]);
 }
 
 bool vi_lane_begin_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
 {
     const int64_t point = (int64_t)g->record.point[lane];
     const double count = floor((points->end[point] - points->begin[point]) * plan->rate * (1.0 + LAST)) + 1.0;
-    g->samples.next[lane] = 0.0;
+    if (!(count <= (double)points->most_samples)) {
+        return false;
+    }
     g->samples.count[lane] = count;
-    set_next(g, plan, points, lane);
+    set_next(g, plan, points, lane, 0.0);
     vi_lane_sample_from(g, lane);
     vi_lane_take_samples(g, plan, points, lane);
-    return count <= (double)points->most_samples;
+    return true;
 }
 
 void vi_lane_sample_from(vi_lane_group *g, int lane)
@@ -91,46 +88,45 @@ static void write_sample(vi_lane_group *g, vi_lanes_points *points, int lane, co
                          double rate)
 {
     const int64_t point = (int64_t)g->record.point[lane], n = (int64_t)g->samples.next[lane];
-    const int64_t place = point * points->most_samples + n, column = points->count * points->most_samples;
-    if (n < points->most_samples) {
-        points->samples[place] = vi_max(phase->least, vi_min(phase->most, phase->sign * (phase->level + state)));
-        points->samples[column + place] = phase->sign * rate;
-        points->samples_of[point] = n + 1;
-    }
+    double *sample = points->samples + point * points->most_samples + n;
+    sample[0] = vi_max(phase->least, vi_min(phase->most, phase->sign * (phase->level + state)));
+    sample[points->count * points->most_samples] = phase->sign * rate;
+    points->samples_of[point] = n + 1;
 }
 
 void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
 {
     vi_lane_samples *samples = &g->samples;
     const vi_clock clock = clock_of(g, lane);
-    const vi_instant now = {(int64_t)g->periods[lane], g->rest[lane], g->rest_low[lane]};
+    const vi_instant zero = {0, clock.origin, clock.origin_low};
     const vi_instant from = {(int64_t)samples->from_periods[lane], samples->from_rest[lane], samples->from_rest_low[lane]};
-    const double length = vi_clock_elapsed(&clock, from, now);
+    const vi_instant now = {(int64_t)g->periods[lane], g->rest[lane], g->rest_low[lane]};
+    double low;
+    const double high = vi_clock_elapsed_twofold(&clock, zero, from, &low), length = vi_clock_elapsed(&clock, from, now);
+    const double slack = ROUNDING_OF_TIME * (fabs(high) + length);
     const sampled_phase phase = phase_of_lane(g, plan, lane);
     vi_lane_state state = {samples->from_q[lane], samples->from_p[lane], samples->from_cosine[lane],
                            samples->from_sine[lane]};
-    vi_lane_state start = state;
     vi_lane_cell cell = {{0.0}};
-    double passed = 0.0, expanded = -1.0; /* cells before `state`; the cell that is expanded */
+    double value, slope;
+    int64_t passed = 0, expanded = -1; /* cells before `state`; the cell that is expanded */
     while (samples->next[lane] < samples->count[lane]) {
-        const vi_instant at = {(int64_t)samples->periods[lane], samples->rest[lane], samples->rest_low[lane]};
-        const double offset = vi_clock_elapsed(&clock, from, at);
-        if (!(offset <= length)) {
+        const double offset = (samples->time[lane] - high) - low;
+        if (!(offset <= length + slack)) {
             return;
         }
-        const double cells = vi_max(0.0, offset * phase.rate), whole = floor(cells);
+        const double cells = vi_max(0.0, vi_min(offset, length)) * phase.rate;
+        const int64_t whole = (int64_t)cells;
         for (; passed + VI_CELLS <= whole; passed += VI_CELLS) {
             state = vi_lane_after_cells(phase.tables, lane, &state, VI_CELLS);
         }
         if (whole != expanded) {
-            start = vi_lane_after_cells(phase.tables, lane, &state, (int)(whole - passed));
+            const vi_lane_state start = vi_lane_after_cells(phase.tables, lane, &state, (int)(whole - passed));
             cell = vi_lane_cell_from(phase.tables, lane, &start, phase.cell);
             expanded = whole;
         }
-        double value, slope;
-        vi_lane_cell_at(&cell, (offset - whole * phase.cell) * phase.rate, &value, &slope);
+        vi_lane_cell_at(&cell, cells - (double)whole, &value, &slope);
         write_sample(g, points, lane, &phase, value, slope * phase.rate);
-        samples->next[lane] += 1.0;
-        set_next(g, plan, points, lane);
+        set_next(g, plan, points, lane, samples->next[lane] + 1.0);
     }
 }
