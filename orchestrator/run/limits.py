@@ -16,6 +16,7 @@ from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.called_effects import called_by_numbers
 from vibroimpact.orchestrator.run.parameters import body_points
+from vibroimpact.orchestrator.run.record import OBSERVED
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -104,13 +105,35 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
     return {
         "measuring chain": scene.is_measured or scene.exciter is not None,
         "laws": any(stop.law != "restitution" for stop in scene.stops) and not _yields_in_lanes(scene),
-        "time series": scene.record.time_series is not None,
+        "time series": scene.record.time_series is not None and not _samples_in_lanes(scene),
         "many contacts": len(scene.stops) > core.MOST_CONTACTS,
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),
         "residual vectors": body.has_residual_vectors,
         AMPLITUDE: AMPLITUDE in called_by_numbers(scene),
     }
+
+
+def _samples_in_lanes(scene: Scene) -> bool:
+    """Return whether lanes can sample the time series: the motion of one mode, at the observed point and the stops."""
+    rigid = all(stop.law == "restitution" for stop in scene.stops)
+    return scene.body.kept_modes == 1 and all(
+        name in OBSERVED
+        or name.startswith(("contact_displacement[", "contact_velocity["))
+        or (rigid and name.startswith("contact_force"))
+        for name in scene.sampled
+    )
+
+
+def contact_of(name: str) -> int | None:
+    """Return the contact (1-based) of a sampled variable; None for a variable of the observed point.
+
+    Examples
+    --------
+    >>> contact_of("contact_velocity[2]"), contact_of("velocity")
+    (2, None)
+    """
+    return int(name.partition("[")[2][:-1]) if "[" in name else None
 
 
 def _yields_in_lanes(scene: Scene) -> bool:

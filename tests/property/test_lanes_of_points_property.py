@@ -64,6 +64,14 @@ def assert_agree(lanes: xr.Dataset, fused: xr.Dataset) -> None:
             assert one.shape == other.shape
             assert one == pytest.approx(other, rel=AGREEMENT, abs=AGREEMENT)
     short = few_impacts(fused)
+    if "samples" in lanes:
+        assert lanes.samples.values.tolist() == fused.samples.values.tolist()
+        assert np.array_equal(lanes.time.values, fused.time.values)
+        sampled = short[np.repeat(np.arange(lanes.sizes["run"]), fused.samples.values)]
+        for name in ("displacement", "velocity", "contact_velocity_1"):
+            assert lanes[name].values[sampled] == pytest.approx(
+                fused[name].values[sampled], rel=AGREEMENT, abs=AGREEMENT
+            )
     for name in ("final_displacement", "final_velocity", "displacement_max", "strobe_velocity"):
         if name in lanes:
             values, expected = (rows[name].values[short] for rows in (lanes, fused))
@@ -107,6 +115,22 @@ def test_points_on_kelvin_voigt_stops_in_lanes_are_those_of_the_scalar_engine_ho
         assert runner.execution == "lanes"
     whole = rows_of(scene)
     assert_agree(whole, rows_of(with_execution(across, "fused")))
+    cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
+    assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
+
+
+SERIES = 'time_series = { rate = 7.3, variables = ["displacement", "velocity", "contact_velocity[1]"] }'
+
+
+@settings(max_examples=20, deadline=None)
+@given(text=oscillators("auto", (*RIGID, *YIELDING)), data=st.data())
+def test_time_series_in_lanes_are_those_of_the_scalar_engine(text: str, data: Any) -> None:
+    sampled = text.replace("[record]", "[record]\n" + SERIES)
+    scene = with_execution(sampled + '"body.displacement_start" = { values = [0.0, 0.5] }\n', "auto")
+    with open_scene(scene) as runner:
+        assert runner.execution == "lanes"
+    whole = rows_of(scene)
+    assert_agree(whole, rows_of(with_execution(scene.text, "fused")))
     cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
     assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
 

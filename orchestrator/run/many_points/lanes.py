@@ -69,5 +69,6 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         instructions=core.instructions(),
         impact_limit=scene.execution.impact_limit,
         yielding=sum(2**number for number, stop in enumerate(stops) if not LAWS[stop.law].is_rigid),
+        rate=scene.sampling_rate,
     )
     return LanePoints(plan, modal, {name: np.ascontiguousarray(values) for name, values in given.items()})

@@ -22,6 +22,8 @@ def scene(body: str = OSCILLATOR, *, stop: str = STOP, record: str = RECORD, res
     return body + FORCING.format(amplitude=amplitude) + stop + record + rest
 
 
+SERIES = "time_series = { rate = 10 }\n"
+OF_FORCE = 'time_series = { rate = 10, variables = ["contact_force", "contact_velocity[1]"] }\n'
 VOIGT = '[[stop]]\nposition = 1.0\nlaw = "kelvin_voigt"\nstiffness = 10.0\n'
 TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
 
@@ -51,7 +53,13 @@ TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
         (scene(stop=VOIGT, rest=SWEEP + '"stop[1].relaxation_time" = { values = [0.0, 0.1] }\n'), False),
         (scene(rest='[execution]\nhow = "fused"\n' + SWEEP), False),
         (scene(rest="[execution]\ndeadline = 1.0\n" + SWEEP), False),
-        (scene(record=RECORD + "time_series = { rate = 10 }\n"), False),
+        (scene(record=RECORD + SERIES), True),
+        (scene(BEAM.format(modes=1), record=RECORD + SERIES), True),
+        (scene(BEAM.format(modes=2), record=RECORD + SERIES), False),
+        (scene(stop=VOIGT, record=RECORD + SERIES), True),
+        (scene(record=RECORD + OF_FORCE), True),
+        (scene(stop=VOIGT, record=RECORD + OF_FORCE), False),
+        (scene(record=RECORD + 'time_series = { rate = 10, variables = ["acceleration"] }\n'), False),
         (scene(OSCILLATOR + "frequency_slope = 0.1\n"), False),
     ],
 )
