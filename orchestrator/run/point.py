@@ -54,7 +54,7 @@ from vibroimpact.orchestrator.scene import Scene
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-ENGINE = 6
+ENGINE = 7
 """Version of the C engine that follows the package's bodies; other versions give other results in a campaign."""
 
 SAMPLES_OF_A_BLOCK = 16_384

@@ -12,7 +12,7 @@ from pathlib import Path
 from vibroimpact.fmus.packaging.build import NATIVE
 
 ROOMS = ("core/body", "core/contact", "core/lanes", "core/modes", "core/motion", "bodies")
-HEADERS = ("recording.h", "rounds.h", "rounds_many.h")
+HEADERS = ("cells.h", "extremes.h", "recording.h", "rounds.h", "rounds_many.h")
 """Headers that contain computations."""
 OF_INPUT = re.compile(r"vi_check|vi_complain|complaint|message|isfinite|isnan")
 """Lines that check arguments, or write messages about them."""

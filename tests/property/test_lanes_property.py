@@ -27,6 +27,8 @@ from vibroimpact.fmus.errors import UsageError
 SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1)]
 #: Largest difference of a point: a rounding after some dozen impacts, each of which may multiply it.
 FLIGHTS = 1e-9
+#: Largest difference after ten impacts of chaos, each of which multiplies a rounding by ten or so at most.
+CHAOS = 1e-10
 #: Most events of one point: elastic bodies between two stops would go on for long.
 MOST = 300
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
@@ -144,6 +146,35 @@ def test_a_contact_that_is_open_at_the_end_has_an_impact_without_an_end() -> Non
         assert np.isnan(last[[4, 6, 7]]).all()
 
 
+@pytest.mark.parametrize(("modes", "contacts"), SIZES)
+def test_a_record_changes_no_bit_of_the_motion(modes: int, contacts: int) -> None:
+    points = drawn(40, modes, contacts, seed=30 * modes + contacts)
+    whole = run(points, impact_limit=MOST)
+    ends = ("state", "reached", "final_q", "final_p")
+    for recorded in ({"extrema": False}, {"impacts": False}, {"extrema": False, "impacts": False}):
+        other = run(points, impact_limit=MOST, **recorded)
+        assert all(np.array_equal(other.columns[name], whole.columns[name], equal_nan=True) for name in ends)
+        for one, rows in zip(whole.rows, other.rows, strict=True):
+            strobes, impacts = (rows[rows[:, 0] == kind] for kind in (PERIOD, IMPACT))
+            assert np.array_equal(strobes[:, 4:], one[one[:, 0] == PERIOD][:, 4:])
+            assert len(impacts) == 0 or np.array_equal(impacts, one[one[:, 0] == IMPACT])
+
+
+@pytest.mark.parametrize(("modes", "contacts"), SIZES)
+def test_one_row_for_all_periods_reduces_the_rows_of_each(modes: int, contacts: int) -> None:
+    points = drawn(40, modes, contacts, seed=40 * modes + contacts)
+    each, reduced = run(points, impact_limit=MOST), run(points, impact_limit=MOST, each_period=False)
+    assert np.array_equal(each.columns["periods_of"], reduced.columns["periods_of"])
+    for rows, one in zip(each.rows, reduced.rows, strict=True):
+        periods, impacts = rows[rows[:, 0] == PERIOD], rows[rows[:, 0] == IMPACT]
+        assert np.array_equal(one[one[:, 0] == IMPACT], impacts)
+        if len(periods):
+            found = one[one[:, 0] == PERIOD][0, 2:7]
+            last = periods[-1, 4:6]
+            expected = [periods[:, 2].max(), periods[:, 3].min(), *last, periods[:, 6].sum() / len(periods)]
+            assert found.tolist() == expected
+
+
 def test_rows_that_find_no_room_are_asked_for() -> None:
     points = drawn(60, 1, 2, seed=5, recorded=60)
     small, large = run(points, impact_limit=MOST), run(points, impact_limit=MOST, room=100_000)
@@ -215,7 +246,7 @@ def test_the_first_ten_impacts_of_chaos_are_those_of_the_oscillator() -> None:
             alone = o.rows()
         impacts = found.rows[place][found.rows[place][:, 0] == IMPACT]
         assert len(impacts) >= 10
-        assert np.abs(impacts[:10, 1:] - alone[:10, 1:]).max() <= 1e-11
+        assert np.abs(impacts[:10, 1:] - alone[:10, 1:]).max() <= CHAOS
 
 
 def test_a_branch_goes_on_from_where_the_point_before_has_ended() -> None:

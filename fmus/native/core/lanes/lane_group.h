@@ -127,7 +127,7 @@ typedef struct {
     vi_lane_array fastest_impact, impacts;
     /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
-    vi_lane_array passed, share;
+    vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps of VI_CELLS */
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_lane_record record;

@@ -57,7 +57,7 @@ static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts
     g->start_q[0][lane] = g->q[0][lane];
     g->start_p[0][lane] = g->p[0][lane];
     vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &g->start_cosine[lane], &g->start_sine[lane]);
-    g->passed[lane] = 0.0;
+    g->jumped[lane] = g->passed[lane] = 0.0;
     const vi_lane_cell cell = cell_after(g, lane, 0);
     vi_cell_result result = VI_CELL_CLEAR;
     double slope;
@@ -126,11 +126,11 @@ static double stop_on(const vi_lane_group *g, int lane, int contacts, double sig
     return farthest;
 }
 
-/* The largest sign * q over the round whose cells end at edge[], and so far (`most`). */
-static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[],
-                     const bulges *bulge, double most)
+/* The largest sign * q over cells that end at edge[], and so far (`most`). */
+static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[], int passed,
+                     double share, const bulges *bulge, double most)
 {
-    const int passed = (int)g->passed[lane], last = g->share[lane] > 0.0 ? passed + 1 : passed;
+    const int last = share > 0.0 ? passed + 1 : passed;
     const double stop = stop_on(g, lane, contacts, sign);
     for (int i = 0; i <= last; ++i) {
         most = vi_max(most, vi_min(stop, sign * edge[i]));
@@ -139,27 +139,48 @@ static double extend(const vi_lane_group *g, int lane, int contacts, double sign
         if (vi_max(sign * edge[i], sign * edge[i + 1]) + bulge->q > most
             && !(i < passed && is_monotone(g, lane, i, bulge->p))) {
             const vi_lane_cell cell = cell_after(g, lane, i);
-            const double inside = vi_lane_cell_crest(&cell, sign, i < passed ? 1.0 : g->share[lane]);
+            const double inside = vi_lane_cell_crest(&cell, sign, i < passed ? 1.0 : share);
             most = vi_max(most, vi_min(stop, inside));
         }
     }
     return most;
 }
 
-static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
+/* Extend the extremes over some whole cells after the start, and a share of one more that ends at q. */
+static void extend_both(vi_lane_group *g, int lane, int contacts, int passed, double share, double end)
 {
-    (void)modes;
     vi_lane_record *record = &g->record;
     const bulges bulge = bulges_of(g, lane);
-    const int passed = (int)g->passed[lane];
     double edge[VI_CELLS + 2];
     edge[0] = g->start_q[0][lane];
     for (int i = 1; i <= passed; ++i) {
         edge[i] = after_cells(g->one.end_q[i], g, lane);
     }
-    edge[passed + 1] = g->q[0][lane];
-    record->most[lane] = extend(g, lane, contacts, 1.0, edge, &bulge, record->most[lane]);
-    record->least[lane] = -extend(g, lane, contacts, -1.0, edge, &bulge, -record->least[lane]);
+    edge[passed + 1] = end;
+    record->most[lane] = extend(g, lane, contacts, 1.0, edge, passed, share, &bulge, record->most[lane]);
+    record->least[lane] = -extend(g, lane, contacts, -1.0, edge, passed, share, &bulge, -record->least[lane]);
+}
+
+/* Move the start of the round by VI_CELLS cells. */
+static void jump(vi_lane_group *g, int lane)
+{
+    const double q = after_cells(g->one.end_q[VI_CELLS], g, lane), p = after_cells(g->one.end_p[VI_CELLS], g, lane);
+    const double c = g->one.turn_cosine[VI_CELLS][lane], n = g->one.turn_sine[VI_CELLS][lane];
+    const double cosine = g->start_cosine[lane], sine = g->start_sine[lane];
+    g->start_q[0][lane] = q;
+    g->start_p[0][lane] = p;
+    g->start_cosine[lane] = cosine * c - sine * n;
+    g->start_sine[lane] = sine * c + cosine * n;
+}
+
+static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
+{
+    (void)modes;
+    for (; g->jumped[lane] > 0.0; g->jumped[lane] -= VI_CELLS) {
+        extend_both(g, lane, contacts, VI_CELLS, 0.0, g->start_q[0][lane]);
+        jump(g, lane);
+    }
+    extend_both(g, lane, contacts, (int)g->passed[lane], g->share[lane], g->q[0][lane]);
 }
 
 static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)

@@ -1,20 +1,12 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
-#include "lanes/recording.h"
+#include "lanes/extremes.h"
 #include "lanes/rounds_samples.h"
-
-/* Most times that a lane goes through all its cells in one round. */
-enum { MOST_JUMPS = 3 };
 
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
-/* State of the lanes of a vector at the start of a round. */
-typedef struct {
-    vector q, p, cosine, sine, on;
-    vector to_goal;             /* cells */
-    vector jumped;              /* whole cells already passed in the round */
-    vector second, third, fourth; /* bounds of derivatives of q over VI_CELLS cells, times powers of the cell */
-} setting;
+/* Most times in a row that a lane goes through all its cells in one round, and most strobes that it passes there. */
+enum { MOST_JUMPS = 3, MOST_STROBES = 1 };
 
 /* The cell in which a lane may meet a contact or its goal. */
 typedef struct {
@@ -25,23 +17,8 @@ typedef struct {
     mask twofold;         /* two contacts may be met in it */
     vector sign, limit;   /* of the contact */
     vector number;        /* from 1 */
-    vector q, p, cosine, sine; /* at its start */
+    state start;
 } candidate;
-
-/* Bound the derivatives of q over the next VI_CELLS cells. */
-LANES_INLINE void bound(const vi_lane_group *g, int at, setting *s)
-{
-    /* the energy norm grows at most by the loads; the derivatives follow from the equation */
-    const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
-    const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
-    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * load(g->one.span + at);
-    const vector second = loads + load(g->one.root_rate + at) * norm;
-    const vector third = w * loads + (drag * second + k * norm);
-    const vector fourth = w * (w * loads) + (drag * third + k * second);
-    s->second = second * square;
-    s->third = third * (square * cell);
-    s->fourth = fourth * (square * square);
-}
 
 /* Time to the goal, s. */
 LANES_INLINE vector seconds_to_goal(const vi_lane_group *g, int at)
@@ -52,46 +29,45 @@ LANES_INLINE vector seconds_to_goal(const vi_lane_group *g, int at)
     return high + low;
 }
 
-LANES_INLINE setting begin_round(const vi_lane_group *g, int at)
+LANES_INLINE flight begin_round(const vi_lane_group *g, int at)
 {
-    setting s;
-    s.q = load(g->q[0] + at);
-    s.p = load(g->p[0] + at);
-    s.on = load(g->on + at);
-    turn(load(g->angular_frequency + at) * load(g->rest + at), &s.cosine, &s.sine);
-    s.to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
-    s.jumped = all(0.0);
-    bound(g, at, &s);
-    return s;
+    flight f;
+    f.now.q = load(g->q[0] + at);
+    f.now.p = load(g->p[0] + at);
+    turn(load(g->angular_frequency + at) * load(g->rest + at), &f.now.cosine, &f.now.sine);
+    f.start = f.now;
+    f.on = load(g->on + at);
+    f.to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
+    f.jumped = all(0.0);
+    bound(g, at, &f);
+    return f;
 }
 
-/* Count the cells in which each contact is surely not met. */
-LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setting *s, vector count[])
+/* Count the cells in which each contact is surely not met. q[]: at the ends of the cells. */
+LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const flight *f, vector count[], vector q[])
 {
     vector before[VI_LANES_CONTACTS], sign[VI_LANES_CONTACTS], limit[VI_LANES_CONTACTS];
     mask clear[VI_LANES_CONTACTS];
-    const vector bulge = 0.125 * s->second;
+    const vector bulge = 0.125 * f->second;
+    q[0] = f->now.q;
     for (int c = 0; c < contacts; ++c) {
         sign[c] = load(g->sign[c] + at);
         limit[c] = load(g->limit[c] + at);
-        before[c] = sign[c] * s->q - limit[c];
+        before[c] = sign[c] * q[0] - limit[c];
         count[c] = all(0.0);
         clear[c] = before[c] == before[c];
     }
 #pragma GCC unroll 8
     for (int i = 1; i <= VI_CELLS; ++i) {
-        const vi_lane_array *table = g->one.end_q[i];
-        const vector q = (load(table[VI_OF_Q] + at) * s->q + load(table[VI_OF_P] + at) * s->p)
-                         + ((load(table[VI_OF_COSINE] + at) * s->cosine + load(table[VI_OF_SINE] + at) * s->sine)
-                            + load(table[VI_OF_ONE] + at));
+        q[i] = linear(g->one.end_q[i], at, &f->now);
         for (int c = 0; c < contacts; ++c) {
-            const vector y = sign[c] * q - limit[c];
+            const vector y = sign[c] * q[i] - limit[c];
             mask passes = larger(before[c], y) + bulge < 0.0;
             if (i == 1) {
                 /* just left: the mean velocity since then, which is smooth, stays negative */
-                const vector leaving = sign[c] * (s->p * load(g->cell + at));
-                const mask left = larger(leaving, y) + s->third * (1.0 / 24.0) < 0.0;
-                const mask here = s->on == (double)(c + 1);
+                const vector leaving = sign[c] * (f->now.p * load(g->cell + at));
+                const mask left = larger(leaving, y) + f->third * (1.0 / 24.0) < 0.0;
+                const mask here = f->on == (double)(c + 1);
                 passes = (passes & ~here) | (left & here);
             }
             clear[c] &= passes;
@@ -101,86 +77,107 @@ LANES_INLINE void scan(const vi_lane_group *g, int at, int contacts, const setti
     }
 }
 
-/* Rows of a table, chosen by each lane. */
-LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const int row[])
-{
-    vector found;
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        found[i] = rows[row[i] * stride][at + i];
-    }
-    return found;
-}
-
-LANES_INLINE void go_to_cell(const vi_lane_group *g, int at, const setting *s, candidate *cell)
-{
-    int row[VI_WIDTH];
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)cell->passed[i];
-    }
-    const vi_lane_array *q = g->one.end_q[0], *p = g->one.end_p[0];
-    cell->q = (gather(q + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(q + VI_OF_P, VI_PARTS, at, row) * s->p)
-              + ((gather(q + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
-                  + gather(q + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
-                 + gather(q + VI_OF_ONE, VI_PARTS, at, row));
-    cell->p = (gather(p + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(p + VI_OF_P, VI_PARTS, at, row) * s->p)
-              + ((gather(p + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
-                  + gather(p + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
-                 + gather(p + VI_OF_ONE, VI_PARTS, at, row));
-    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
-    cell->cosine = s->cosine * c - s->sine * n;
-    cell->sine = s->sine * c + s->cosine * n;
-}
-
 /* Whole cells that a lane surely passes: no contact in them, and not beyond the goal. */
-LANES_INLINE vector sure_cells(const setting *s, int contacts, const vector count[], vector *cleared)
+LANES_INLINE vector sure_cells(const flight *f, int contacts, const vector count[], vector *cleared)
 {
     *cleared = all((double)VI_CELLS);
     for (int c = 0; c < contacts; ++c) {
         *cleared = smaller(count[c], *cleared);
     }
-    return smaller(*cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
+    return smaller(*cleared, whole_part(smaller(f->to_goal, all((double)VI_CELLS))));
 }
 
 /* Lanes that pass all their cells go on from there in the same round. */
-LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, setting *s)
+LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, flight *f)
 {
-    const vi_lane_array *q = g->one.end_q[VI_CELLS], *p = g->one.end_p[VI_CELLS];
-    const vector c = load(g->one.turn_cosine[VI_CELLS] + at), n = load(g->one.turn_sine[VI_CELLS] + at);
-    const vector next_q = (load(q[VI_OF_Q] + at) * s->q + load(q[VI_OF_P] + at) * s->p)
-                          + ((load(q[VI_OF_COSINE] + at) * s->cosine + load(q[VI_OF_SINE] + at) * s->sine)
-                             + load(q[VI_OF_ONE] + at));
-    const vector next_p = (load(p[VI_OF_Q] + at) * s->q + load(p[VI_OF_P] + at) * s->p)
-                          + ((load(p[VI_OF_COSINE] + at) * s->cosine + load(p[VI_OF_SINE] + at) * s->sine)
-                             + load(p[VI_OF_ONE] + at));
-    const vector cosine = s->cosine * c - s->sine * n, sine = s->sine * c + s->cosine * n;
-    s->q = choose(jumps, next_q, s->q);
-    s->p = choose(jumps, next_p, s->p);
-    s->cosine = choose(jumps, cosine, s->cosine);
-    s->sine = choose(jumps, sine, s->sine);
-    s->on = only(~jumps, s->on);
-    s->jumped += only(jumps, all((double)VI_CELLS));
-    s->to_goal -= only(jumps, all((double)VI_CELLS));
-    bound(g, at, s);
+    const vector q = linear(g->one.end_q[VI_CELLS], at, &f->now), p = linear(g->one.end_p[VI_CELLS], at, &f->now);
+    const state next = turned(g, at, VI_CELLS, q, p, &f->now);
+    f->now = chosen(jumps, &next, &f->now);
+    f->on = only(~jumps, f->on);
+    f->jumped += only(jumps, all((double)VI_CELLS));
+    f->to_goal -= only(jumps, all((double)VI_CELLS));
 }
 
-LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, setting *s)
+/* Turn the periods of some lanes, whose goal is then the next strobe. Returns their displacements. */
+LANES_INLINE vector turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                 int contacts, mask turns, vector q, vector p)
+{
+    for (int c = 0; c < contacts; ++c) { /* beyond a stop by rounding: put on it */
+        const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
+        q = choose(turns & (sign * q > limit), sign * limit, q);
+    }
+    end_periods(g, plan, points, at, turns);
+    begin_periods(g, at, turns, q, p);
+    store(g->goal_periods + at, load(g->goal_periods + at) + only(turns, all(1.0)));
+    return q;
+}
+
+/* Lanes at a strobe after some whole cells go on from there in the same round. Returns these lanes: all but those with
+ * doubtful extremes. */
+LANES_INLINE mask pass_strobe(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
+                              bool follows, mask turns, const vector cells_q[], vector passed, flight *f,
+                              extremes *e)
+{
+    const state start = after_cells(g, at, &f->now, cells_q, passed);
+    const vector length = larger(f->to_goal - passed, all(0.0));
+    vector term[VI_LANE_ORDER + 1], added, slope;
+    expand(g, at, &start, term);
+    evaluate(term, length, &added, &slope);
+    if (follows) {
+        follow_part(g, at, e, turns & e->follows, f, &start, term, length, start.q + added, slope);
+        finish_crests(g, at, e, turns & e->follows);
+        turns &= ~(e->doubtful[UPPER] | e->doubtful[LOWER]);
+        keep_extremes(g, at, e);
+    }
+    const vector p = slope * load(g->cell_rate + at);
+    store(g->periods + at, choose(turns, load(g->goal_periods + at), load(g->periods + at)));
+    store(g->rest + at, only(~turns, load(g->rest + at)));
+    store(g->rest_low + at, only(~turns, load(g->rest_low + at)));
+    const vector q = turn_periods(g, plan, points, at, contacts, turns, start.q + added, p);
+    const state next = {q, p, all(1.0), all(0.0)};
+    if (follows) {
+        e->most[UPPER] = choose(turns, q, e->most[UPPER]);
+        e->most[LOWER] = choose(turns, -q, e->most[LOWER]);
+    }
+    const vector to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
+    f->now = chosen(turns, &next, &f->now);
+    f->start = chosen(turns, &next, &f->start);
+    f->on = only(~turns, f->on);
+    f->jumped = only(~turns, f->jumped);
+    f->to_goal = choose(turns, to_goal, f->to_goal);
+    return turns;
+}
+
+/* Move on to the cell in which each lane may meet a contact, its goal or the end of its round. */
+LANES_INLINE candidate choose_cell(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
+                                   int contacts, bool follows, flight *f, extremes *e)
 {
     candidate cell;
-    vector count[VI_LANES_CONTACTS], cleared;
-    const mask alone = load(g->record.extremes + at) == 0.0;
-    for (int i = 0;; ++i) {
-        scan(g, at, contacts, s, count);
-        cell.passed = sure_cells(s, contacts, count, &cleared);
-        const mask jumps = alone & (cell.passed == (double)VI_CELLS);
-        if (i == MOST_JUMPS || !any(jumps)) {
+    vector count[VI_LANES_CONTACTS], cleared, q[VI_CELLS + 1];
+    const vector last = load(g->record.last_turn + at);
+    mask fresh = e->follows, on_strobe = load(g->goal_periods + at) < last;
+    for (int i = 0; i <= (MOST_STROBES + 1) * (MOST_JUMPS + 1); ++i) {
+        scan(g, at, contacts, f, count, q);
+        cell.passed = sure_cells(f, contacts, count, &cleared);
+        if (follows) {
+            follow_cells(g, at, e, fresh, f, q, cell.passed);
+        }
+        const mask all_cells = cell.passed == (double)VI_CELLS;
+        const mask jumps = all_cells & (f->jumped < (double)(MOST_JUMPS * VI_CELLS));
+        mask turns = on_strobe & (cleared > cell.passed) & (f->to_goal - cell.passed <= 1.0);
+        if (any(turns)) {
+            turns = pass_strobe(g, plan, points, at, contacts, follows, turns, q, cell.passed, f, e);
+            on_strobe = on_strobe & ~on_strobe; /* once */
+        }
+        if (!any(jumps | turns)) {
             break;
         }
-        jump(g, at, jumps, s);
+        jump(g, at, jumps, f);
+        bound(g, at, f);
+        fresh = e->follows & (jumps | turns);
     }
     const mask jumps = cell.passed == (double)VI_CELLS;
-    const vector length = larger(s->to_goal - cell.passed, all(0.0));
+    const vector length = larger(f->to_goal - cell.passed, all(0.0));
     cell.length = only(~jumps, smaller(length, all(1.0)));
     cell.goal = ~jumps & (length <= 1.0);
     cell.searched = ~jumps & (cleared == cell.passed);
@@ -193,92 +190,43 @@ LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts,
         cell.limit = choose(met, load(g->limit[c] + at), cell.limit);
         cell.number = choose(met, all((double)(c + 1)), cell.number);
     }
-    go_to_cell(g, at, s, &cell);
+    cell.start = after_cells(g, at, &f->now, q, cell.passed);
     return cell;
-}
-
-/* Taylor coefficients of q over the cell, in its share. */
-LANES_INLINE void expand(const vi_lane_group *g, int at, const candidate *cell, vector term[])
-{
-    term[0] = cell->q;
-    term[1] = cell->p * load(g->cell + at);
-#pragma GCC unroll 16
-    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
-        const vi_lane_array *table = g->one.taylor[n];
-        term[n] = (load(table[VI_OF_Q] + at) * cell->q + load(table[VI_OF_P] + at) * cell->p)
-                  + ((load(table[VI_OF_COSINE] + at) * cell->cosine + load(table[VI_OF_SINE] + at) * cell->sine)
-                     + load(table[VI_OF_ONE] + at));
-    }
-}
-
-/* Added value of the polynomial beyond its first term, and its slope, at a share of the cell. Odd and even powers are
- * summed apart, which halves the chain of operations. */
-LANES_INLINE void follow(const vector term[], vector share, vector *added, vector *slope)
-{
-    const vector square = share * share;
-    vector odd = term[VI_LANE_ORDER - 1], odd_slope = (double)(VI_LANE_ORDER - 1) * odd;
-    vector even = term[VI_LANE_ORDER], even_slope = (double)VI_LANE_ORDER * even;
-#pragma GCC unroll 16
-    for (int n = VI_LANE_ORDER - 3; n >= 1; n -= 2) {
-        odd = odd * square + term[n];
-        odd_slope = odd_slope * square + (double)n * term[n];
-        even = even * square + term[n + 1];
-        even_slope = even_slope * square + (double)(n + 1) * term[n + 1];
-    }
-    *added = share * (odd + share * even);
-    *slope = odd_slope + share * even_slope;
 }
 
 /* One step towards the zero of y + sign * (added value of the polynomial), of third order (Chebyshev's). */
 LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
 {
-    const int last = VI_LANE_ORDER;
-    const vector square = share * share;
-    vector added, slope, odd = (double)((last - 1) * (last - 2) / 2) * term[last - 1];
-    vector even = (double)(last * (last - 1) / 2) * term[last];
-#pragma GCC unroll 16
-    for (int n = last - 3; n >= 3; n -= 2) {
-        odd = odd * square + (double)(n * (n - 1) / 2) * term[n];
-        even = even * square + (double)((n + 1) * n / 2) * term[n + 1];
-    }
-    follow(term, share, &added, &slope);
-    const vector bend = (even * square + term[2]) + share * odd; /* half the second derivative */
+    vector added, slope;
+    evaluate(term, share, &added, &slope);
+    const vector bend = half_bend(term, share);
     const vector inverse = 1.0 / slope, step = (sign * y + added) * inverse;
     return share - step * (1.0 + step * (bend * inverse));
-}
-
-/* First guess of the contact: the zero of the inverse of a rising cubic. */
-LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
-{
-    const vector rise = end_y - y, t = -y / rise, back = 1.0 - t;
-    /* slopes of the inverse at both ends; a line has 1 */
-    const vector inverse = rise / (length * (slope * end_slope));
-    const vector x = t + t * back * ((inverse * end_slope - 1.0) * back - (inverse * slope - 1.0) * t);
-    return length * smaller(larger(x, all(0.0)), all(1.0));
 }
 
 /* Result of a round for the lanes. */
 typedef struct {
     vector share; /* passed share of the cell */
     vector q, p;
+    vector slope; /* of the polynomial, before a rebound */
     mask hits, careful;
 } arrival;
 
-LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, const candidate *cell)
+/* Move to the contact, the goal or the end of a cell with these Taylor coefficients. */
+LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, const candidate *cell, const vector term[])
 {
-    vector term[VI_LANE_ORDER + 1], added, slope;
-    expand(g, at, cell, term);
-    follow(term, cell->length, &added, &slope);
-    const vector length = cell->length, bare = cell->sign * cell->q - cell->limit;
-    const mask leaves = (cell->passed == 0.0) & (s->on == cell->number);
+    vector added, slope;
+    evaluate(term, cell->length, &added, &slope);
+    const vector length = cell->length, bare = cell->sign * term[0] - cell->limit;
+    const mask leaves = (cell->passed == 0.0) & (f->on == cell->number);
     const vector y = only(~leaves, bare), first = cell->sign * term[1];
     const vector end_y = y + cell->sign * added, end_slope = cell->sign * slope;
-    const vector noise = ROUNDING * (size_of(cell->limit) + size_of(cell->q) + size_of(term[1]) + size_of(added));
-    const mask rises = (smaller(first, end_slope) > 0.125 * s->third * (length * length)) & (y <= noise);
+    const vector noise = ROUNDING * (size_of(cell->limit) + size_of(term[0]) + size_of(term[1]) + size_of(added));
+    const mask rises = (smaller(first, end_slope) > 0.125 * f->third * (length * length)) & (y <= noise);
     /* Bernstein coefficients of the cubic with these values and slopes, and the deviation from the cubic */
     const vector third = length * (1.0 / 3.0);
     const vector highest = larger(larger(y, end_y), larger(y + third * first, end_y - third * end_slope));
-    const mask below = highest + s->fourth * (1.0 / 384.0) < 0.0;
+    const mask below = highest + f->fourth * (1.0 / 384.0) < 0.0;
     arrival a;
     a.hits = cell->searched & ~cell->twofold & rises & (end_y > 0.0);
     a.careful = cell->searched & ~a.hits & (cell->twofold | ~(below | (rises & (end_y <= 0.0))));
@@ -289,12 +237,13 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const setting *s, co
             share = smaller(larger(closer(term, y, cell->sign, share), all(0.0)), length);
         }
         a.share = choose(a.hits, share, length);
-        follow(term, a.share, &added, &slope);
+        evaluate(term, a.share, &added, &slope);
         const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
         a.hits &= ~lost;
         a.careful |= lost;
     }
-    a.q = choose(a.hits, cell->sign * cell->limit, cell->q + added);
+    a.slope = slope;
+    a.q = choose(a.hits, cell->sign * cell->limit, term[0] + added);
     a.p = slope * load(g->cell_rate + at);
     return a;
 }
@@ -343,59 +292,66 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
     store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
 }
 
-/* Turn the periods of lanes at their goals. Returns these lanes, whose goal is now the end of the next period. */
-LANES_INLINE mask turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
-                               mask arrives)
+/* Follow the extremes over the last part of the round of some lanes, and keep the extremes so far. */
+LANES_INLINE void end_extremes(vi_lane_group *g, int at, const flight *f, const candidate *cell, const vector term[],
+                               const arrival *a, extremes *e)
 {
-    const vector goal = load(g->goal_periods + at), last = load(g->record.last_turn + at);
-    const mask turns = arrives & (goal < last) & (load(g->record.doubtful + at) == 0.0);
-    if (!any(turns)) {
-        return turns;
-    }
-    vector q = load(g->q[0] + at);
-    for (int c = 0; c < contacts; ++c) { /* beyond a stop by rounding: put on it */
-        const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
-        q = choose(turns & (sign * q > limit), sign * limit, q);
-    }
-    store(g->q[0] + at, q);
-    end_periods(g, plan, points, at, turns);
-    begin_periods(g, at, turns, q, load(g->p[0] + at));
-    store(g->goal_periods + at, goal + only(turns, all(1.0)));
-    return turns;
+    follow_part(g, at, e, e->follows & ~a->careful, f, &cell->start, term, a->share, a->q, a->slope);
+    finish_crests(g, at, e, e->follows);
+    const mask doubtful = (e->doubtful[UPPER] & (e->most[UPPER] < e->stop[UPPER]))
+                          | (e->doubtful[LOWER] & (e->most[LOWER] < e->stop[LOWER]));
+    keep_extremes(g, at, e);
+    store(g->record.doubtful + at, only(doubtful, all(1.0)));
 }
 
-/* Do one round of a vector of lanes; true when one of them has an event. */
-LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts)
+/* Do one round of a vector of lanes; true when one of them has an event. follows: some lanes may follow extremes. */
+LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
+                            bool follows)
 {
-    setting s = begin_round(g, at);
+    flight f = begin_round(g, at);
     if (plan->rate > 0.0) {
-        sample_from(g, at, s.q, s.p, s.cosine, s.sine);
+        sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }
-    const candidate cell = choose_cell(g, at, contacts, &s);
-    arrival a = search(g, at, &s, &cell);
+    extremes e = {0};
+    vector term[VI_LANE_ORDER + 1];
+    if (follows) {
+        e = begin_extremes(g, at, contacts);
+    }
+    const candidate cell = choose_cell(g, plan, points, at, contacts, follows, &f, &e);
+    expand(g, at, &cell.start, term);
+    arrival a = search(g, at, &f, &cell, term);
+    if (follows) {
+        end_extremes(g, at, &f, &cell, term, &a, &e);
+    }
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
     const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
+    const mask turns = arrives & (load(g->goal_periods + at) < load(g->record.last_turn + at))
+                       & (load(g->record.doubtful + at) == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    store(g->start_q[0] + at, s.q);
-    store(g->start_p[0] + at, s.p);
-    store(g->start_cosine + at, s.cosine);
-    store(g->start_sine + at, s.sine);
+    vector q = choose(moves, a.q, cell.start.q);
+    const vector p = choose(moves, a.p, cell.start.p);
+    store(g->start_q[0] + at, f.start.q);
+    store(g->start_p[0] + at, f.start.p);
+    store(g->start_cosine + at, f.start.cosine);
+    store(g->start_sine + at, f.start.sine);
+    store(g->jumped + at, f.jumped);
     store(g->passed + at, cell.passed);
     store(g->share + at, share);
     store(g->impacts + at, impacts);
-    store(g->q[0] + at, choose(moves, a.q, cell.q));
-    store(g->p[0] + at, choose(moves, a.p, cell.p));
-    store(g->on + at, choose(a.hits, cell.number, only(stays, s.on)));
-    move_clock(g, at, s.jumped + cell.passed, share, arrives);
+    store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
+    move_clock(g, at, f.jumped + cell.passed, share, arrives);
     if (plan->rate > 0.0) {
         take_samples(g, plan, points, at);
     }
-    store(g->record.doubtful + at, load(g->record.extremes + at));
     const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {
         write_impacts(g, points, at, contacts, written);
     }
-    const mask turns = turn_periods(g, plan, points, at, contacts, arrives);
+    if (any(turns)) {
+        q = turn_periods(g, plan, points, at, contacts, turns, q, p);
+    }
+    store(g->q[0] + at, q);
+    store(g->p[0] + at, p);
     vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
     event = choose(a.hits & (impacts >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT), event);
     event = choose(arrives & ~turns, all((double)VI_EVENT_GOAL), event);
@@ -405,12 +361,17 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     return any(event > 0.0);
 }
 
+/* Do rounds until a lane has an event. */
 LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts)
 {
-    bool found = false;
+    bool found = false, follows = false;
+    for (int lane = 0; lane < VI_LANES; ++lane) {
+        follows = follows || g->record.extremes[lane] > 0.0;
+    }
     for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= one_round(g, plan, points, at, contacts);
+            found |= follows ? one_round(g, plan, points, at, contacts, true)
+                             : one_round(g, plan, points, at, contacts, false);
         }
     }
 }

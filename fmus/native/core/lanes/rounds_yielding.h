@@ -204,7 +204,6 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
 {
     phase_cell cell;
     vector count[VI_LANES_CONTACTS], cleared, length;
-    const mask alone = load(g->record.extremes + at) == 0.0;
     mask jumps;
     for (int i = 0;; ++i) {
         scan_phase(g, at, contacts, s, count);
@@ -214,10 +213,10 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
         }
         cell.passed = smaller(cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
         jumps = cell.passed == (double)VI_CELLS;
-        if (i == MOST_JUMPS || !any(jumps & alone)) {
+        if (i == MOST_JUMPS || !any(jumps)) {
             break;
         }
-        jump_phase(g, at, contacts, jumps & alone, s);
+        jump_phase(g, at, contacts, jumps, s);
     }
     length = larger(s->to_goal - cell.passed, all(0.0));
     cell.length = only(~jumps, smaller(length, all(1.0)));
@@ -259,7 +258,7 @@ LANES_INLINE phase_arrival search_phase(const vi_lane_group *g, int at, int cont
 {
     vector term[VI_LANE_ORDER + 1], event[VI_LANE_ORDER + 1], added, slope;
     expand_phase(g, at, contacts, s, cell, term, event);
-    follow(event, cell->length, &added, &slope);
+    evaluate(event, cell->length, &added, &slope);
     const vector length = cell->length;
     const mask leaves = (cell->passed == 0.0) & (s->on == cell->number);
     const vector y = only(~leaves, event[0] - cell->limit), first = event[1], end_y = y + added;
@@ -282,13 +281,13 @@ LANES_INLINE phase_arrival search_phase(const vi_lane_group *g, int at, int cont
             share = smaller(larger(closer(event, y, all(1.0), share), all(0.0)), length);
         }
         a.share = choose(a.hits, share, length);
-        follow(event, a.share, &added, &slope);
+        evaluate(event, a.share, &added, &slope);
         /* rounding would decide whether a graze is an event: its extreme is within the noise */
         const mask lost = a.hits & ~((size_of(y + added) <= noise) & (slope * slope > 2.0 * second * noise));
         a.hits &= ~lost;
         a.careful |= lost;
     }
-    follow(term, a.share, &added, &slope);
+    evaluate(term, a.share, &added, &slope);
     a.q = cell->q + added;
     a.p = slope * s->rate;
     return a;
@@ -437,6 +436,7 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
     store(g->start_p[0] + at, s.p);
     store(g->start_cosine + at, s.cosine);
     store(g->start_sine + at, s.sine);
+    store(g->jumped + at, s.jumped);
     store(g->passed + at, cell.passed);
     store(g->share + at, share);
     store(g->q[0] + at, a.q);

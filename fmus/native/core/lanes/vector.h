@@ -9,6 +9,9 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 typedef double vector __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
@@ -46,6 +49,23 @@ LANES_INLINE vector only(mask where, vector a)
     return (vector)((mask)a & where);
 }
 
+/* larger and smaller return b where one is NaN and where both are 0. any: is a lane of the mask set? */
+#if defined(__x86_64__) && VI_WIDTH == 8
+LANES_INLINE vector larger(vector a, vector b)
+{
+    return (vector)_mm512_max_pd((__m512d)a, (__m512d)b);
+}
+
+LANES_INLINE vector smaller(vector a, vector b)
+{
+    return (vector)_mm512_min_pd((__m512d)a, (__m512d)b);
+}
+
+LANES_INLINE bool any(mask where)
+{
+    return _mm512_test_epi64_mask((__m512i)where, (__m512i)where) != 0;
+}
+#else
 LANES_INLINE vector larger(vector a, vector b)
 {
     return choose(a > b, a, b);
@@ -55,6 +75,17 @@ LANES_INLINE vector smaller(vector a, vector b)
 {
     return choose(a < b, a, b);
 }
+
+LANES_INLINE bool any(mask where)
+{
+    int64_t found = 0;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        found |= where[i];
+    }
+    return found != 0;
+}
+#endif
 
 LANES_INLINE vector size_of(vector a)
 {
@@ -69,16 +100,6 @@ LANES_INLINE vector root(vector a)
         r[i] = sqrt(a[i]);
     }
     return r;
-}
-
-LANES_INLINE bool any(mask where)
-{
-    int64_t found = 0;
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        found |= where[i];
-    }
-    return found != 0;
 }
 
 /* Rounding error of the sum `sum` = a + b (Knuth). */

@@ -154,7 +154,7 @@ static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts
     g->start_p[0][lane] = s.p;
     g->start_cosine[lane] = s.cosine;
     g->start_sine[lane] = s.sine;
-    g->passed[lane] = 0.0;
+    g->jumped[lane] = g->passed[lane] = 0.0;
     g->yielding.start_pressed[lane] = g->yielding.pressed_stop[lane];
     const vi_one_mode *tables = tables_of(g, (int)g->yielding.pressed_stop[lane]);
     const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &s, g->cell[lane]);
@@ -201,21 +201,21 @@ static double bulge_of(const vi_one_mode *tables, int lane, const vi_lane_state 
 /* The largest sign * q of a phase over the last round, and so far (`most`). */
 static double extend(const vi_one_mode *tables, const vi_lane_group *g, int lane, double sign, double length, double most)
 {
-    const vi_lane_state start = start_of_round(g, lane);
-    const int passed = (int)g->passed[lane];
-    const double bulge = bulge_of(tables, lane, &start, length), share = g->share[lane];
-    vi_lane_state now = start;
+    vi_lane_state start = start_of_round(g, lane), now = start;
+    const int passed = (int)(g->jumped[lane] + g->passed[lane]);
     for (int i = 0; i <= passed; ++i) {
-        const double end = i < passed ? 1.0 : share;
-        const vi_lane_state next = i < VI_CELLS ? vi_lane_after_cells(tables, lane, &start, i + 1) : now;
+        const int cells = i % VI_CELLS + 1;
+        const double end = i < passed ? 1.0 : g->share[lane];
+        const vi_lane_state next = vi_lane_after_cells(tables, lane, &start, cells);
         most = vi_max(most, sign * now.q);
-        if (end > 0.0 && vi_max(sign * now.q, sign * next.q) + bulge > most) {
+        if (end > 0.0 && vi_max(sign * now.q, sign * next.q) + bulge_of(tables, lane, &start, length) > most) {
             const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &now, length);
             double q, slope;
             vi_lane_cell_at(&cell, end, &q, &slope);
             most = vi_max(most, vi_max(sign * q, vi_lane_cell_crest(&cell, sign, end)));
         }
         now = next;
+        start = cells == VI_CELLS ? next : start;
     }
     return most;
 }

@@ -1,0 +1,142 @@
+/* The motion of a vector of lanes of one mode over cells: states at their ends, Taylor polynomials, bounds. */
+#include "lanes/recording.h"
+
+/* A state of the lanes of a vector. */
+typedef struct {
+    vector q, p, cosine, sine;
+} state;
+
+/* The lanes of a vector during a round. */
+typedef struct {
+    state now, start;           /* from here the contacts are searched; start: of the round, or its last strobe */
+    vector on;
+    vector to_goal;             /* cells */
+    vector jumped;              /* whole cells passed from `start` to `now` */
+    vector second, third, fourth; /* bounds of derivatives of q over VI_CELLS cells, times powers of the cell */
+} flight;
+
+/* Bound the derivatives of q over the next VI_CELLS cells. */
+LANES_INLINE void bound(const vi_lane_group *g, int at, flight *f)
+{
+    /* the energy norm grows at most by the loads; the derivatives follow from the equation */
+    const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
+    const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
+    const vector q = f->now.q, p = f->now.p;
+    const vector norm = root(p * p + k * (q * q)) + loads * load(g->one.span + at);
+    const vector second = loads + load(g->one.root_rate + at) * norm;
+    const vector third = w * loads + (drag * second + k * norm);
+    const vector fourth = w * (w * loads) + (drag * third + k * second);
+    f->second = second * square;
+    f->third = third * (square * cell);
+    f->fourth = fourth * (square * square);
+}
+
+/* Value of a table's row for a state. */
+LANES_INLINE vector linear(const vi_lane_array row[VI_PARTS], int at, const state *s)
+{
+    return (load(row[VI_OF_Q] + at) * s->q + load(row[VI_OF_P] + at) * s->p)
+           + ((load(row[VI_OF_COSINE] + at) * s->cosine + load(row[VI_OF_SINE] + at) * s->sine)
+              + load(row[VI_OF_ONE] + at));
+}
+
+LANES_INLINE state chosen(mask where, const state *a, const state *b)
+{
+    return (state){choose(where, a->q, b->q), choose(where, a->p, b->p), choose(where, a->cosine, b->cosine),
+                   choose(where, a->sine, b->sine)};
+}
+
+/* Rows of a table, chosen by each lane. */
+LANES_INLINE vector gather(const vi_lane_array *rows, int stride, int at, const int row[])
+{
+    vector found;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        found[i] = rows[row[i] * stride][at + i];
+    }
+    return found;
+}
+
+/* Value of a table for a state, in the row of each lane. */
+LANES_INLINE vector gathered(const vi_lane_array *table, int at, const int row[], const state *s)
+{
+    return (gather(table + VI_OF_Q, VI_PARTS, at, row) * s->q + gather(table + VI_OF_P, VI_PARTS, at, row) * s->p)
+           + ((gather(table + VI_OF_COSINE, VI_PARTS, at, row) * s->cosine
+               + gather(table + VI_OF_SINE, VI_PARTS, at, row) * s->sine)
+              + gather(table + VI_OF_ONE, VI_PARTS, at, row));
+}
+
+/* The state after some whole cells of each lane; q[]: displacements after all numbers of cells. */
+LANES_INLINE state after_cells(const vi_lane_group *g, int at, const state *s, const vector q[], vector cells)
+{
+    int row[VI_WIDTH];
+    vector here;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        row[i] = (int)cells[i];
+        here[i] = q[row[i]][i];
+    }
+    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
+    return (state){here, gathered(g->one.end_p[0], at, row, s),
+                   s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
+}
+
+/* The state of this displacement and velocity some cells later. */
+LANES_INLINE state turned(const vi_lane_group *g, int at, int cells, vector q, vector p, const state *s)
+{
+    const vector c = load(g->one.turn_cosine[cells] + at), n = load(g->one.turn_sine[cells] + at);
+    return (state){q, p, s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
+}
+
+/* Taylor coefficients of q over a cell that begins in a state, in its share. */
+LANES_INLINE void expand(const vi_lane_group *g, int at, const state *s, vector term[])
+{
+    term[0] = s->q;
+    term[1] = s->p * load(g->cell + at);
+#pragma GCC unroll 16
+    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
+        term[n] = linear(g->one.taylor[n], at, s);
+    }
+}
+
+/* Added value of the polynomial beyond its first term, and its slope, at a share of the cell. Odd and even powers are
+ * summed apart, which halves the chain of operations. */
+LANES_INLINE void evaluate(const vector term[], vector share, vector *added, vector *slope)
+{
+    const vector square = share * share;
+    vector odd = term[VI_LANE_ORDER - 1], odd_slope = (double)(VI_LANE_ORDER - 1) * odd;
+    vector even = term[VI_LANE_ORDER], even_slope = (double)VI_LANE_ORDER * even;
+#pragma GCC unroll 16
+    for (int n = VI_LANE_ORDER - 3; n >= 1; n -= 2) {
+        odd = odd * square + term[n];
+        odd_slope = odd_slope * square + (double)n * term[n];
+        even = even * square + term[n + 1];
+        even_slope = even_slope * square + (double)(n + 1) * term[n + 1];
+    }
+    *added = share * (odd + share * even);
+    *slope = odd_slope + share * even_slope;
+}
+
+/* Half the second derivative of the polynomial at a share of the cell. */
+LANES_INLINE vector half_bend(const vector term[], vector share)
+{
+    const int last = VI_LANE_ORDER;
+    const vector square = share * share;
+    vector odd = (double)((last - 1) * (last - 2) / 2) * term[last - 1];
+    vector even = (double)(last * (last - 1) / 2) * term[last];
+#pragma GCC unroll 16
+    for (int n = last - 3; n >= 3; n -= 2) {
+        odd = odd * square + (double)(n * (n - 1) / 2) * term[n];
+        even = even * square + (double)((n + 1) * n / 2) * term[n + 1];
+    }
+    return (even * square + term[2]) + share * odd;
+}
+
+/* First guess of a zero over a length: that of the inverse of a rising cubic. */
+LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end_slope, vector length)
+{
+    const vector rise = end_y - y, t = -y / rise, back = 1.0 - t;
+    /* slopes of the inverse at both ends; a line has 1 */
+    const vector inverse = rise / (length * (slope * end_slope));
+    const vector x = t + t * back * ((inverse * end_slope - 1.0) * back - (inverse * slope - 1.0) * t);
+    return length * smaller(larger(x, all(0.0)), all(1.0));
+}
