@@ -12,6 +12,7 @@
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
 enum { MOST_PERIODS = 40, OF_PERIODS = POINTS * MOST_PERIODS }; /* room of a point, of a column */
+enum { MOST_SAMPLES = 128, OF_SAMPLES = POINTS * MOST_SAMPLES };
 
 /* Arrays of points. */
 typedef struct {
@@ -32,13 +33,15 @@ typedef struct {
     int64_t rows_of[POINTS], periods_of[POINTS];
     double sum_of_rows[POINTS]; /* sum of all numbers of a point's impacts, in their order */
     double periods[VI_PERIOD_WIDTH * OF_PERIODS];
+    int64_t samples_of[POINTS];
+    double samples[2 * OF_SAMPLES];
 } results;
 
 static const double TURN = 6.283185307179586;
 /* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
  * change. */
 static const uint64_t BITS = 0xd4f3042e217bfb0fu;
-static const uint64_t BITS_OF_YIELDING = 0x3a989a18852a2e31u; /* Kelvin-Voigt stops */
+static const uint64_t BITS_OF_YIELDING = 0xf09c9e3c7ec9acdau; /* Kelvin-Voigt stops, time series */
 
 static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
 {
@@ -133,6 +136,9 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .periods = r->periods,
                              .periods_of = r->periods_of,
                              .most_periods = MOST_PERIODS,
+                             .samples = r->samples,
+                             .samples_of = r->samples_of,
+                             .most_samples = MOST_SAMPLES,
                              .rows_of = r->rows_of,
                              .rows = rows,
                              .owner = owner,
@@ -217,6 +223,12 @@ static void compare(const results *a, const results *b, int i, const char *what)
             CHECK(memcmp(period_of(a, i, column), period_of(b, i, column), sizeof(double[MOST_PERIODS])) == 0,
                   "one column %d of the periods of %d by %s", column, i, what);
         }
+        CHECK(a->samples_of[i] == b->samples_of[i], "the number of samples of %d by %s", i, what);
+        for (int column = 0; column < 2; ++column) {
+            const int place = column * OF_SAMPLES + i * MOST_SAMPLES;
+            CHECK(memcmp(&a->samples[place], &b->samples[place], sizeof(double[MOST_SAMPLES])) == 0,
+                  "the samples of %d by %s", i, what);
+        }
         CHECK(isfinite(a->displacement[i]) && isfinite(a->velocity[i]), "numbers at the end of point %d", i);
     }
 }
@@ -242,6 +254,10 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
         for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
             hash = hashed(hash, period_of(r, i, column), (size_t)r->periods_of[i] * sizeof(double));
         }
+        for (int column = 0; column < 2; ++column) {
+            hash = hashed(hash, &r->samples[column * OF_SAMPLES + i * MOST_SAMPLES],
+                          (size_t)r->samples_of[i] * sizeof(double));
+        }
         for (int j = 0; j < modes; ++j) {
             hash = hashed(hash, &r->final_q[j * POINTS + i], sizeof(double));
             hash = hashed(hash, &r->final_p[j * POINTS + i], sizeof(double));
@@ -254,7 +270,8 @@ static void check_sizes(int modes, int contacts, int64_t yielding, uint64_t *see
 {
     static sample good, bad;
     static results whole, other;
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding,
+                          yielding ? 1.7 : 0.0};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;
@@ -327,6 +344,9 @@ int main(void)
                                   {.modes = 1, .contacts = VI_LANES_CONTACTS + 1},
                                   {.modes = 1, .contacts = 1, .yielding = 2},
                                   {.modes = 2, .contacts = 1, .yielding = 1},
+                                  {.modes = 2, .rate = 1.0},
+                                  {.modes = 1, .rate = -1.0},
+                                  {.modes = 1, .rate = INFINITY},
                                   {.modes = 1, .instructions = 4}};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);

@@ -109,6 +109,9 @@ def test_stops_that_yield_have_the_same_bits_in_every_instruction_set_and_cut(
     backwards = np.arange(40)[::-1]
     part = run(taken(points, backwards), impact_limit=MOST)
     assert np.array_equal(part.columns["final_q"], whole.columns["final_q"][:, backwards], equal_nan=True)
+    for recorded in ({"extrema": False}, {"impacts": False}, {"rate": 7.3}):
+        other = run(points, impact_limit=MOST, **recorded)
+        assert np.array_equal(other.columns["final_q"], whole.columns["final_q"], equal_nan=True)
 
 
 def test_a_mass_rebounds_from_a_kelvin_voigt_stop_as_the_closed_form_says() -> None:
@@ -173,6 +176,28 @@ def test_one_row_for_all_periods_reduces_the_rows_of_each(modes: int, contacts: 
             last = periods[-1, 4:6]
             expected = [periods[:, 2].max(), periods[:, 3].min(), *last, periods[:, 6].sum() / len(periods)]
             assert found.tolist() == expected
+
+
+@pytest.mark.parametrize("yields", [False, True])
+def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(*, yields: bool) -> None:
+    rate = 7.3
+    points = drawn_yielding(24, 2, seed=60) if yields else drawn(24, 1, 2, seed=60)
+    points["begin"] = np.maximum(points["begin"], 1e-3)
+    plain = run(points, impact_limit=MOST)
+    found = run(points, impact_limit=MOST, rate=rate)
+    assert all(one.tobytes() == other.tobytes() for one, other in zip(found.rows, plain.rows, strict=True))
+    for place in np.flatnonzero(found.has_run & (found.columns["outcome"] == 0)):
+        begin, end = float(points["begin"][place]), float(points["end"][place])
+        count = math.floor((end - begin) * rate * (1.0 + 1e-12)) + 1
+        assert found.columns["samples_of"][place] == count
+        with follow_alone({**points, "end": points["begin"]}, int(place)) as body:
+            for n in range(count):
+                further = min(begin + n / rate, end) - body.time
+                if further > 0.0:
+                    body.advance(further, held=points["held"][:, place])
+                q, p = found.columns["samples"][:, place, n]
+                assert abs(q - body.displacement[0]) <= FLIGHTS
+                assert abs(p - body.velocity[0]) <= 100.0 * FLIGHTS
 
 
 def test_rows_that_find_no_room_are_asked_for() -> None:

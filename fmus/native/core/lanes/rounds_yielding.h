@@ -420,6 +420,10 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
                                   int contacts)
 {
     phase_setting s = begin_phase_round(g, at, contacts);
+    store(g->start_q[0] + at, s.q);
+    store(g->start_p[0] + at, s.p);
+    store(g->start_cosine + at, s.cosine);
+    store(g->start_sine + at, s.sine);
     if (plan->rate > 0.0) {
         sample_from(g, at, s.q, s.p, s.cosine, s.sine);
     }
@@ -432,10 +436,6 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
     a.p = choose(moves, a.p, cell.p);
     const mask leaves = change_phase(g, at, contacts, &s, &cell, &a);
     const mask touches = a.hits & ~pressed & (load(g->yielding.pressed_stop + at) > 0.0), kept = ~leaves;
-    store(g->start_q[0] + at, s.q);
-    store(g->start_p[0] + at, s.p);
-    store(g->start_cosine + at, s.cosine);
-    store(g->start_sine + at, s.sine);
     store(g->jumped + at, s.jumped);
     store(g->passed + at, cell.passed);
     store(g->share + at, share);
