@@ -15,7 +15,7 @@ from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of,
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.core.runs import address
 from vibroimpact.orchestrator.run.many_points.lanes import lane_points
-from vibroimpact.orchestrator.run.many_points.lanes_samples import LaneSamples, points_at_once
+from vibroimpact.orchestrator.run.many_points.lanes_samples import LaneSamples, fits
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
 from vibroimpact.orchestrator.run.many_points.loop_rows import (
     LISTEN_SECONDS,
@@ -82,12 +82,9 @@ def run_in_lanes(
     points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
-    rate = loop.scene.sampling_rate
-    if prepared is not None and rate and (few := points_at_once(prepared.begin, prepared.end, rate)) < len(points):
-        return run_in_lanes(loop, points.piece(0, few, points.starts.get(0)), deadline, alone)
-    if prepared is not None:
+    if prepared is not None and fits(prepared.begin, prepared.end, loop.scene.sampling_rate):
         return _LaneRun(loop, points, prepared, alone).run(deadline)
-    if len(points) == 1:
+    if prepared is None and len(points) == 1:
         given = points.starts.get(0)
         record = alone(0, given)
         return columns_of([record]), next_start(record, given) if loop.chained else None
@@ -105,7 +102,7 @@ def run_prepared_in_lanes(
 def _run_halves(
     loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points of mixed kinds, or with invalid parameters, by splitting them in halves."""
+    """Run points of mixed kinds, with invalid parameters or with many samples, by splitting them in halves."""
     half = len(points) // 2
     columns, carried = run_in_lanes(loop, points.piece(0, half, points.starts.get(0)), deadline, alone)
     if len(columns) < half or time.perf_counter() > deadline:

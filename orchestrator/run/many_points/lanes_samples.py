@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,20 +20,20 @@ ROUNDING = 1e-12
 
 
 MOST_BYTES = 2**28
-"""Largest size of the samples of one call, bytes; further points wait for the next call."""
+"""Largest size of the samples of one call, bytes; further points run by another call."""
 
 
 def most_samples(begin: Floats, end: Floats, rate: float) -> int:
     """Return the largest number of samples of a point whose recording begins and ends at these times, s."""
     with np.errstate(over="ignore", invalid="ignore"):  # C leaves a point with an infinite period
         count = (end - begin) * rate * (1.0 + ROUNDING)
-    return math.floor(count[np.isfinite(count)].max(initial=0.0)) + 1
+    return int(count[np.isfinite(count)].max(initial=0.0)) + 1
 
 
-def points_at_once(begin: Floats, end: Floats, rate: float) -> int:
-    """Return the number of points, the first of those given, whose samples fit into one call; at least 1."""
-    each = VALUES * np.dtype(np.float64).itemsize * most_samples(begin, end, rate)
-    return min(len(begin), max(1, MOST_BYTES // each))
+def fits(begin: Floats, end: Floats, rate: float) -> bool:
+    """Return whether points are few enough for one call: a single point, or samples below `MOST_BYTES`."""
+    size = VALUES * np.dtype(np.float64).itemsize * len(begin) * most_samples(begin, end, rate)
+    return len(begin) == 1 or size <= MOST_BYTES
 
 
 class LaneSamples:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+import vibroimpact as vi
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
+from vibroimpact.orchestrator.run.many_points import lanes_samples
 from vibroimpact.orchestrator.scene import parse_scene
 
 OSCILLATOR = "[body]\nmass = 1.0\nstiffness = 1.0\n"
@@ -72,3 +74,14 @@ def test_lanes_take_few_modes_between_rigid_stops_or_one_on_stops_that_yield(
 def test_the_choice_does_not_depend_on_the_number_of_points() -> None:
     for values in ("[1.0]", "[1.0, 2.0, 3.0]"):
         assert goes_by_lanes(parse_scene(scene(rest=SWEEP.replace("[1.0, 2.0]", values)), "scene.toml"))
+
+
+def test_points_with_many_samples_run_by_several_calls_with_the_same_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    text = scene(record=RECORD + SERIES, rest=SWEEP + PATH)
+    whole = vi.run(parse_scene(text, "scene.toml"), progress=False)
+    assert whole.attrs["execution"] == "lanes"
+    monkeypatch.setattr(lanes_samples, "MOST_BYTES", 1)
+    cut = vi.run(parse_scene(text, "scene.toml"), progress=False)
+    assert whole.drop_vars("point_seconds").identical(cut.drop_vars("point_seconds"))
