@@ -229,6 +229,8 @@ def _with_columns(table: Floats, number: int) -> Floats:
 
 def joined(pieces: Sequence[RunColumns]) -> RunColumns:
     """Return the runs of several columns of one scene, one after the other."""
+    if len(pieces) == 1:
+        return pieces[0]
     return RunColumns(*(_joined([getattr(piece, name) for piece in pieces]) for name in RunColumns.__slots__))
 
 
@@ -239,7 +241,14 @@ def _joined(values: Sequence[Any]) -> Any:
     if first is None:
         return None
     if first.ndim == 3:
-        periods = max(value.shape[1] for value in values)
-        padding = [((0, 0), (0, periods - value.shape[1]), (0, 0)) for value in values]
-        values = [np.pad(v, p, constant_values=np.nan) for v, p in zip(values, padding, strict=True)]
+        return _joined_periods(values)
     return np.concatenate(values)
+
+
+def _joined_periods(tables: Sequence[Floats]) -> Floats:
+    """Return tables of periods as one, shape (run, period, column), whose columns are contiguous."""
+    runs, periods, columns = (list(sizes) for sizes in zip(*(table.shape for table in tables), strict=True))
+    whole = np.full((columns[0], sum(runs), max(periods)), np.nan)
+    for table, end in zip(tables, np.cumsum(runs), strict=True):
+        whole[:, end - len(table) : end, : table.shape[1]] = np.moveaxis(table, -1, 0)
+    return np.moveaxis(whole, 0, -1)
