@@ -66,6 +66,7 @@ class RunColumns:
     periods: Floats | None = None
     impacts: Ragged | None = None
     sticks: Ragged | None = None
+    samples: Ragged | None = None
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -157,7 +158,17 @@ def columns_of(records: Sequence[RunRecord]) -> RunColumns:
         periods=_periods([record.periods for record in records]),
         impacts=ragged([record.impacts for record in records], len(IMPACT_COLUMNS)),
         sticks=ragged([record.sticks for record in records], len(STICK_COLUMNS)),
+        samples=_samples([record.samples for record in records]),
     )
+
+
+def _samples(tables: Sequence[Floats | None]) -> Ragged | None:
+    widths = {table.shape[1] for table in tables if table is not None}
+    if len(widths) > 1:
+        raise DatasetError(
+            f"dataset: samples: expected tables of one width, got {names_list(list(map(str, sorted(widths))))}."
+        )
+    return ragged(tables, widths.pop()) if widths else None
 
 
 def _states(states: Sequence[Floats | None]) -> Floats | None:

@@ -136,7 +136,7 @@ def build_dataset(
     variables = _described({"run_index": run_index, "direction": direction}, units)
     variables |= _column_variables(columns, units, omit, each_period)
     samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
-    variables |= _sample_variables(records, samples)
+    variables |= _sample_variables(columns.samples, samples)
     variables |= _event_variables(records, event_components, units)
     variables |= _coupling_variables(records, connections, units)
     variables |= _score_variables(records, compared, units)
@@ -239,7 +239,8 @@ def _ragged_variables(
     """Return a contiguous ragged array (CF-1.11 section 9.3.3): the count of each run, then all rows."""
     if rows is None:
         return {}
-    values = {RAGGED[dimension]: rows.count} | dict(zip(columns, rows.rows.T, strict=True))
+    known = rows.rows[:, : len(columns)]
+    values = {RAGGED[dimension]: rows.count} | dict(zip(columns, known.T, strict=True))
     return _described(values, units)
 
 
@@ -267,21 +268,19 @@ class _Samples:
         return attributes if stored == name else attributes | {"long_name": name, "component_variable": name}
 
 
-def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
+def _sample_variables(samples: Ragged | None, known: _Samples) -> _Variables:
     """Return the time series: `time` and the sampled variables."""
-    tables = [run.samples for run in runs]
-    variables = _ragged_variables("sample", ragged(tables, 1), ("time",), known.units)
-    if not variables:
+    variables = _ragged_variables("sample", samples, ("time",), known.units)
+    if samples is None:
         return {}
-    rows = np.concatenate([table for table in tables if table is not None])
-    if rows.shape[1] != 1 + len(known.names):
+    if samples.rows.shape[1] != 1 + len(known.names):
         raise DatasetError(
             f"dataset: samples: expected time and {len(known.names)} variables ({names_list(known.names)}), "
-            f"got {rows.shape[1]} columns."
+            f"got {samples.rows.shape[1]} columns."
         )
     stored_names = file_names(known.names, RESERVED_NAMES | set(known.swept))
     for column, (name, stored) in enumerate(zip(known.names, stored_names, strict=True), start=1):
-        values = np.ascontiguousarray(rows[:, column])
+        values = np.ascontiguousarray(samples.rows[:, column])
         variables[stored] = (("sample",), values, known.attributes(name, stored))
     return variables
 

@@ -63,6 +63,8 @@ class LanesPlan(Structure):
             for name in ("modes", "contacts", "impacts", "extrema", "periods", "each_period", "instructions")
         ),
         ("impact_limit", c_int64),
+        ("yielding", c_int64),
+        ("rate", c_double),
     ]
 
 
@@ -71,7 +73,8 @@ class LanesPoints(Structure):
 
     GIVEN = (
         "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "observed",
-        "position", "direction", "restitution", "yield_velocity", "start_q", "start_p", "begin", "end", "first",
+        "position", "direction", "restitution", "yield_velocity", "contact_stiffness", "contact_damping",
+        "start_q", "start_p", "begin", "end", "first",
     )  # fmt: skip
     RESULTS = (
         "state", "outcome", "reached", "displacement", "velocity", "final_q", "final_p", "periods", "periods_of",
@@ -81,6 +84,9 @@ class LanesPoints(Structure):
         ("count", c_int64),
         *((name, c_void_p) for name in (*GIVEN, *RESULTS)),
         ("most_periods", c_int64),
+        ("samples", c_void_p),
+        ("samples_of", c_void_p),
+        ("most_samples", c_int64),
         *((name, c_void_p) for name in OF_ROWS),
         *((name, c_int64) for name in ("rows_room", "rows_used", "begun_below", "finished")),
         ("most_seconds", c_double),

@@ -20,7 +20,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
 from vibroimpact.analysis.dataset.columns import RunColumns, arrays_of
-from vibroimpact.analysis.dataset.schema import RULES, SWEPT_ALONG
+from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
@@ -109,7 +109,12 @@ class DatasetForm:
 
     def arrays(self, columns: RunColumns) -> dict[str, Any]:
         """Return the results of points as arrays, with the names and the types of the dataset."""
-        return arrays_of(columns, self.omitted, each_period=self._said["each_period"])
+        found = arrays_of(columns, self.omitted, each_period=self._said["each_period"])
+        if columns.samples is not None:
+            found[RAGGED["sample"]] = columns.samples.count.astype(RULES[RAGGED["sample"]].dtype)
+            names = ("time", *stored_samples(self._scene))
+            found |= dict(zip(names, map(np.ascontiguousarray, columns.samples.rows.T), strict=True))
+        return found
 
     def refuse_impossible(self) -> None:
         """Raise DatasetError unless the scene can have a dataset, whatever its points record."""

@@ -1,8 +1,9 @@
 """The limits of lanes, orbits and the studies' ways: one table, and the entries of the table that a scene has.
 
 `execution.how = "auto"` lets the points of a sweep run in lanes (`fmus.core.run_lanes`). Its bodies then have few modes
-between restitution stops, and each point is independent or continues the point before. Lanes leave out points that
-chatter, rest or are rare in another way. These points run by the scalar engine from their start, as in a fused run.
+between restitution stops, or one mode and a Kelvin-Voigt stop. Each point is independent or continues the point before.
+Lanes leave out points that chatter, rest or are rare in another way. These points run by the scalar engine from their
+start, as in a fused run.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.called_effects import called_by_numbers
 from vibroimpact.orchestrator.run.parameters import body_points
+from vibroimpact.orchestrator.run.record import OBSERVED
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -42,7 +44,7 @@ LIMITS = {
     "body": Limit(lanes=True, orbits="an oscillator, a chain or a beam whose orbits are followed"),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
-    "law": Limit(lanes=True, orbits='"restitution": impacts without duration'),
+    "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
     "distance": Limit(lanes=True, orbits=_NONE),
     "reduced": Limit(thrown_back="a Chain with fewer modes than masses does not move one mass alone"),
@@ -102,13 +104,50 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
     body = scene.body
     return {
         "measuring chain": scene.is_measured or scene.exciter is not None,
-        "time series": scene.record.time_series is not None,
+        "laws": any(stop.law != "restitution" for stop in scene.stops) and not _yields_in_lanes(scene),
+        "time series": scene.record.time_series is not None and not _samples_in_lanes(scene),
         "many contacts": len(scene.stops) > core.most_contacts(body.kept_modes),
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),
         "residual vectors": body.has_residual_vectors,
         AMPLITUDE: AMPLITUDE in called_by_numbers(scene),
     }
+
+
+def _samples_in_lanes(scene: Scene) -> bool:
+    """Return whether lanes can sample the time series: the motion of one mode, at the observed point and the stops."""
+    rigid = all(stop.law == "restitution" for stop in scene.stops)
+    return scene.body.kept_modes == 1 and all(
+        name in OBSERVED
+        or name.startswith(("contact_displacement[", "contact_velocity["))
+        or (rigid and name.startswith("contact_force"))
+        for name in scene.sampled
+    )
+
+
+def contact_of(name: str) -> int | None:
+    """Return the contact (1-based) of a sampled variable; None for a variable of the observed point.
+
+    Examples
+    --------
+    >>> contact_of("contact_velocity[2]"), contact_of("velocity")
+    (2, None)
+    """
+    return int(name.partition("[")[2][:-1]) if "[" in name else None
+
+
+def _yields_in_lanes(scene: Scene) -> bool:
+    """Return whether lanes can follow stops that yield: Kelvin-Voigt stops of one mode; surfaces relax at once."""
+    stops = scene.stops
+    relaxes = any(axis.key.endswith(".relaxation_time") for axis in scene.sweep) or any(
+        getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in stops
+    )
+    return (
+        scene.body.kept_modes == 1
+        and all(stop.law in ("restitution", "kelvin_voigt") for stop in stops)
+        and len({stop.side for stop in stops}) == len(stops)
+        and not relaxes
+    )
 
 
 def seen_of_flaw(scene: Scene, flaw: str) -> Seen:

@@ -23,7 +23,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench_fused import PERIOD, PHASE, VELOCITY, Fused, Peer, machine
+import bench_fused
+from bench_fused import PERIOD, PHASE, SCENE, VELOCITY, Fused, Peer, machine
 from peers import fmpy_import, jax_flights
 from peers.problems import orbit
 from peers.ways import Clock as Allowance
@@ -33,6 +34,8 @@ from support.lane_points import IMPACT, TURN, Columns, drawn, run, taken
 
 from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.core.lanes import Instructions, instructions
+from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.scene import parse_scene
 
 POINTS = 64
 SETS = {
@@ -42,6 +45,10 @@ SETS = {
     "all of all periods": ("periods", "impacts", "extrema"),
 }
 """Recorded variables, by the name of the set."""
+STIFFNESSES = (1e4, 1e8)
+"""Stiffnesses of Kelvin-Voigt stops, that of the oscillator's spring being 1."""
+VOIGT_RATIO = 0.1222
+"""Damping ratio of a mass on a Kelvin-Voigt stop that has the restitution .7 (equations.md 6.9)."""
 OTHER_IMPACTS = 100
 """Impacts of diffrax and FMPy, one in each period: the time per impact does not depend on the number."""
 HERE = [each for each in Instructions if each and instructions() >= each]
@@ -144,6 +151,34 @@ def errors() -> tuple[float, float]:
     return float(np.abs(rows[:, 2] - PHASE).max()), float(np.abs(rows[:, 3] - VELOCITY).max())
 
 
+def yielding(periods: int, stiffness: float) -> Columns:
+    """Return the points of `periodic` on a Kelvin-Voigt stop with about the restitution of its rigid stop."""
+    points = periodic(periods)
+    points["contact_stiffness"][:] = stiffness
+    points["contact_damping"][:] = 2.0 * VOIGT_RATIO * math.sqrt(stiffness)
+    return points
+
+
+class FusedYielding:
+    """The Oscillator FMU on the orbit of `yielding`, in one step."""
+
+    PERIODS = 20_000
+
+    def __init__(self, stiffness: float) -> None:
+        law = f'law = "kelvin_voigt"\nstiffness = {stiffness}\ndamping = {2.0 * VOIGT_RATIO * math.sqrt(stiffness)}'
+        text = SCENE.format_map({**vars(bench_fused), "velocity": -0.5, "impacts": self.PERIODS})
+        self._runner = PointRunner(parse_scene(text.replace("restitution = 0.7", law), "bench_lanes.toml"))
+
+    def seconds(self) -> float:
+        """Return seconds per impact."""
+        began = time.thread_time()
+        record = self._runner.run({})
+        seconds = time.thread_time() - began
+        assert record.impacts is not None
+        assert len(record.impacts) == 1
+        return seconds / self.PERIODS
+
+
 def cases(periods: int) -> dict[str, Case]:
     """Return the timed cases, by name."""
     chaos = {"decay": 0.0, "angular_frequency": 2.8, "position": 0.0, "restitution": 0.8}
@@ -153,6 +188,10 @@ def cases(periods: int) -> dict[str, Case]:
         **{
             f"P(1,1), {what}": counted(periodic(0, min(periods, 500)), *recorded)
             for what, recorded in SETS.items()
+        },
+        **{
+            f"P(1,1), Kelvin-Voigt stop of stiffness {stiffness:g}": counted(yielding(periods, stiffness))
+            for stiffness in STIFFNESSES
         },
         "chaos": counted(oscillators(periods // 10, 1, start_p=0.1, **chaos)),
     }
@@ -166,6 +205,10 @@ def measure(periods: int, repetitions: int) -> tuple[dict[str, float], dict[str,
     """Time all in turns; return median microseconds per impact, and the others' errors of phase and velocity."""
     clock, fused, off = Clock(), Fused(100_000), {}
     timed: dict[str, Callable[[], float]] = {"fused Oscillator": lambda: fused.run()[0]}
+    for stiffness in STIFFNESSES:
+        timed[f"fused Oscillator, Kelvin-Voigt stop of stiffness {stiffness:g}"] = FusedYielding(
+            stiffness
+        ).seconds
 
     def timed_other(other: Peer | Other) -> float:
         seconds, *off[other.name] = other.run()

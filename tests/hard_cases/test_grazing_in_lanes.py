@@ -15,7 +15,8 @@ LEVELS = [10.0**-n for n in (2, 3, 4, 5, 6, 7, 8, 9, 10)]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 0.0), (0.5, 0.0), (1e4, 20.0), (1e8, 2e3)])
+def test_no_impact_is_lost_at_a_graze(sign: float, stiffness: float, damping: float) -> None:
     # the peak of a steady motion exceeds the stop by ever less, or stays below it, from eight phases
     zeta, w = 0.05, 0.8
     size, lag = math.hypot(1.0 - w * w, 2.0 * zeta * w), math.atan2(2.0 * zeta * w, 1.0 - w * w)
@@ -33,6 +34,8 @@ def test_no_impact_is_lost_at_a_graze(sign: float) -> None:
         start_p=-w * amplitude * np.sin(phase - lag),
         position=1.0,
         restitution=0.7,
+        contact_stiffness=stiffness,
+        contact_damping=damping,
     )
     points["begin"] = np.zeros(len(excess))
     found = run(points)
@@ -128,3 +131,20 @@ def test_the_ripples_of_a_fast_mode_over_the_stop_are_those_that_the_scalar_engi
         assert difference.max(initial=0.0) <= 100.0 * SEQUENCE
         seen += len(impacts)
     assert seen > 0
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e8])
+def test_elastic_stops_that_yield_give_back_the_energy_of_hundreds_of_contacts(stiffness: float) -> None:
+    points = oscillators(
+        8, 0, 20, decay=0.0, force=0.0, angular_frequency=TURN / 100.0, position=0.5, restitution=0.0,
+        contact_stiffness=stiffness, contact_damping=0.0, start_q=-np.linspace(0.7, 2.0, 8), start_p=0.0,
+    )  # fmt: skip
+    points["begin"] = np.zeros(8)
+    found = run(points)
+    assert found.has_run.all()
+    for place, rows in enumerate(found.rows):
+        impacts = rows[(rows[:, 0] == IMPACT) & ~np.isnan(rows[:, 4])]
+        amplitude = -points["start_q"][0, place]
+        assert len(impacts) > 300
+        assert np.abs(impacts[:, 6] - 1.0).max() <= 1e-8  # the rounding of the stop's position over the depth
+        assert np.abs(impacts[:, 3] / math.sqrt(amplitude**2 - 0.25) - 1.0).max() <= 1e-10

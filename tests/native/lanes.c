@@ -12,6 +12,7 @@
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
 enum { MOST_PERIODS = 40, OF_PERIODS = POINTS * MOST_PERIODS }; /* room of a point, of a column */
+enum { MOST_SAMPLES = 128, OF_SAMPLES = POINTS * MOST_SAMPLES };
 
 /* Arrays of points. */
 typedef struct {
@@ -21,6 +22,7 @@ typedef struct {
     double shape[VI_LANES_CONTACTS * STATES], impulse[VI_LANES_CONTACTS * STATES];
     double position[VI_LANES_CONTACTS * POINTS], direction[VI_LANES_CONTACTS * POINTS];
     double restitution[VI_LANES_CONTACTS * POINTS], yield_velocity[VI_LANES_CONTACTS * POINTS];
+    double contact_stiffness[VI_LANES_CONTACTS * POINTS], contact_damping[VI_LANES_CONTACTS * POINTS];
     uint8_t first[POINTS];
 } sample;
 
@@ -31,15 +33,19 @@ typedef struct {
     int64_t rows_of[POINTS], periods_of[POINTS];
     double sum_of_rows[POINTS]; /* sum of all numbers of a point's impacts, in their order */
     double periods[VI_PERIOD_WIDTH * OF_PERIODS];
+    int64_t samples_of[POINTS];
+    double samples[2 * OF_SAMPLES];
 } results;
 
 static const double TURN = 6.283185307179586;
 /* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
  * change. */
 static const uint64_t BITS = 0xf68c2759cf6a40dcu;
+static const uint64_t BITS_OF_YIELDING = 0xf09c9e3c7ec9acdau; /* Kelvin-Voigt stops, time series */
 
-static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed)
+static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
 {
+    const int modes = plan->modes, contacts = plan->contacts;
     for (int j = 0; j < modes; ++j) {
         const double natural = uniform(seed, 0.5, 5.0), ratio = choice(seed, 5) ? 0.03 : uniform(seed, 0.0, 3.0);
         const int at = j * POINTS + i;
@@ -57,6 +63,14 @@ static void draw_point(sample *s, int i, int modes, int contacts, uint64_t *seed
         s->position[at] = s->direction[at] * uniform(seed, 0.2, 1.0);
         s->restitution[at] = uniform(seed, 0.3, 1.0);
         s->yield_velocity[at] = choice(seed, 2) ? 0.0 : 0.3;
+        s->contact_stiffness[at] = s->contact_damping[at] = 0.0;
+        if ((plan->yielding >> k) & 1) {
+            s->contact_stiffness[at] = uniform(seed, 0.1, 1.0);
+            for (int decades = choice(seed, 9); decades > 0; --decades) {
+                s->contact_stiffness[at] *= 10.0;
+            }
+            s->contact_damping[at] = choice(seed, 4) * uniform(seed, 0.0, 1.0) * sqrt(s->contact_stiffness[at]);
+        }
         for (int j = 0; j < modes; ++j) {
             const int place = (k * modes + j) * POINTS + i;
             s->shape[place] = s->impulse[place] = uniform(seed, 0.3, 1.0);
@@ -105,6 +119,8 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .direction = s->direction,
                              .restitution = s->restitution,
                              .yield_velocity = s->yield_velocity,
+                             .contact_stiffness = s->contact_stiffness,
+                             .contact_damping = s->contact_damping,
                              .start_q = s->start_q,
                              .start_p = s->start_p,
                              .begin = s->begin,
@@ -120,6 +136,9 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .periods = r->periods,
                              .periods_of = r->periods_of,
                              .most_periods = MOST_PERIODS,
+                             .samples = r->samples,
+                             .samples_of = r->samples_of,
+                             .most_samples = MOST_SAMPLES,
                              .rows_of = r->rows_of,
                              .rows = rows,
                              .owner = owner,
@@ -204,6 +223,12 @@ static void compare(const results *a, const results *b, int i, const char *what)
             CHECK(memcmp(period_of(a, i, column), period_of(b, i, column), sizeof(double[MOST_PERIODS])) == 0,
                   "one column %d of the periods of %d by %s", column, i, what);
         }
+        CHECK(a->samples_of[i] == b->samples_of[i], "the number of samples of %d by %s", i, what);
+        for (int column = 0; column < 2; ++column) {
+            const int place = column * OF_SAMPLES + i * MOST_SAMPLES;
+            CHECK(memcmp(&a->samples[place], &b->samples[place], sizeof(double[MOST_SAMPLES])) == 0,
+                  "the samples of %d by %s", i, what);
+        }
         CHECK(isfinite(a->displacement[i]) && isfinite(a->velocity[i]), "numbers at the end of point %d", i);
     }
 }
@@ -229,6 +254,10 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
         for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
             hash = hashed(hash, period_of(r, i, column), (size_t)r->periods_of[i] * sizeof(double));
         }
+        for (int column = 0; column < 2; ++column) {
+            hash = hashed(hash, &r->samples[column * OF_SAMPLES + i * MOST_SAMPLES],
+                          (size_t)r->samples_of[i] * sizeof(double));
+        }
         for (int j = 0; j < modes; ++j) {
             hash = hashed(hash, &r->final_q[j * POINTS + i], sizeof(double));
             hash = hashed(hash, &r->final_p[j * POINTS + i], sizeof(double));
@@ -237,13 +266,14 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
     return hash;
 }
 
-static void check_sizes(int modes, int contacts, uint64_t *seed, uint64_t *hash)
+static void check_sizes(int modes, int contacts, int64_t yielding, uint64_t *seed, uint64_t *hash)
 {
     static sample good, bad;
     static results whole, other;
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding,
+                          yielding ? 1.7 : 0.0};
     for (int i = 0; i < POINTS; ++i) {
-        draw_point(&good, i, modes, contacts, seed);
+        draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;
     }
     run(&good, &whole, &plan, 1e9);
@@ -307,22 +337,34 @@ static void check_functions(uint64_t *seed)
 
 int main(void)
 {
-    uint64_t seed = 18, hash = 14695981039346656037u;
+    uint64_t seed = 18, hash = 14695981039346656037u, hash_of_yielding = hash;
     const vi_lanes_plan none[] = {{.modes = 0},
                                   {.modes = VI_LANES_MODES + 1},
                                   {.modes = 1, .contacts = -1},
                                   {.modes = 1, .contacts = VI_ONE_MODE_CONTACTS + 1},
                                   {.modes = 2, .contacts = VI_LANES_CONTACTS + 1},
+                                  {.modes = 1, .contacts = 1, .yielding = 2},
+                                  {.modes = 2, .contacts = 1, .yielding = 1},
+                                  {.modes = 2, .rate = 1.0},
+                                  {.modes = 1, .rate = -1.0},
+                                  {.modes = 1, .rate = INFINITY},
                                   {.modes = 1, .instructions = 4}};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);
     }
     for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
         for (int contacts = 0; contacts <= (modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS); ++contacts) {
-            check_sizes(modes, contacts, &seed, &hash);
+            check_sizes(modes, contacts, 0, &seed, &hash);
+        }
+    }
+    for (int contacts = 1; contacts <= VI_ONE_MODE_CONTACTS; ++contacts) {
+        for (int64_t yielding = 1; yielding < 1 << contacts; ++yielding) {
+            check_sizes(1, contacts, yielding, &seed, &hash_of_yielding);
         }
     }
     check_functions(&seed);
     CHECK(hash == BITS, "the bits of every machine, got the hash %016" PRIx64, hash);
+    CHECK(hash_of_yielding == BITS_OF_YIELDING, "the bits on stops that yield, got the hash %016" PRIx64,
+          hash_of_yielding);
     return 0;
 }

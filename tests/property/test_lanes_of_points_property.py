@@ -22,6 +22,7 @@ from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 RIGID = tuple(law for law in LAWS if "kelvin_voigt" not in law)
+YIELDING = tuple(law for law in LAWS if "kelvin_voigt" in law)
 FIRST_IMPACTS = 10
 """Number of compared impacts of a point: later, chaotic motion multiplies rounding by any factor."""
 AGREEMENT = 1e-9
@@ -63,6 +64,14 @@ def assert_agree(lanes: xr.Dataset, fused: xr.Dataset) -> None:
             assert one.shape == other.shape
             assert one == pytest.approx(other, rel=AGREEMENT, abs=AGREEMENT)
     short = few_impacts(fused)
+    if "samples" in lanes:
+        assert lanes.samples.values.tolist() == fused.samples.values.tolist()
+        assert np.array_equal(lanes.time.values, fused.time.values)
+        sampled = short[np.repeat(np.arange(lanes.sizes["run"]), fused.samples.values)]
+        for name in ("displacement", "velocity", "contact_velocity_1"):
+            assert lanes[name].values[sampled] == pytest.approx(
+                fused[name].values[sampled], rel=AGREEMENT, abs=AGREEMENT
+            )
     for name in ("final_displacement", "final_velocity", "displacement_max", "strobe_velocity"):
         if name in lanes:
             values, expected = (rows[name].values[short] for rows in (lanes, fused))
@@ -91,6 +100,37 @@ def test_points_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(tex
         assert runner.execution == "lanes"
     whole = rows_of(scene)
     assert_agree(whole, rows_of(with_execution(across, "fused")))
+    cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
+    assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
+
+
+@settings(max_examples=15, deadline=None)
+@given(text=oscillators("auto", YIELDING), damping=st.sampled_from((0.5, 5.0, 40.0)), data=st.data())
+def test_points_on_kelvin_voigt_stops_in_lanes_are_those_of_the_scalar_engine_however_they_are_cut(
+    text: str, damping: float, data: Any
+) -> None:
+    across = text + f'"stop[1].damping" = {{ values = [0.0, {damping}] }}\n'
+    scene = with_execution(across, "auto")
+    with open_scene(scene) as runner:
+        assert runner.execution == "lanes"
+    whole = rows_of(scene)
+    assert_agree(whole, rows_of(with_execution(across, "fused")))
+    cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
+    assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
+
+
+SERIES = 'time_series = { rate = 7.3, variables = ["displacement", "velocity", "contact_velocity[1]"] }'
+
+
+@settings(max_examples=20, deadline=None)
+@given(text=oscillators("auto", (*RIGID, *YIELDING)), data=st.data())
+def test_time_series_in_lanes_are_those_of_the_scalar_engine(text: str, data: Any) -> None:
+    sampled = text.replace("[record]", "[record]\n" + SERIES)
+    scene = with_execution(sampled + '"body.displacement_start" = { values = [0.0, 0.5] }\n', "auto")
+    with open_scene(scene) as runner:
+        assert runner.execution == "lanes"
+    whole = rows_of(scene)
+    assert_agree(whole, rows_of(with_execution(scene.text, "fused")))
     cuts = sorted(data.draw(st.sets(st.integers(1, run_count(scene.sweep) - 1), max_size=3)))
     assert_equal_bit_for_bit(whole, rows_of(scene, cuts))
 
@@ -181,4 +221,6 @@ def beam(kind: str, modes: int, path: str = "independent") -> str:
     ids=["chain", "modes", "coupled", "force", "uniform", "mode", "base", "beam", "path"],
 )
 def test_chains_and_beams_in_lanes_are_those_of_the_scalar_engine(text: str) -> None:
+    if "modes = 1" in text:
+        text = text.replace("[record]", "[record]\n" + SERIES)
     assert_agree(rows_of(with_execution(text, "auto")), rows_of(with_execution(text, "fused")))

@@ -7,7 +7,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.component_fmu import OscillatorFmu, forced, stop
-from support.lane_points import IMPACT, PERIOD, Columns, Results, drawn, follow_alone, oscillators, run, taken
+from support.lane_points import (
+    IMPACT,
+    PEAK,
+    PERIOD,
+    TURN,
+    Columns,
+    Results,
+    drawn,
+    drawn_yielding,
+    follow_alone,
+    oscillators,
+    run,
+    taken,
+)
 from support.tolerance import LONG_PHASE, ORBIT
 
 from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, instructions
@@ -25,6 +38,11 @@ MOST = 300
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
 """Phase and velocity of the impacts of P(1,1) of m = k = 1, zeta .1, F .5, w 1, r .7, stop 1: closed form."""
 
+YIELDING = [(1, False), (2, False), (2, True)]
+"""Numbers of contacts; whether the second stop is rigid, beside a Kelvin-Voigt stop."""
+IN_CONTACT = 1e-7
+"""Largest relative difference of a largest force: the rounding of the stop's position over the depth, times impacts."""
+
 HERE = [each for each in Instructions if each and instructions() >= each]
 
 
@@ -34,7 +52,7 @@ def differences(points: Columns, found: Results, place: int) -> float:
         begin = points["begin"][place] * (1.0 - 1e-12)
         rows, impacts, periods = found.rows[place], body.impacts, body.periods
         impacts, periods = impacts[impacts[:, 1] >= begin], periods[periods[:, 1] >= begin]
-        own = [rows[rows[:, 0] == kind] for kind in (IMPACT, PERIOD)]
+        own = [rows[(rows[:, 0] == kind) & ~np.isnan(rows[:, 4])] for kind in (IMPACT, PERIOD)]
         assert [len(each) for each in own] == [len(impacts), len(periods)]
         pairs = [(own[0], impacts), (own[1][:, 2:], periods[:, 2:])]
         pairs += [(found.columns["final_q"][:, place], body.displacement)]
@@ -65,6 +83,74 @@ def test_every_instruction_set_and_every_cut_gives_the_same_bits(modes: int, con
             np.array_equal(rows, whole.rows[place], equal_nan=True)
             for rows, place in zip(part.rows, places, strict=True)
         )
+
+
+@pytest.mark.parametrize(("contacts", "rigid"), YIELDING)
+def test_random_bodies_on_stops_that_yield_do_in_lanes_what_the_scalar_engine_makes_of_them(
+    contacts: int, *, rigid: bool
+) -> None:
+    points = drawn_yielding(60, contacts, seed=40 + contacts + rigid, rigid=rigid)
+    found = run(points, impact_limit=MOST)
+    places = np.flatnonzero(found.has_run)
+    assert len(places) >= 50
+    for place in places:
+        assert differences(points, found, int(place)) <= FLIGHTS
+        with follow_alone(points, int(place), impact_limit=MOST) as body:
+            begin, peaks = points["begin"][place] * (1.0 - 1e-12), body.peaks
+            peaks, own = peaks[peaks[:, 1] >= begin, 3], found.rows[place]
+            assert own[own[:, 0] == PEAK, 3] == pytest.approx(peaks, rel=IN_CONTACT)
+
+
+@pytest.mark.parametrize(("contacts", "rigid"), YIELDING)
+def test_stops_that_yield_have_the_same_bits_in_every_instruction_set_and_cut(
+    contacts: int, *, rigid: bool
+) -> None:
+    points = drawn_yielding(40, contacts, seed=50 + contacts + rigid, rigid=rigid)
+    whole = run(points, impact_limit=MOST)
+    for chosen in HERE:
+        assert run(points, impact_limit=MOST, instructions=chosen).same_as(whole)
+    assert run(points, impact_limit=MOST, most_seconds=0.0).same_as(whole)
+    backwards = np.arange(40)[::-1]
+    part = run(taken(points, backwards), impact_limit=MOST)
+    assert np.array_equal(part.columns["final_q"], whole.columns["final_q"][:, backwards], equal_nan=True)
+    for recorded in ({"extrema": False}, {"impacts": False}, {"rate": 7.3}):
+        other = run(points, impact_limit=MOST, **recorded)
+        assert np.array_equal(other.columns["final_q"], whole.columns["final_q"], equal_nan=True)
+
+
+def test_a_mass_rebounds_from_a_kelvin_voigt_stop_as_the_closed_form_says() -> None:
+    # equations.md 6.9: restitution and duration until the force is 0, for a mass on a soft spring
+    ratio, rate, soft = np.array([0.0, 0.1, 0.5, 0.9]), 1e3, 1e-12
+    points = oscillators(
+        4, 0, 1, decay=0.0, force=0.0, angular_frequency=1.0, stiffness=soft, position=1.0, restitution=0.0,
+        contact_stiffness=rate**2, contact_damping=2.0 * ratio * rate, start_q=0.0, start_p=2.0,
+    )  # fmt: skip
+    points["begin"] = np.zeros(4)
+    found = run(points)
+    impacts = np.array([rows[rows[:, 0] == IMPACT][0] for rows in found.rows])
+    turned = np.sqrt(1.0 - ratio**2)
+    assert impacts[:, 6] == pytest.approx(np.exp(-2.0 * ratio * np.arccos(ratio) / turned), abs=1e-11)
+    assert impacts[:, 7] == pytest.approx(2.0 * np.arccos(ratio) / (rate * turned), rel=1e-10)
+    assert impacts[:, 4] == pytest.approx(2.0 * (1.0 + impacts[:, 6]), rel=1e-10)
+    assert impacts[:, 3] == pytest.approx(2.0, rel=1e-11)
+
+
+def test_a_contact_that_is_open_at_the_end_has_an_impact_without_an_end() -> None:
+    points = oscillators(
+        8, 0, 1, decay=0.05, force=0.0, held=2.0, angular_frequency=TURN / 10.0, position=1.0, restitution=0.0,
+        contact_stiffness=9.0, contact_damping=0.5, start_q=np.linspace(0.0, 0.4, 8), start_p=0.0,
+    )  # fmt: skip
+    points["begin"] = np.zeros(8)
+    found = run(points)
+    assert found.has_run.all()
+    for place, rows in enumerate(found.rows):
+        with follow_alone(points, place) as body:
+            assert body.statuses == ("yielding",)
+            ended = body.impacts
+        last = rows[rows[:, 0] == IMPACT][-1]
+        assert len(ended) + 1 == np.count_nonzero(rows[:, 0] == IMPACT)
+        assert np.isfinite(last[[1, 2, 3]]).all()
+        assert np.isnan(last[[4, 6, 7]]).all()
 
 
 @pytest.mark.parametrize(("modes", "contacts"), SIZES)
@@ -111,6 +197,28 @@ def test_the_first_impacts_between_many_stops_are_those_of_the_scalar_engine(
         assert len(first) == min(len(own), FIRST)
         assert own[:FIRST, 5].tolist() == first[:, 5].tolist()
         assert np.abs(own[:FIRST, [1, 3]] - first[:, [1, 3]]).max(initial=0.0) <= NEAR
+
+
+@pytest.mark.parametrize("yields", [False, True])
+def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(*, yields: bool) -> None:
+    rate = 7.3
+    points = drawn_yielding(24, 2, seed=60) if yields else drawn(24, 1, 2, seed=60)
+    points["begin"] = np.maximum(points["begin"], 1e-3)
+    plain = run(points, impact_limit=MOST)
+    found = run(points, impact_limit=MOST, rate=rate)
+    assert all(one.tobytes() == other.tobytes() for one, other in zip(found.rows, plain.rows, strict=True))
+    for place in np.flatnonzero(found.has_run & (found.columns["outcome"] == 0)):
+        begin, end = float(points["begin"][place]), float(points["end"][place])
+        count = math.floor((end - begin) * rate * (1.0 + 1e-12)) + 1
+        assert found.columns["samples_of"][place] == count
+        with follow_alone({**points, "end": points["begin"]}, int(place)) as body:
+            for n in range(count):
+                further = min(begin + n / rate, end) - body.time
+                if further > 0.0:
+                    body.advance(further, held=points["held"][:, place])
+                q, p = found.columns["samples"][:, place, n]
+                assert abs(q - body.displacement[0]) <= FLIGHTS
+                assert abs(p - body.velocity[0]) <= 100.0 * FLIGHTS
 
 
 def test_rows_that_find_no_room_are_asked_for() -> None:

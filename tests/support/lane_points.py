@@ -27,9 +27,12 @@ from vibroimpact.fmus.core.runs import address
 Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 TURN = 2.0 * math.pi
-IMPACT, PERIOD = 1.0, 3.0
+IMPACT, PERIOD, PEAK = 1.0, 3.0, 4.0
 OF_MODES = ("stiffness", "decay", "force", "held", "observed", "start_q", "start_p")
-OF_CONTACTS = ("position", "direction", "restitution", "yield_velocity")
+OF_CONTACTS = (
+    *("position", "direction", "restitution", "yield_velocity"),
+    *("contact_stiffness", "contact_damping"),
+)
 
 
 @dataclass
@@ -70,6 +73,7 @@ def run(
     periods: bool = True,
     each_period: bool = True,
     impact_limit: int = 0,
+    rate: float = 0.0,
     instructions: Instructions = Instructions.best,
     room: int = 4096,
     most_seconds: float = 1e9,
@@ -80,7 +84,7 @@ def run(
     ----------
     points : dict of str to ndarray
         Arrays of `LanesPoints.GIVEN`, the last axis over the points.
-    impacts, extrema, periods, each_period, impact_limit, instructions
+    impacts, extrema, periods, each_period, impact_limit, rate, instructions
         Fields of the plan.
     room : int
         Number of rows that fit into one call.
@@ -101,12 +105,20 @@ def run(
         **{name: np.full((modes, count), np.nan) for name in ("final_q", "final_p")},
     }
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
-    plan = LanesPlan(modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit)
+    yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
+    plan = LanesPlan(
+        modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields, rate
+    )
     most = _most_periods(points) if each_period else 1
     table = np.full((PERIOD_WIDTH, count, most), np.nan)
     state = LanesPoints(
         count=count, begun_below=count, most_periods=most, rows_room=room, most_seconds=most_seconds
     )
+    if rate:
+        longest = np.nanmax(points["end"] - points["begin"], initial=0.0)
+        results["samples_of"] = np.zeros(count, np.int64)
+        results["samples"] = np.full((2, count, math.floor(longest * rate) + 2), np.nan)
+        state.most_samples = results["samples"].shape[2]
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
     for name, array in (given | results | block | {"periods": table}).items():
         setattr(state, name, address(array))
@@ -122,7 +134,7 @@ def run(
     ran = results["state"] == PointState.has_run
     found = impacts_by_point(list(zip(rows, owners, strict=True)), results["rows_of"])
     own = [
-        np.concatenate([_written(IMPACT, impacts[:, :-1]), _written(PERIOD, periods)])
+        np.concatenate([_written(IMPACT, impacts[:, :-1]), _written(PERIOD, periods), _peaks(impacts)])
         for impacts, periods in zip(
             np.split(found, np.cumsum(results["rows_of"])[:-1]),
             (table[:, point, : results["periods_of"][point]].T for point in range(count)),
@@ -142,6 +154,12 @@ def _written(kind: float, values: Array) -> Array:
     """Return rows of a kind as a body writes them; a period has no time."""
     columns = values if kind == IMPACT else np.insert(values, 0, 0.0, axis=1)
     return np.pad(np.insert(columns, 0, kind, axis=1), ((0, 0), (0, 8 - columns.shape[1] - 1)))
+
+
+def _peaks(impacts: Array) -> Array:
+    """Return the rows of the largest forces of ended contacts, as a body writes them."""
+    ended = impacts[~np.isnan(impacts[:, -1])]
+    return np.pad(np.insert(ended[:, [0, 4, 7]], 0, PEAK, axis=1), ((0, 0), (0, 4)))
 
 
 def taken(points: Columns, places: NDArray[np.int64]) -> Columns:
@@ -191,12 +209,33 @@ def drawn(
         "direction": np.sign(position),
         "restitution": random.uniform(0.3, 1.0, (contacts, count)),
         "yield_velocity": random.choice([0.0, 0.0, 0.4], (contacts, count)),
+        "contact_stiffness": np.zeros((contacts, count)),
+        "contact_damping": np.zeros((contacts, count)),
         "start_q": random.uniform(-0.05, 0.05, (modes, count)),
         "start_p": random.uniform(-0.5, 0.5, (modes, count)),
         "begin": first * (TURN / frequency) - lag,
         "end": (first + recorded) * (TURN / frequency) - lag,
         "first": np.ones(count, np.uint8),
     }
+
+
+def drawn_yielding(
+    count: int, contacts: int, seed: int, *, rigid: bool = False, recorded: int = 4
+) -> Columns:
+    """Draw points of one mode with Kelvin-Voigt stops.
+
+    Stiffnesses are 0.3 to 1e8 times the body's, dampings up to twice critical. A fifth of the stops have no damping.
+    With `rigid`, the second stop stays rigid.
+    """
+    random = np.random.default_rng(seed)
+    points = drawn(count, 1, contacts, seed, recorded=recorded)
+    soft = contacts - rigid
+    mobility = (points["shape"] * points["impulse"])[:soft, 0]
+    rate = points["stiffness"] * 10.0 ** random.uniform(-0.5, 8.0, (soft, count))
+    ratio = random.choice([0.0, 0.02, 0.1, 0.5, 1.0, 2.0], (soft, count), p=[0.2, 0.2, 0.2, 0.2, 0.1, 0.1])
+    points["contact_stiffness"][:soft] = rate / mobility
+    points["contact_damping"][:soft] = 2.0 * ratio * np.sqrt(rate) / mobility
+    return points
 
 
 def oscillators(count: int, transient: int, recorded: int, **values: object) -> Columns:
@@ -222,6 +261,9 @@ def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Struc
             restitution=float(p["restitution"][k]),
             yield_velocity=float(p["yield_velocity"][k]),
             impulse=p["impulse"][k],
+            law="kelvin_voigt" if p["contact_stiffness"][k] > 0.0 else "restitution",
+            stiffness=float(p["contact_stiffness"][k]),
+            damping=float(p["contact_damping"][k]),
         )
         for k in range(len(p["position"]))
     ]

@@ -12,6 +12,7 @@ from vibroimpact.fmus.core import lanes as core
 from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.laws import LAWS
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,8 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         ),
         "restitution": each("restitution", none),
         "yield_velocity": each("yield_velocity", none),
+        "contact_stiffness": each("stiffness", none),
+        "contact_damping": each("damping", none),
         "begin": points.begin,
         "end": points.end,
     }
@@ -65,5 +68,7 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         each_period=record.each_period,
         instructions=core.instructions(),
         impact_limit=scene.execution.impact_limit,
+        yielding=sum(2**number for number, stop in enumerate(stops) if not LAWS[stop.law].is_rigid),
+        rate=scene.sampling_rate,
     )
     return LanePoints(plan, modal, {name: np.ascontiguousarray(values) for name, values in given.items()})

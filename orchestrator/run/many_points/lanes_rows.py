@@ -15,6 +15,7 @@ from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of,
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.core.runs import address
 from vibroimpact.orchestrator.run.many_points.lanes import lane_points
+from vibroimpact.orchestrator.run.many_points.lanes_samples import LaneSamples, fits
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
 from vibroimpact.orchestrator.run.many_points.loop_rows import (
     LISTEN_SECONDS,
@@ -81,9 +82,9 @@ def run_in_lanes(
     points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
-    if prepared is not None:
+    if prepared is not None and fits(prepared.begin, prepared.end, loop.scene.sampling_rate):
         return _LaneRun(loop, points, prepared, alone).run(deadline)
-    if len(points) == 1:
+    if prepared is None and len(points) == 1:
         given = points.starts.get(0)
         record = alone(0, given)
         return columns_of([record]), next_start(record, given) if loop.chained else None
@@ -101,7 +102,7 @@ def run_prepared_in_lanes(
 def _run_halves(
     loop: PointLoop, points: LaneValues, deadline: float, alone: Alone
 ) -> tuple[RunColumns, State | None]:
-    """Run points of mixed kinds, or with invalid parameters, by splitting them in halves."""
+    """Run points of mixed kinds, with invalid parameters or with many samples, by splitting them in halves."""
     half = len(points) // 2
     columns, carried = run_in_lanes(loop, points.piece(0, half, points.starts.get(0)), deadline, alone)
     if len(columns) < half or time.perf_counter() > deadline:
@@ -138,11 +139,16 @@ class _LaneRun:
             "periods": self._periods, "periods_of": self._periods_of,
             "first": self._first.astype(np.uint8), "rows_of": self._rows_of,
         }  # fmt: skip
+        self._samples: LaneSamples | None = None
+        if self._plan.rate > 0.0:
+            self._samples = LaneSamples(loop.scene.sampled, self._plan.rate, self._given)
+            results |= {"samples": self._samples.values, "samples_of": self._samples.count}
         self._kept = {**self._given, **results}  # keeps the arrays alive while C uses them
         self._c = core.LanesPoints(
             count=count,
             begun_below=count,
             most_periods=self._periods.shape[2],
+            most_samples=0 if self._samples is None else self._samples.values.shape[2],
             rows_room=ROWS_ROOM,
             most_seconds=LISTEN_SECONDS,
         )
@@ -215,14 +221,18 @@ class _LaneRun:
             self._values.begins_as_scene if self._loop.chained else np.ones(len(self._state), dtype=np.bool_)
         )
         given = {
-            int(place): self._given_state(place) for place in left if self._values.starts or not own[place]
+            int(place): self._given_state(place)
+            for place in left
+            if self._samples is not None or self._values.starts or not own[place]
         }
         by_itself = [
             place
             for place, state in given.items()
-            if self._is_structure or (state is None and not own[place])
+            if self._samples is not None or self._is_structure or (state is None and not own[place])
         ]
         for place in by_itself:
+            if self._samples is not None and not self._loop.chained and time.perf_counter() > deadline:
+                return
             self._answer(np.array([place]), columns_of([self._alone(place, given[place])]))
         rest = left[~np.isin(left, by_itself)]
         if rest.size:
@@ -325,6 +335,7 @@ class _LaneRun:
             periods=self._periods_at(run) if points.periods else None,
             impacts=self._impacts_at(run) if record.impacts else None,
             sticks=no_sticks if record.impacts else None,
+            samples=None if self._samples is None else self._samples.rows(run),
         )
 
     def _period_table(self) -> Floats:

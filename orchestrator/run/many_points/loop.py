@@ -78,7 +78,7 @@ def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop 
     deadline, chained = scene.execution.deadline, any(axis.continuation for axis in scene.sweep)
     if (
         not isinstance(driver, BodyDriver)
-        or scene.record.time_series is not None
+        or (scene.record.time_series is not None and not by_lanes)
         or scene.is_measured
         or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)

@@ -10,7 +10,12 @@ typedef struct {
 } vi_lane_cell;
 
 /* Result of a careful search. */
-typedef enum { VI_CELL_CLEAR, VI_CELL_HIT, VI_CELL_UNDECIDED } vi_cell_result;
+typedef enum {
+    VI_CELL_CLEAR,
+    VI_CELL_HIT,
+    VI_CELL_UNDECIDED,
+    VI_CELL_ACTED /* the body has acted on an event of its own */
+} vi_cell_result;
 
 /* Displacement and its slope over the share, at a share of the cell. */
 void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacement, double *slope);

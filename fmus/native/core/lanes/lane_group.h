@@ -42,6 +42,26 @@ typedef struct {
     vi_lane_array span;                       /* VI_CELLS cells, s */
 } vi_one_mode;
 
+/* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */
+typedef struct {
+    vi_one_mode pressed[VI_ONE_MODE_CONTACTS];   /* tables of the depth while the stop is pressed */
+    /* depth + lag * rate after whole cells: it has the sign of the force. The same of q, free, beyond the stop */
+    vi_lane_array pressed_end[VI_ONE_MODE_CONTACTS][VI_CELLS + 1][VI_PARTS];
+    vi_lane_array receding_end[VI_ONE_MODE_CONTACTS][VI_CELLS + 1][VI_PARTS];
+    vi_lane_array cell[VI_ONE_MODE_CONTACTS + 1], cell_rate[VI_ONE_MODE_CONTACTS + 1]; /* free; on each stop, s and 1/s */
+    vi_lane_array lag[VI_ONE_MODE_CONTACTS];     /* damping / stiffness of the stop, s */
+    vi_lane_array yields[VI_ONE_MODE_CONTACTS];  /* 1: the stop yields */
+    vi_lane_array force[VI_ONE_MODE_CONTACTS];   /* of the stop for depth + lag * rate = 1, N */
+    vi_lane_array pressed_stop;               /* number of the stop that is pressed, from 1; 0: none */
+    vi_lane_array receding;                   /* number of the stop beyond whose rest position the body flies; 0: none */
+    vi_lane_array start_pressed;              /* pressed_stop in the last round */
+    vi_lane_array cells_pressed, most_pressed; /* cells since the touch-down; number above which the point is left */
+    vi_lane_array depth;                      /* at the separation of the last round */
+    /* the touch-down of the present contact, if it is recorded (open = 1): instant, time, phases, speed of approach */
+    vi_lane_array open, touch_periods, touch_rest, touch_rest_low, touch_time, touch_phase;
+    vi_lane_array touch_cosine, touch_sine, touch_approach;
+} vi_yielding;
+
 /* Lengths of cells for bodies of several modes: each level has a quarter of the length of the one before. */
 enum { VI_LEVELS = 5, VI_LEVEL_RATIO = 4, VI_POINTS = VI_LANES_CONTACTS + 1 };
 
@@ -100,6 +120,14 @@ typedef struct {
     vi_lane_array doubtful;                   /* 1: `most` and `least` lack the last round, see `extremes` of the body */
 } vi_lane_record;
 
+/* The time series of the lanes, for bodies of one mode. */
+typedef struct {
+    vi_lane_array next, count;                /* number of the next sample, from 0; of all samples of the point */
+    vi_lane_array time;                       /* of the next sample, s */
+    /* state and instant from which the next samples are taken: the start of the last round */
+    vi_lane_array from_q, from_p, from_cosine, from_sine, from_periods, from_rest, from_rest_low, from_pressed;
+} vi_lane_samples;
+
 typedef struct {
     /* the body */
     vi_lane_array cell, cell_rate;            /* shortest cell, s; its reciprocal, 1/s */
@@ -121,7 +149,9 @@ typedef struct {
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_lane_record record;
+    vi_lane_samples samples;
     vi_one_mode one;
+    vi_yielding yielding;
     vi_many_modes many;
 } vi_lane_group;
 

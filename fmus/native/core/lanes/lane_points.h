@@ -7,8 +7,11 @@
 /* Most modes and contacts of a body, and most contacts of a body of one mode. */
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
-/* Columns of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution. Then
- * duration (s) and largest force (N), 0 and NaN at a rigid stop. */
+/* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
+ * duration (s), largest force (N).
+ *
+ * The largest force is NaN at a rigid stop. A contact that is open at the end of its run has NaN for its
+ * impulse, restitution, duration and largest force. */
 enum { VI_IMPACT_WIDTH = 8 };
 /* Columns of a period, over its points: largest and smallest displacement (m), displacement (m) and velocity (m/s) at
  * its start, number of impacts. */
@@ -29,11 +32,13 @@ enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_A
 /* Common parameters of all points. */
 typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
-    int32_t contacts; /* 0 to VI_LANES_CONTACTS, of one mode to VI_ONE_MODE_CONTACTS; each a rigid stop */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS, of one mode to VI_ONE_MODE_CONTACTS */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */
+    int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
+    double rate;          /* samples per s of the time series, of one mode; 0: none */
 } vi_lanes_plan;
 
 /* The points. Arrays are [point], [mode][point], [contact][point] or [contact][mode][point], in SI units.
@@ -50,6 +55,7 @@ typedef struct {
     const double *observed;                         /* [mode][point] shape of the observed point */
     const double *position, *direction;             /* [contact][point] of the stop, m; +1: above the motion, -1: below */
     const double *restitution, *yield_velocity;     /* [contact][point] as in contact_law.h */
+    const double *contact_stiffness, *contact_damping; /* [contact][point] of a stop that yields: N/m, N s/m */
     const double *start_q, *start_p;                /* [mode][point]; of the points that begin a branch */
     const double *begin, *end;                      /* of the recording, s */
     /* Is the point the first of a branch? Independent points all are, and so is point 0. A later point starts at time 0
@@ -65,6 +71,11 @@ typedef struct {
     double *periods;             /* [VI_PERIOD_WIDTH][point][most_periods] */
     int64_t *periods_of;         /* number of ended periods of each point; 0 again once it is left */
     int64_t most_periods;
+    /* Samples of each point from `begin` on, as far as it has run: q and q' of its mode. A point with more than
+     * most_samples is left. */
+    double *samples;             /* [2][point][most_samples] */
+    int64_t *samples_of;         /* number of samples of each point; 0 again once it is left */
+    int64_t most_samples;
     int64_t *rows_of;            /* number of impacts of each point; 0 again once it is left */
     /* Impacts of one point are in the order of time, mixed with impacts of others. */
     double *rows;                /* [rows_room][VI_IMPACT_WIDTH] */

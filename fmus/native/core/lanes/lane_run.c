@@ -7,6 +7,8 @@
 #include "contact/contact_law.h"
 #include "door/runs.h"
 #include "lanes/lane_record.h"
+#include "lanes/sampling.h"
+#include "lanes/yielding.h"
 #include "motion/majorant.h"
 
 /* Least stiffness and, its reciprocal, largest stiffness and decay: squares of rates and of cells stay in range. */
@@ -50,6 +52,9 @@ static void leave(vi_lanes_work *w, int lane)
     const int64_t point = w->run[lane].point;
     w->points->state[point] = VI_POINT_IS_LEFT;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
+    if (w->plan->rate > 0.0) {
+        w->points->samples_of[point] = 0;
+    }
     w->points->finished += 1;
     w->run[lane].point = -1;
 }
@@ -70,6 +75,7 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
         const int64_t place = (VI_OF_IMPACTS * points->count + point) * points->most_periods;
         points->periods[place] /= (double)points->periods_of[point];
     }
+    vi_yielding_write_open(w->group, points, lane);
     points->outcome[point] = (int8_t)outcome;
     points->reached[point] = reached;
     points->displacement[point] = w->group->record.scale[lane] * displacement;
@@ -113,6 +119,10 @@ static void arrive(vi_lanes_work *w, int lane)
         vi_lane_begin_period(g, lane, displacement, velocity);
         if (w->plan->periods && g->rest[lane] == 0.0) {
             turn_period(w, lane, displacement, velocity);
+        }
+        if (w->plan->rate > 0.0 && !vi_lane_begin_samples(g, w->plan, w->points, lane)) {
+            leave(w, lane);
+            return;
         }
     }
     if (vi_clock_elapsed(&run->clock, instant_of(g, lane), run->end) > 0.0) {
@@ -162,18 +172,21 @@ static int search(const vi_lanes_work *w, int lane)
     const vi_instant now = instant_of(g, lane);
     const vi_instant goal = {(int64_t)g->goal_periods[lane], g->goal_rest[lane], g->goal_rest_low[lane]};
     const double length = vi_clock_elapsed(clock, now, goal) * g->cell_rate[lane];
-    double share = vi_max(0.0, vi_min(length, 1.0));
+    double share = vi_max(0.0, vi_min(length, 1.0)), cell = g->cell[lane];
     vi_lane_meeting met;
     const vi_cell_result result = w->body->search(g, lane, w->plan->modes, w->plan->contacts, &share, &met);
     if (result == VI_CELL_UNDECIDED) {
         return VI_EVENT_LEAVE;
     }
-    g->on[lane] = 0.0;
+    g->on[lane] = result == VI_CELL_ACTED ? g->on[lane] : 0.0;
     if (result == VI_CELL_CLEAR && length <= 1.0) {
         put_instant(g, lane, goal);
         return VI_EVENT_GOAL;
     }
-    put_instant(g, lane, vi_clock_after(clock, now, share * g->cell[lane]));
+    put_instant(g, lane, vi_clock_after(clock, now, share * cell));
+    if (result == VI_CELL_ACTED) {
+        return vi_yielding_record(g, w->points, lane);
+    }
     return result == VI_CELL_HIT ? bounce(w, lane, &met) : VI_EVENT_NONE;
 }
 
@@ -188,7 +201,13 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
         w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
     }
     if (event == VI_EVENT_CELL) {
+        if (w->plan->rate > 0.0) {
+            vi_lane_sample_from(g, lane);
+        }
         event = search(w, lane);
+        if (event != VI_EVENT_LEAVE && w->plan->rate > 0.0) {
+            vi_lane_take_samples(g, w->plan, w->points, lane);
+        }
         if (event != VI_EVENT_LEAVE && g->record.extremes[lane] > 0.0) {
             w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
         }
@@ -212,7 +231,7 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
     }
     vi_lane_group *g = w->group;
     w->run[lane].point = -1;
-    g->cell_rate[lane] = g->period[lane] = g->many.present.rate[lane] = 1.0;
+    g->cell_rate[lane] = g->period[lane] = g->many.present.rate[lane] = g->yielding.cell_rate[0][lane] = 1.0;
     g->goal_periods[lane] = 1e300;
     g->most_impacts[lane] = HUGE_VAL;
     for (int c = 0; c < VI_LANES_CONTACTS; ++c) {
@@ -302,8 +321,12 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     vi_lane_run *run = &w->run[lane];
     double q[VI_LANES_MODES], p[VI_LANES_MODES];
     run->point = point;
+    w->group->samples.next[lane] = w->group->samples.count[lane] = 0.0;
     run->recording = run->goal_is_period = run->period_open = false;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
+    if (w->plan->rate > 0.0) {
+        w->points->samples_of[point] = 0;
+    }
     g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
     g->hit_cells[lane] = -1.0;
     g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;

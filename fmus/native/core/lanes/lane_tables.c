@@ -1,5 +1,7 @@
 #include "lanes/lane_tables.h"
 
+#include <math.h>
+
 /* State (q, p, cosine, sine) after some cells, as rows over (q, p, cosine, sine, 1). */
 typedef struct {
     double q[VI_PARTS], p[VI_PARTS];
@@ -59,17 +61,17 @@ static step joined(const step *a, const step *b)
     return both;
 }
 
-static void store(vi_lane_group *group, int lane, int cells, const step *s)
+static void store(vi_one_mode *tables, int lane, int cells, const step *s)
 {
     for (int part = 0; part < VI_PARTS; ++part) {
-        group->one.end_q[cells][part][lane] = s->q[part];
-        group->one.end_p[cells][part][lane] = s->p[part];
+        tables->end_q[cells][part][lane] = s->q[part];
+        tables->end_p[cells][part][lane] = s->p[part];
     }
-    group->one.turn_cosine[cells][lane] = s->cosine;
-    group->one.turn_sine[cells][lane] = s->sine;
+    tables->turn_cosine[cells][lane] = s->cosine;
+    tables->turn_sine[cells][lane] = s->sine;
 }
 
-void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, double cell)
+void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell)
 {
     step after[VI_CELLS + 1];
     after[0] = (step){.q = {[VI_OF_Q] = 1.0}, .p = {[VI_OF_P] = 1.0}, .cosine = 1.0, .sine = 0.0};
@@ -79,7 +81,7 @@ void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, do
         for (int n = VI_LANE_ORDER; n >= 0; --n) { /* smallest terms first */
             q += term[n];
             slope += n * term[n];
-            group->one.taylor[n][part][lane] = term[n];
+            tables->taylor[n][part][lane] = term[n];
         }
         after[1].q[part] = q;
         after[1].p[part] = slope / cell;
@@ -89,6 +91,11 @@ void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, do
         after[i] = joined(&after[i - i / 2], &after[i / 2]); /* fewest roundings */
     }
     for (int i = 0; i <= VI_CELLS; ++i) {
-        store(group, lane, i, &after[i]);
+        store(tables, lane, i, &after[i]);
     }
+    tables->span[lane] = (double)VI_CELLS * cell;
+    tables->stiffness[lane] = mode->stiffness;
+    tables->load[lane] = fabs(mode->force) + fabs(mode->held);
+    tables->drag[lane] = 2.0 * mode->decay;
+    tables->root_rate[lane] = 2.0 * mode->decay + sqrt(mode->stiffness);
 }

@@ -9,7 +9,7 @@ typedef struct {
     double stiffness, decay, force, held, angular_frequency;
 } vi_lane_mode;
 
-/* Fill the tables of one lane for cells of this length, s; the length must be short against every rate. */
-void vi_lane_tables(vi_lane_group *group, int lane, const vi_lane_mode *mode, double cell);
+/* Fill the tables of one lane for cells of this length, s, and its bounds; the length must be short against every rate. */
+void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell);
 
 #endif

@@ -1,15 +1,18 @@
 #include "lanes/lanes.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "door/seconds.h"
 #include "lanes/instructions.h"
 #include "lanes/lane_run.h"
+#include "lanes/yielding.h"
 
 /* Rounds of attending the lanes between two readings of the clock. */
 enum { ROUNDS_BETWEEN_READINGS = 64 };
-/* Most rows written between two checks of their room: by the rounds, and when all lanes are attended once. */
-enum { MOST_ROWS = (VI_MOST_ROUNDS + 1) * VI_LANES };
+/* Most rows written between two checks of their room: by the rounds, and when all lanes are attended once. A run that
+ * ends may write its open contact too. */
+enum { MOST_ROWS = (VI_MOST_ROUNDS + 2) * VI_LANES };
 
 /* State that is kept between two calls. */
 typedef struct {
@@ -30,6 +33,8 @@ static bool is_plan(const vi_lanes_plan *plan)
 {
     const int most = plan->modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS;
     return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= most
+           && plan->yielding >= 0 && plan->yielding < (plan->modes == 1 ? 1 << plan->contacts : 1)
+           && (plan->rate == 0.0 || (plan->modes == 1 && plan->rate > 0.0 && isfinite(plan->rate)))
            && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 
@@ -92,6 +97,14 @@ static void begin(vi_lanes_work *work, kept_state *memory)
     }
 }
 
+static const vi_lane_body *body_of(const vi_lanes_plan *plan)
+{
+    if (plan->yielding) {
+        return &vi_lane_yielding;
+    }
+    return plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes;
+}
+
 VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, void *memory)
 {
     if (!is_plan(plan) || points->rows_room < VI_LANES_LEAST_ROOM) {
@@ -100,7 +113,7 @@ VI_DOOR int vi_door_lanes(const vi_lanes_plan *plan, vi_lanes_points *points, vo
     const double call = vi_seconds_now();
     const vi_lanes_rounds rounds = vi_lanes_rounds_of(plan->instructions);
     kept_state *now = aligned(memory);
-    vi_lanes_work work = {plan, plan->modes == 1 ? &vi_lane_one_mode : &vi_lane_many_modes, points, &now->group, now->run, 0};
+    vi_lanes_work work = {plan, body_of(plan), points, &now->group, now->run, 0};
     begin(&work, now);
     for (int rounds_done = 0;; ++rounds_done) {
         if (points->rows_room - points->rows_used < MOST_ROWS) {

@@ -239,16 +239,11 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     if (!isfinite(mode.force) || !isfinite(mode.held) || !(cell > 0.0) || !(period <= VI_MOST_CELLS * cell)) {
         return false;
     }
-    vi_lane_tables(g, lane, &mode, cell);
+    vi_lane_tables(one, lane, &mode, cell);
     g->cell[lane] = cell;
     g->cell_rate[lane] = 1.0 / cell;
     g->q[0][lane] = q[0];
     g->p[0][lane] = p[0];
-    one->span[lane] = (double)VI_CELLS * cell;
-    one->stiffness[lane] = mode.stiffness;
-    one->load[lane] = fabs(mode.force) + fabs(mode.held);
-    one->drag[lane] = drag;
-    one->root_rate[lane] = drag + natural;
     g->record.scale[lane] = points->observed[point];
     const double steady = LARGEST_STEADY * one->load[lane] / (fastest * fastest);
     return take_contacts(g, lane, plan->contacts, points, point, steady);

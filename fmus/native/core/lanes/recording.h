@@ -1,5 +1,8 @@
 /* Rows of a vector of lanes: impacts and periods. For any width of vectors, so that lockstep and single lanes write the
  * same bits. */
+#ifndef VIBROIMPACT_LANE_RECORDING_H
+#define VIBROIMPACT_LANE_RECORDING_H
+
 #include <string.h>
 
 #include "lanes/lane_group.h"
@@ -123,3 +126,5 @@ LANES_INLINE void begin_periods(vi_lane_group *g, int at, mask turns, vector dis
     store(r->strobe_velocity + at, choose(turns, velocity, load(r->strobe_velocity + at)));
     store(r->impacts_before + at, choose(turns, load(g->impacts + at), load(r->impacts_before + at)));
 }
+
+#endif

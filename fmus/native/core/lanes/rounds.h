@@ -1,5 +1,6 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
 #include "lanes/extremes.h"
+#include "lanes/rounds_samples.h"
 
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
@@ -349,6 +350,9 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
                             bool follows)
 {
     flight f = begin_round(g, at);
+    if (plan->rate > 0.0) {
+        sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
+    }
     extremes e = {0};
     vector term[VI_LANE_ORDER + 1];
     if (follows) {
@@ -379,6 +383,9 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     store(g->impacts + at, impacts);
     store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
     move_clock(g, at, f.jumped + cell.passed, share, arrives);
+    if (plan->rate > 0.0) {
+        take_samples(g, plan, points, at);
+    }
     const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {
         write_impacts(g, points, at, contacts, written);

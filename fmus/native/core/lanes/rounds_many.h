@@ -2,6 +2,7 @@
  * Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
 #include "lanes/many_extremes.h"
 #include "lanes/many_tables.h"
+#include "lanes/rounds_yielding.h"
 
 /* Result of a search for the lanes. */
 typedef struct {
@@ -186,10 +187,15 @@ LANES_INLINE void run_rounds_many(vi_lane_group *g, const vi_lanes_plan *plan, v
 
 void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points)
 {
+    /* a body without a contact has tables of an idle lane there: nothing meets it */
     if (plan->modes > 1) {
         run_rounds_many(g, plan, points);
+    } else if (plan->yielding && plan->contacts < 2) {
+        run_phase_rounds(g, plan, points, 1);
+    } else if (plan->yielding) {
+        run_phase_rounds(g, plan, points, 2);
     } else if (plan->contacts < 2) {
-        run_rounds(g, plan, points, 1); /* without a contact the tables are those of an idle lane: nothing meets it */
+        run_rounds(g, plan, points, 1);
     } else {
         run_rounds(g, plan, points, 2);
     }

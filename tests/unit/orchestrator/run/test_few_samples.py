@@ -61,7 +61,7 @@ def test_an_impact_on_a_rigid_stop_has_no_largest_force() -> None:
 def test_the_loop_over_points_has_the_largest_forces_of_single_runs() -> None:
     positions = [0.3, 0.35, 0.4, 0.45]
     sweep = {"sweep": {"stop[1].position": {"values": positions}}}
-    together = vi.run(SCENE | sweep, progress=False)
+    together = vi.run(SCENE | sweep | {"execution": {"how": "fused"}}, progress=False)
     for place, position in enumerate(positions):
         stop = SCENE["stop"][0] | {"position": position}
         alone = vi.run(SCENE | {"stop": [stop]}, progress=False)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+import vibroimpact as vi
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
+from vibroimpact.orchestrator.run.many_points import lanes_samples
 from vibroimpact.orchestrator.scene import parse_scene
 
 OSCILLATOR = "[body]\nmass = 1.0\nstiffness = 1.0\n"
@@ -22,6 +24,9 @@ def scene(body: str = OSCILLATOR, *, stop: str = STOP, record: str = RECORD, res
     return body + FORCING.format(amplitude=amplitude) + stop + record + rest
 
 
+SERIES = "time_series = { rate = 10 }\n"
+OF_FORCE = 'time_series = { rate = 10, variables = ["contact_force", "contact_velocity[1]"] }\n'
+VOIGT = '[[stop]]\nposition = 1.0\nlaw = "kelvin_voigt"\nstiffness = 10.0\n'
 TWO = STOP + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.5\n'
 ALONG = [
     f'[[stop]]\nposition = {sign}1.0\nside = "{side}"\nlocation = {place}\nrestitution = 0.5\n'
@@ -52,13 +57,26 @@ FOUR = TWO + TWO.replace("restitution", "mass = 1\nrestitution")
         (scene(BEAM.format(modes=2) + 'impact_projection = "collocation"\n'), False),
         (scene(BEAM.format(modes=2), rest=SWEEP + '"body.modes" = { values = [1, 2] }\n'), False),
         (scene(stop='[[stop]]\nposition = 1.0\nlaw = "hertz"\nstiffness = 10.0\n'), False),
+        (scene(stop=VOIGT), True),
+        (scene(CHAIN + "modes = 1\n", stop=VOIGT), True),
+        (scene(CHAIN, stop=VOIGT), False),
+        (scene(BEAM.format(modes=1), stop=VOIGT), True),
+        (scene(stop=TWO.replace(STOP, VOIGT)), True),
+        (scene(stop=VOIGT + "relaxation_time = 0.1\n"), False),
+        (scene(stop=VOIGT, rest=SWEEP + '"stop[1].relaxation_time" = { values = [0.0, 0.1] }\n'), False),
         (scene(rest='[execution]\nhow = "fused"\n' + SWEEP), False),
         (scene(rest="[execution]\ndeadline = 1.0\n" + SWEEP), False),
-        (scene(record=RECORD + "time_series = { rate = 10 }\n"), False),
+        (scene(record=RECORD + SERIES), True),
+        (scene(BEAM.format(modes=1), record=RECORD + SERIES), True),
+        (scene(BEAM.format(modes=2), record=RECORD + SERIES), False),
+        (scene(stop=VOIGT, record=RECORD + SERIES), True),
+        (scene(record=RECORD + OF_FORCE), True),
+        (scene(stop=VOIGT, record=RECORD + OF_FORCE), False),
+        (scene(record=RECORD + 'time_series = { rate = 10, variables = ["acceleration"] }\n'), False),
         (scene(OSCILLATOR + "frequency_slope = 0.1\n"), False),
     ],
 )
-def test_lanes_take_few_modes_between_rigid_stops_that_can_run_beside_each_other(
+def test_lanes_take_few_modes_between_rigid_stops_or_one_on_stops_that_yield(
     text: str, *, expected: bool
 ) -> None:
     assert goes_by_lanes(parse_scene(text, "scene.toml")) is expected
@@ -67,3 +85,14 @@ def test_lanes_take_few_modes_between_rigid_stops_that_can_run_beside_each_other
 def test_the_choice_does_not_depend_on_the_number_of_points() -> None:
     for values in ("[1.0]", "[1.0, 2.0, 3.0]"):
         assert goes_by_lanes(parse_scene(scene(rest=SWEEP.replace("[1.0, 2.0]", values)), "scene.toml"))
+
+
+def test_points_with_many_samples_run_by_several_calls_with_the_same_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    text = scene(record=RECORD + SERIES, rest=SWEEP + PATH)
+    whole = vi.run(parse_scene(text, "scene.toml"), progress=False)
+    assert whole.attrs["execution"] == "lanes"
+    monkeypatch.setattr(lanes_samples, "MOST_BYTES", 1)
+    cut = vi.run(parse_scene(text, "scene.toml"), progress=False)
+    assert whole.drop_vars("point_seconds").identical(cut.drop_vars("point_seconds"))

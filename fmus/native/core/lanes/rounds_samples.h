@@ -1,0 +1,35 @@
+/* Samples of a vector of lanes in a round; they change nothing of its motion. */
+#ifndef VIBROIMPACT_LANE_ROUNDS_SAMPLES_H
+#define VIBROIMPACT_LANE_ROUNDS_SAMPLES_H
+
+#include "lanes/recording.h"
+#include "lanes/sampling.h"
+
+/* Keep the states at the start of a round: its samples are taken from there on. */
+LANES_INLINE void sample_from(vi_lane_group *g, int at, vector q, vector p, vector cosine, vector sine)
+{
+    vi_lane_samples *samples = &g->samples;
+    store(samples->from_q + at, q);
+    store(samples->from_p + at, p);
+    store(samples->from_cosine + at, cosine);
+    store(samples->from_sine + at, sine);
+    store(samples->from_periods + at, load(g->periods + at));
+    store(samples->from_rest + at, load(g->rest + at));
+    store(samples->from_rest_low + at, load(g->rest_low + at));
+    store(samples->from_pressed + at, load(g->yielding.pressed_stop + at));
+}
+
+/* Take the samples of a round, after the clocks have moved. */
+LANES_INLINE void take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
+{
+    /* a sample at the end of the round may be after it by rounding */
+    const vector now = time_of(g, at) * (1.0 + 16.0 * 2.220446049250313e-16);
+    const mask samples = (load(g->samples.next + at) < load(g->samples.count + at)) & (load(g->samples.time + at) <= now);
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        if (samples[i]) {
+            vi_lane_take_samples(g, plan, points, at + i);
+        }
+    }
+}
+
+#endif
