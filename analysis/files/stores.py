@@ -1,0 +1,286 @@
+"""The only module that imports zarr: stores in folders and at addresses, read within bounds.
+
+A store is not trusted. Each object that is read has a bounded size, and each compressed chunk must expand to the size
+that its array announces. Every fault of a store is one DatasetError that names it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+STORE_ENDING = ".zarr"
+MOST_OBJECT_BYTES = 1 << 30
+"""Largest object of a store that is read, bytes: a shard has 64 MiB of numbers."""
+MOST_METADATA_BYTES = 1 << 26
+MOST_TEXT_BYTES = 1 << 28
+"""Largest size of the texts of one chunk, bytes."""
+LONGEST_REASON = 200
+Place = str | os.PathLike[str]
+"""A path, or an address such as `s3://bucket/map.zarr`."""
+
+
+def is_address(place: Place) -> bool:
+    """Return whether a place is an address of fsspec, and no path.
+
+    >>> is_address("s3://bucket/map.zarr"), is_address("map.zarr")
+    (True, False)
+    """
+    return "://" in os.fspath(place)
+
+
+def is_store(place: Place) -> bool:
+    """Return whether a place is a store: an address, or a folder with the metadata of one."""
+    return is_address(place) or os.path.isfile(os.path.join(place, "zarr.json"))
+
+
+@cache
+def zarr_package() -> ModuleType:
+    """Return the package zarr; raise UsageError where it is missing."""
+    try:
+        import fsspec  # noqa: F401  # of the same extra
+        import zarr
+    except ImportError as missing:
+        raise UsageError(
+            f"store: expected the package {missing.name} for Zarr stores, got none. Install it: pip install "
+            "'vibroimpact[store]', or in a clone pip install '.[store]'."
+        ) from None
+    _register_bounded_codecs()
+    return zarr
+
+
+def _register_bounded_codecs() -> None:
+    """Register the codecs that refuse a chunk whose content is larger than its array announces."""
+    from zarr.codecs import BloscCodec, VLenUTF8Codec, ZstdCodec
+    from zarr.registry import register_codec
+
+    class BoundedBlosc(BloscCodec):
+        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
+            head = bytes(chunk_bytes.as_numpy_array()[:16])
+            expected = _bytes_of(chunk_spec)
+            if len(head) < 16 or struct.unpack_from("<I", head, 4)[0] != expected:
+                raise ValueError(f"a compressed chunk that does not hold {expected} bytes")
+            return await super()._decode_single(chunk_bytes, chunk_spec)
+
+    class BoundedZstd(ZstdCodec):
+        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
+            size = _zstd_content(bytes(chunk_bytes.as_numpy_array()[:18]))
+            if size is None or size > MOST_TEXT_BYTES:
+                raise ValueError(f"a compressed chunk of texts that holds more than {MOST_TEXT_BYTES} bytes")
+            return await super()._decode_single(chunk_bytes, chunk_spec)
+
+    class BoundedTexts(VLenUTF8Codec):
+        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
+            head = bytes(chunk_bytes.as_numpy_array()[:4])
+            expected = _points_of(chunk_spec)
+            if len(head) < 4 or struct.unpack("<I", head)[0] != expected:
+                raise ValueError(f"a chunk that does not hold {expected} texts")
+            return await super()._decode_single(chunk_bytes, chunk_spec)
+
+    for name, codec in (("blosc", BoundedBlosc), ("zstd", BoundedZstd), ("vlen-utf8", BoundedTexts)):
+        codec.__qualname__ = codec.__name__
+        register_codec(name, codec, qualname=_codec_name(name))
+
+
+def _codec_name(name: str) -> str:
+    return f"{__name__}.{name}"
+
+
+def _points_of(spec: Any) -> int:
+    points = 1
+    for size in spec.shape:
+        points *= size
+    return points
+
+
+def _bytes_of(spec: Any) -> int:
+    return _points_of(spec) * int(spec.dtype.to_native_dtype().itemsize)
+
+
+def _zstd_content(head: bytes) -> int | None:
+    """Return the announced size of a Zstandard frame (RFC 8878, 3.1.1.1); None where the frame has none."""
+    if len(head) < 6 or head[:4] != b"\x28\xb5\x2f\xfd":
+        return None
+    kind, is_single = head[4] >> 6, bool(head[4] & 0x20)
+    width = (1 if is_single else 0, 2, 4, 8)[kind]
+    start = 5 + (0 if is_single else 1) + (0, 1, 2, 4)[head[4] & 3]
+    if not width or len(head) < start + width:
+        return None
+    return int.from_bytes(head[start : start + width], "little") + (256 if width == 2 else 0)
+
+
+@contextmanager
+def quiet_zarr() -> Iterator[None]:
+    """Hold back the remark that consolidated metadata are zarr's own extension of format 3."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        yield
+
+
+def opened_group(place: Place, mode: str) -> Any:
+    """Return the root group of a store.
+
+    Parameters
+    ----------
+    place : path or address
+    mode : {"r", "r+", "w-"}
+        Read a finished store by its consolidated metadata; write into a store; make a new store.
+
+    Raises
+    ------
+    DatasetError
+        There is no store, it is unfinished, or it cannot be reached.
+    """
+    zarr = zarr_package()
+    codecs = {f"codecs.{name}": _codec_name(name) for name in ("blosc", "zstd", "vlen-utf8")}
+    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), zarr.config.set(codecs):
+        store = _bounded(_store(place, read_only=mode == "r"))
+        if mode == "w-":
+            return zarr.create_group(store, zarr_format=3)
+        if mode == "r":
+            _refuse_unfinished(place)
+        return zarr.open_group(store, mode=mode, zarr_format=3, use_consolidated=mode == "r")
+
+
+def _store(place: Place, *, read_only: bool) -> Any:
+    from zarr.storage import FsspecStore, LocalStore
+
+    if is_address(place):
+        return FsspecStore.from_url(os.fspath(place), read_only=read_only)
+    return LocalStore(Path(place).absolute(), read_only=read_only)
+
+
+def _bounded(store: Any) -> Any:
+    """Return a store that gives no object above its bound."""
+    from zarr.abc.store import RangeByteRequest
+    from zarr.storage import WrapperStore
+
+    class BoundedStore(WrapperStore[Any]):
+        async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:
+            most = MOST_METADATA_BYTES if key.endswith("zarr.json") else MOST_OBJECT_BYTES
+            if isinstance(byte_range, RangeByteRequest) and byte_range.end - byte_range.start > most:
+                raise ValueError(f"a part of {key} above {most} bytes")
+            if byte_range is None:
+                byte_range = RangeByteRequest(0, most + 1)
+            found = await super().get(key, prototype, byte_range)
+            if found is not None and len(found) > most:
+                raise ValueError(f"an object {key} above {most} bytes")
+            return found
+
+    return BoundedStore(store)
+
+
+def _refuse_unfinished(place: Place) -> None:
+    """Raise DatasetError unless a store has the consolidated metadata that are written last."""
+    system, root = system_of(place)
+    try:
+        found = system.cat_file(f"{root}/zarr.json", 0, MOST_METADATA_BYTES + 1)
+    except FileNotFoundError:
+        raise DatasetError(f"{os.fspath(place)}: expected a Zarr store, got none there.") from None
+    if len(found) > MOST_METADATA_BYTES:
+        raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
+    head = json.loads(found)
+    if not isinstance(head, dict) or head.get("zarr_format") != 3 or head.get("node_type") != "group":
+        raise ValueError("no group of Zarr format 3")
+    if not head.get("consolidated_metadata"):
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a finished store, got one without consolidated metadata. "
+            "Its writing has not ended: run the command that writes it again."
+        )
+
+
+def system_of(place: Place) -> tuple[Any, str]:
+    """Return the file system of a place, and its path there."""
+    from fsspec.core import url_to_fs
+
+    system, root = url_to_fs(os.fspath(place) if is_address(place) else os.path.abspath(place))
+    return system, str(root).rstrip("/")
+
+
+def remove_object(place: Place, key: str) -> None:
+    """Remove an object of a store, if it is there: a damaged shard would be read before it is written."""
+    system, root = system_of(place)
+    with suppress(FileNotFoundError):
+        system.rm_file(f"{root}/{key}")
+
+
+def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
+    """Write another shape of an array into its metadata; zarr would list every chunk of the old shape."""
+    system, root = system_of(place)
+    path = f"{root}/{name}/zarr.json"
+    system.pipe_file(path, json.dumps(json.loads(system.cat_file(path)) | {"shape": shape}).encode())
+
+
+def new_array(
+    group: Any,
+    name: str,
+    dims: tuple[str, ...],
+    shape: tuple[int, ...],
+    chunk: tuple[int, ...],
+    shard: tuple[int, ...],
+    dtype: Any,
+    attributes: dict[str, Any],
+) -> Any:
+    """Make an array of a group: compressed chunks with a checksum each; values never written are missing."""
+    from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
+
+    kind = np.dtype(dtype).kind
+    is_text = kind in "OUT"
+    packed = ZstdCodec(level=1) if is_text else BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
+    return group.create_array(
+        name,
+        shape=shape,
+        dtype="string" if is_text else dtype,
+        chunks=chunk,
+        shards=None if shard == chunk else shard,
+        compressors=(packed, Crc32cCodec()),
+        fill_value="" if is_text else math.nan if kind == "f" else -1,
+        attributes=attributes,
+        dimension_names=dims,
+    )
+
+
+@contextmanager
+def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
+    """Turn every exception from a store into one DatasetError that names it.
+
+    While it `writes`, an OSError stays as it is: a full disk is no damage.
+    """
+    try:
+        yield
+    except (DatasetError, UsageError):
+        raise
+    except ModuleNotFoundError as missing:
+        raise UsageError(
+            f"{os.fspath(place)}: expected the package {missing.name} for this kind of address, got none. "
+            f"Install it: pip install {missing.name}."
+        ) from missing
+    except Exception as problem:
+        if isinstance(problem, NameError | AssertionError) or (writes and isinstance(problem, OSError)):
+            raise
+        words = str(problem).strip().splitlines()[:1]
+        reason = words[0][:LONGEST_REASON] if words else ""
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a Zarr store that can be read and written, got "
+            f"{type(problem).__name__}: {reason}. It is damaged, of another kind, or out of reach."
+        ) from problem
+
+
+def consolidate(place: Place) -> None:
+    """Write the consolidated metadata of a store, which mark it as finished."""
+    zarr = zarr_package()
+    with one_store_error(place, writes=True), quiet_zarr():
+        zarr.consolidate_metadata(_store(place, read_only=False), zarr_format=3)
