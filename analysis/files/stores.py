@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,14 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.analysis.files.store_metadata import finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 STORE_ENDING = ".zarr"
-MOST_OBJECT_BYTES = 1 << 30
-"""Largest object of a store that is read, bytes: a shard has 64 MiB of numbers."""
 MOST_METADATA_BYTES = 1 << 26
-MOST_TEXT_BYTES = 1 << 28
-"""Largest size of the texts of one chunk, bytes."""
 LONGEST_REASON = 200
 Place = str | os.PathLike[str]
 """A path, or an address such as `s3://bucket/map.zarr`."""
@@ -58,68 +54,7 @@ def zarr_package() -> ModuleType:
             f"store: expected the package {missing.name} for Zarr stores, got none. Install it: pip install "
             "'vibroimpact[store]', or in a clone pip install '.[store]'."
         ) from None
-    _register_bounded_codecs()
     return zarr
-
-
-def _register_bounded_codecs() -> None:
-    """Register the codecs that refuse a chunk whose content is larger than its array announces."""
-    from zarr.codecs import BloscCodec, VLenUTF8Codec, ZstdCodec
-    from zarr.registry import register_codec
-
-    class BoundedBlosc(BloscCodec):
-        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
-            head = bytes(chunk_bytes.as_numpy_array()[:16])
-            expected = _bytes_of(chunk_spec)
-            if len(head) < 16 or struct.unpack_from("<I", head, 4)[0] != expected:
-                raise ValueError(f"a compressed chunk that does not hold {expected} bytes")
-            return await super()._decode_single(chunk_bytes, chunk_spec)
-
-    class BoundedZstd(ZstdCodec):
-        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
-            size = _zstd_content(bytes(chunk_bytes.as_numpy_array()[:18]))
-            if size is None or size > MOST_TEXT_BYTES:
-                raise ValueError(f"a compressed chunk of texts that holds more than {MOST_TEXT_BYTES} bytes")
-            return await super()._decode_single(chunk_bytes, chunk_spec)
-
-    class BoundedTexts(VLenUTF8Codec):
-        async def _decode_single(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
-            head = bytes(chunk_bytes.as_numpy_array()[:4])
-            expected = _points_of(chunk_spec)
-            if len(head) < 4 or struct.unpack("<I", head)[0] != expected:
-                raise ValueError(f"a chunk that does not hold {expected} texts")
-            return await super()._decode_single(chunk_bytes, chunk_spec)
-
-    for name, codec in (("blosc", BoundedBlosc), ("zstd", BoundedZstd), ("vlen-utf8", BoundedTexts)):
-        codec.__qualname__ = codec.__name__
-        register_codec(name, codec, qualname=_codec_name(name))
-
-
-def _codec_name(name: str) -> str:
-    return f"{__name__}.{name}"
-
-
-def _points_of(spec: Any) -> int:
-    points = 1
-    for size in spec.shape:
-        points *= size
-    return points
-
-
-def _bytes_of(spec: Any) -> int:
-    return _points_of(spec) * int(spec.dtype.to_native_dtype().itemsize)
-
-
-def _zstd_content(head: bytes) -> int | None:
-    """Return the announced size of a Zstandard frame (RFC 8878, 3.1.1.1); None where the frame has none."""
-    if len(head) < 6 or head[:4] != b"\x28\xb5\x2f\xfd":
-        return None
-    kind, is_single = head[4] >> 6, bool(head[4] & 0x20)
-    width = (1 if is_single else 0, 2, 4, 8)[kind]
-    start = 5 + (0 if is_single else 1) + (0, 1, 2, 4)[head[4] & 3]
-    if not width or len(head) < start + width:
-        return None
-    return int.from_bytes(head[start : start + width], "little") + (256 if width == 2 else 0)
 
 
 @contextmanager
@@ -145,9 +80,10 @@ def opened_group(place: Place, mode: str) -> Any:
         There is no store, it is unfinished, or it cannot be reached.
     """
     zarr = zarr_package()
-    codecs = {f"codecs.{name}": _codec_name(name) for name in ("blosc", "zstd", "vlen-utf8")}
-    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), zarr.config.set(codecs):
-        store = _bounded(_store(place, read_only=mode == "r"))
+    from vibroimpact.analysis.files.bounded_stores import CODECS, BoundedStore
+
+    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), zarr.config.set(CODECS):
+        store = BoundedStore(_store(place, read_only=mode == "r"))
         if mode == "w-":
             return zarr.create_group(store, zarr_format=3)
         if mode == "r":
@@ -163,26 +99,6 @@ def _store(place: Place, *, read_only: bool) -> Any:
     return LocalStore(Path(place).absolute(), read_only=read_only)
 
 
-def _bounded(store: Any) -> Any:
-    """Return a store that gives no object above its bound."""
-    from zarr.abc.store import RangeByteRequest
-    from zarr.storage import WrapperStore
-
-    class BoundedStore(WrapperStore[Any]):
-        async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:
-            most = MOST_METADATA_BYTES if key.endswith("zarr.json") else MOST_OBJECT_BYTES
-            if isinstance(byte_range, RangeByteRequest) and byte_range.end - byte_range.start > most:
-                raise ValueError(f"a part of {key} above {most} bytes")
-            if byte_range is None:
-                byte_range = RangeByteRequest(0, most + 1)
-            found = await super().get(key, prototype, byte_range)
-            if found is not None and len(found) > most:
-                raise ValueError(f"an object {key} above {most} bytes")
-            return found
-
-    return BoundedStore(store)
-
-
 def _refuse_unfinished(place: Place) -> None:
     """Raise DatasetError unless a store has the consolidated metadata that are written last."""
     system, root = system_of(place)
@@ -192,10 +108,7 @@ def _refuse_unfinished(place: Place) -> None:
         raise DatasetError(f"{os.fspath(place)}: expected a Zarr store, got none there.") from None
     if len(found) > MOST_METADATA_BYTES:
         raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
-    head = json.loads(found)
-    if not isinstance(head, dict) or head.get("zarr_format") != 3 or head.get("node_type") != "group":
-        raise ValueError("no group of Zarr format 3")
-    if not head.get("consolidated_metadata"):
+    if finished_nodes(json.loads(found)) is None:
         raise DatasetError(
             f"{os.fspath(place)}: expected a finished store, got one without consolidated metadata. "
             "Its writing has not ended: run the command that writes it again."
@@ -208,6 +121,12 @@ def system_of(place: Place) -> tuple[Any, str]:
 
     system, root = url_to_fs(os.fspath(place) if is_address(place) else os.path.abspath(place))
     return system, str(root).rstrip("/")
+
+
+def stored_bytes(place: Place) -> int:
+    """Return the size of all objects of a store, bytes."""
+    system, root = system_of(place)
+    return int(system.du(root))
 
 
 def remove_object(place: Place, key: str) -> None:
