@@ -68,7 +68,7 @@ from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axe
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
-from vibroimpact.orchestrator.run.dataset import DatasetForm, has_messages
+from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
@@ -448,7 +448,7 @@ class _Campaign:
         began = time.perf_counter()
         try:
             form = self._form or DatasetForm(self._scene)
-            dataset = compact(parts, self._report.dataset, form, self._attributes())
+            has_messages = compact(parts, self._report.dataset, form, self._attributes())
         except DatasetError as error:
             unfit = list(unfit_parts(parts, self._scene))
             if not unfit:
@@ -470,7 +470,7 @@ class _Campaign:
                 )
             ) from error
         remove_parts(self._parts_folder)
-        self._report.is_silent = not has_messages(dataset)
+        self._report.is_silent = not has_messages
         self._report.compaction_seconds = time.perf_counter() - began
         return []
 

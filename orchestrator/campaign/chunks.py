@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
-from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, tally
+from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.points import PointColumns, State, columns_of_points
 from vibroimpact.orchestrator.running.kept import OpenedScene
@@ -236,6 +237,8 @@ def write_part(
     path = Path(work.parts_folder, chunk.part_name)
     try:
         dataset = form.dataset(points, records, attrs)
+        if not has_messages(dataset):
+            dataset.attrs[SILENT] = 1
         write_dataset(dataset, path)
     except OSError as error:
         raise CampaignError(
