@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from vibroimpact.analysis.dataset.checking import check, marked
     from vibroimpact.analysis.dataset.joining import join_files
     from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
+    from vibroimpact.analysis.dataset.places import dataset_place
     from vibroimpact.analysis.dataset.reading import (
         Part,
-        dataset_file,
         open_dataset,
         open_measured,
         read_flat,
@@ -55,7 +55,7 @@ __all__ = [
     "build_dataset",
     "check",
     "constant_names",
-    "dataset_file",
+    "dataset_place",
     "file_name_of",
     "file_names",
     "join_files",
@@ -75,9 +75,8 @@ _HOMES = {
     **dict.fromkeys(("check", "marked"), "checking"),
     "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
-    **dict.fromkeys(
-        ("Part", "dataset_file", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"
-    ),
+    "dataset_place": "places",
+    **dict.fromkeys(("Part", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"),
     **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),
 }
 

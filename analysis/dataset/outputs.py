@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vibroimpact.analysis.files.opening import file_attributes
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
@@ -34,14 +35,14 @@ LONGEST_NAME = 200
 
 
 def refuse_outputs(
-    read: Iterable[Path], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
+    read: Iterable[Place], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
 ) -> None:
     """Refuse outputs that would overwrite a file to be read, lie in no folder, or have the ending of another kind.
 
     Parameters
     ----------
-    read : iterable of Path
-        Files that the command reads.
+    read : iterable of Path or str
+        Files and stores that the command reads.
     output, figure : Path or None
         Files that the command will write.
     ending : str
@@ -148,7 +149,7 @@ class Places(Protocol):
         """Whether a file with other contents may be replaced."""
 
 
-def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None:
+def refuse_places(options: Places, read: Iterable[Place], **same: object) -> None:
     """Raise UsageError for places that cannot be written, or that hold other contents.
 
     Parameters
@@ -192,7 +193,7 @@ def writing(path: Path) -> Iterator[None]:
         raise UsageError(f"{path}: could not be written: {problem.strerror or problem}.") from problem
 
 
-def _same(one: Path, other: Path) -> bool:
+def _same(one: Path, other: Place) -> bool:
     try:
         return one.samefile(other)
     except OSError:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 from uuid import uuid4
 
@@ -18,10 +17,10 @@ from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import structure_problems
-from vibroimpact.analysis.dataset.schema import RAGGED, RULES
-from vibroimpact.analysis.dataset.store_attributes import COORDINATES, attributes_read
-from vibroimpact.analysis.dataset.zarr_store import LABELS
+from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
+from vibroimpact.analysis.dataset.zarr_store import LABELS, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
+from vibroimpact.analysis.files.store_attributes import COORDINATES, attributes_read
 from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, stored_bytes
 from vibroimpact.fmus.errors import DatasetError
 
@@ -91,7 +90,7 @@ def _forward(key: tuple[Any, ...], shape: tuple[int, ...]) -> tuple[tuple[Any, .
 
 
 def _kind(array: Any) -> np.dtype[Any]:
-    return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype)
+    return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype).newbyteorder("=")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,47 +109,54 @@ class _Described:
     attrs: Mapping[str, Any]
 
 
-def opened_store(place: Place, refuse_foreign: Any) -> xr.Dataset:
-    """Return the dataset of a store; values are read when they are used.
+class StoreContents:
+    """The contents of a finished store, whose metadata have passed the checks of files.
 
     Parameters
     ----------
     place : path or address
-    refuse_foreign : callable
-        Raises DatasetError for attributes and names that are no dataset of this package.
+
+    Attributes
+    ----------
+    grid : StoreGrid
+    attrs : dict
+        Global attributes.
+    names : list of str
+        Names of the variables in the order of the schema; derived variables come last.
+    linked : list of str
+        Names of the coordinates, in the order of the scene.
+    rows : dict
+        Number of rows of each shard, by the name of their ragged dimension.
 
     Raises
     ------
     DatasetError
         The store is missing, unfinished, damaged or foreign, or announces more values than it can hold.
     """
-    group = opened_group(place, "r")
-    with one_store_error(place):
-        arrays = dict(group.arrays())
-        attrs = attributes_read(dict(group.attrs))
-        refuse_foreign(attrs, arrays)
-        opening = _Opening(place, arrays)
-        problems = structure_problems(opening.flat(attrs))  # type: ignore[arg-type]  # has what the check uses
-        if problems:
-            raise DatasetError(f"{os.fspath(place)}: {problems[0]} The store is damaged; write it again.")
-        opening.refuse_large()
-        opened = opening.dataset(attrs)
-    opened.encoding["source"] = os.fspath(place)
-    return opened
 
+    def __init__(self, place: Place) -> None:
+        group = opened_group(place, "r")
+        with one_store_error(place):
+            self._place, self.attrs = place, attributes_read(dict(group.attrs))
+            arrays = self._arrays = dict(group.arrays())
+            refuse_foreign(place, self.attrs, arrays)
+            self._take_form()
+            problems = structure_problems(self._flat())  # type: ignore[arg-type]  # has what the check uses
+            if problems:
+                raise DatasetError(f"{os.fspath(place)}: {problems[0]} The store is damaged; write it again.")
+            self._refuse_large()
 
-class _Opening:
-    """The variables of a store."""
-
-    def __init__(self, place: Place, arrays: Mapping[str, Any]) -> None:
-        self._place, self._arrays = place, arrays
+    def _take_form(self) -> None:
+        arrays = self._arrays
+        self.grid = grid_of(arrays["run_id"])
         self._dims = {name: tuple(array.metadata.dimension_names or ()) for name, array in arrays.items()}
         self._attrs = {name: dict(array.attrs) for name, array in arrays.items()}
         self._points = self._dims["run_id"]
-        self._linked = str(self._attrs["outcome"].get(COORDINATES, "")).split()
-        self._rows = {dim: self._rows_of(dim) for dim in RAGGED if f"{dim}_rows" in arrays}
+        self.linked = str(self._attrs["outcome"].get(COORDINATES, "")).split()
         self._token = uuid4().hex
         self._refuse_sizes()
+        self.rows = {dim: self._rows_of(dim) for dim in RAGGED if f"{dim}_rows" in arrays}
+        self.names = self._names()
 
     def _rows_of(self, dim: str) -> NDArray[np.int64]:
         """Return the number of rows of each shard."""
@@ -177,7 +183,7 @@ class _Opening:
 
     def _names(self) -> list[str]:
         """Return the names of the variables in the order of the schema; derived variables come last."""
-        hidden = {f"{dim}_rows" for dim in self._rows}
+        hidden = {f"{dim}_rows" for dim in self.rows}
         first = [name for name in RULES if name in self._arrays]
         others = sorted(self._arrays.keys() - {*first, *hidden, *_DERIVED})
         return [*first, *others, *(name for name in _DERIVED if name in self._arrays)]
@@ -186,23 +192,26 @@ class _Opening:
         return self._dims[name][: len(self._points)] == self._points and not self._is_fixed(name)
 
     def _is_fixed(self, name: str) -> bool:
-        return name in self._linked and name != "run_index"
+        return name in self.linked and name != "run_index"
 
     def _ragged(self, name: str) -> str | None:
-        return next((dim for dim in self._rows if self._dims[name] == _row_dims(dim)), None)
+        return next((dim for dim in self.rows if self._dims[name] == _row_dims(dim)), None)
 
-    def flat(self, attrs: Mapping[str, Any]) -> _Flat:
+    def _flat(self) -> _Flat:
         """Return the variables as a file has them, along runs and rows."""
-        found = {name: self._described(name) for name in self._names() if name not in _DERIVED}
-        axes = {name for name in self._linked if name not in RULES and self._dims[name] in ((), (name,))}
-        for name in axes - {"direction"}:
-            found[name] = _Described(() if not self._dims[name] else ("run",), found[name].dtype, found[name].attrs)
-        places = {name for name in found if name in self._points and name not in RULES and found[name].dtype.kind == "i"}
+        found = {name: self._described(name) for name in self.names if name not in _DERIVED}
+        for name in self.places:
+            found.pop(name, None)
         rule = RULES["direction"]
         attributes = {"long_name": rule.long_name, "units": rule.unit}
         found["direction"] = _Described(("run",), np.dtype(rule.dtype), attributes)
-        kept = {name: one for name, one in found.items() if name not in places}
-        return _Flat(kept, frozenset(d for one in kept.values() for d in one.dims), attrs)
+        return _Flat(found, frozenset(d for one in found.values() for d in one.dims), self.attrs)
+
+    @property
+    def places(self) -> set[str]:
+        """Coordinates that are in no file: numbers or copies along a dimension that swept parameters share."""
+        shared = {attrs.get(SWEPT_ALONG) for attrs in self._attrs.values()}
+        return {name for name in self._points if name in shared and SWEPT_ALONG not in self._attrs[name]}
 
     def _described(self, name: str) -> _Described:
         array, dims, ragged = self._arrays[name], self._dims[name], self._ragged(name)
@@ -217,23 +226,26 @@ class _Opening:
             dims = ("run",)
         return _Described(dims, _kind(array), attributes_read(self._attrs[name]))
 
-    def refuse_large(self) -> None:
+    def _refuse_large(self) -> None:
         """Raise ValueError if the store announces more than its objects can hold."""
         promised = 0
-        for name in self._names():
+        for name in self.names:
             ragged = self._ragged(name)
-            size = math.prod(self._arrays[name].shape) if ragged is None else int(self._rows[ragged].sum())
+            size = math.prod(self._arrays[name].shape) if ragged is None else int(self.rows[ragged].sum())
             promised += size * _kind(self._arrays[name]).itemsize
         if promised > SPARSE_BYTES:
             most = max(SPARSE_BYTES, MOST_EXPANSION * stored_bytes(self._place))
             if promised > most:
                 raise ValueError(f"values of {promised} bytes, at most {most} fit into its objects")
 
-    def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
-        """Return the dataset, in which only the coordinates are read."""
-        variables = {name: self._variable(name) for name in self._names()}
-        coords = {name: variables.pop(name) for name in ("run_index", *self._linked) if name in variables}
-        return xr.Dataset(variables, coords=coords, attrs=attrs)
+    def dataset(self) -> xr.Dataset:
+        """Return the dataset on the dimensions of its sweep; values are read when used, those of coordinates now."""
+        variables = {name: self._variable(name) for name in self.names}
+        coords = {name: variables.pop(name) for name in self.linked if name in variables}
+        with one_store_error(self._place):
+            opened = xr.Dataset(variables, coords=coords, attrs=self.attrs)
+        opened.encoding["source"] = os.fspath(self._place)
+        return opened
 
     def _variable(self, name: str) -> xr.Variable:
         array, attrs = self._arrays[name], attributes_read(self._attrs[name])
@@ -241,20 +253,33 @@ class _Opening:
             return _fixed(name, self._dims[name], _StoreArray(self._place, array), attrs)
         dims, ragged = self._dims[name], self._ragged(name)
         if ragged is None:
-            return self._lazy(name, dims, _StoreArray(self._place, array), attrs, array.shards or array.chunks)
+            return self._lazy(
+                name, dims, _StoreArray(self._place, array), attrs, array.shards or array.chunks
+            )
         if _kind(array).kind == "f":
             attrs["_FillValue"] = np.float64(np.nan)
-        rows = self._rows[ragged]
+        rows = self.rows[ragged]
         chunks = (tuple(rows[rows > 0].tolist()) or (0,),)
         return self._lazy(name, (ragged,), _RowsArray(self._place, array, rows), attrs, chunks)
 
-    def _lazy(self, name: str, dims: tuple[str, ...], array: _StoreArray, attrs: Any, chunks: Any) -> xr.Variable:
+    def _lazy(
+        self, name: str, dims: tuple[str, ...], array: _StoreArray, attrs: Any, chunks: Any
+    ) -> xr.Variable:
         """Return a variable that is read when it is used: in chunks of Dask where it has several."""
         lazily = indexing.LazilyIndexedArray(array)
         if all(size <= _first(part) for size, part in zip(array.shape, chunks, strict=True)):
             return xr.Variable(dims, indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazily)), attrs)
         variable = xr.Variable(dims, lazily, attrs)
         return variable.chunk(dict(zip(dims, chunks, strict=True)), name=f"{name}-{self._token}")
+
+
+def refuse_foreign(place: Place, attributes: Collection[object], variables: Collection[object]) -> None:
+    """Raise DatasetError unless a file or store has the marks of a dataset of this package."""
+    if "dataset_schema" not in attributes or not all(name in variables for name in ("run_index", "outcome")):
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a dataset written by vibroimpact, got other contents. "
+            "Use the dataset of a campaign or the file of a run."
+        )
 
 
 def _first(part: Any) -> int:

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.assembling import Named, new_variable
 from vibroimpact.analysis.dataset.grid import RANGE, RANGE_ENDS, range_attributes, range_over_periods
 from vibroimpact.analysis.dataset.schema import RAGGED, constant_names, swept_names
-from vibroimpact.analysis.dataset.store_attributes import COORDINATES, attributes_stored
 from vibroimpact.analysis.dataset.store_grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
+from vibroimpact.analysis.files.store_attributes import COORDINATES, attributes_stored
 from vibroimpact.analysis.files.stores import (
     Place,
     announce,
@@ -122,7 +122,7 @@ class StoreWriter:
         self._group = opened_group(place, "r+")
         with one_store_error(place):
             self._arrays = dict(self._group.arrays())
-            self.grid = _grid_of(self._arrays["run_id"])
+            self.grid = grid_of(self._arrays["run_id"])
             linked = str(self._arrays["outcome"].attrs.get(COORDINATES, "")).split()
             kept = {name for name in linked if name != "run_index"}
             self._of_cells = {
@@ -300,7 +300,7 @@ def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
     return new_array(group, name, one.dims, one.shape, one.chunk, one.shard, one.dtype, attributes)
 
 
-def _grid_of(run_id: Any) -> StoreGrid:
+def grid_of(run_id: Any) -> StoreGrid:
     """Return the cells of a store, from the array that has a number for each."""
     return StoreGrid(_dims(run_id), run_id.shape, run_id.chunks, run_id.shards or run_id.chunks)
 
@@ -327,4 +327,4 @@ def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any], shape: tup
 def _kind(array: Any) -> Any:
     """Return the type of the values in memory: texts are objects."""
     dtype = array.dtype
-    return object if dtype.kind in "OUT" else dtype
+    return object if dtype.kind in "OUT" else dtype.newbyteorder("=")

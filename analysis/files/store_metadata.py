@@ -55,7 +55,12 @@ def _check_array(name: str, node: Mapping[str, Any]) -> None:
     chunk = _sizes(_configuration(node.get("chunk_grid")).get("chunk_shape"))
     if not isinstance(kind, str) or kind not in _BYTES:
         raise ValueError(f"{name}: the type {str(kind)[:60]}")
-    if shape is None or chunk is None or not isinstance(dims, list) or not len(shape) == len(chunk) == len(dims):
+    if (
+        shape is None
+        or chunk is None
+        or not isinstance(dims, list)
+        or not len(shape) == len(chunk) == len(dims)
+    ):
         raise ValueError(f"{name}: shape, chunks and dimensions that do not fit together")
     if len(set(dims)) != len(dims) or not all(isinstance(d, str) and _NAME.fullmatch(d) for d in dims):
         raise ValueError(f"{name}: dimensions without a name each")

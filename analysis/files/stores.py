@@ -39,8 +39,18 @@ def is_address(place: Place) -> bool:
 
 
 def is_store(place: Place) -> bool:
-    """Return whether a place is a store: an address, or a folder with the metadata of one."""
-    return is_address(place) or os.path.isfile(os.path.join(place, "zarr.json"))
+    """Return whether a place is one of a store: any address, or a folder with the metadata of one."""
+    return is_address(place) or holds_store(place)
+
+
+def holds_store(place: Place) -> bool:
+    """Return whether there are metadata of a store at a place."""
+    if not is_address(place):
+        return os.path.isfile(os.path.join(place, "zarr.json"))
+    zarr_package()
+    with one_store_error(place):
+        system, root = system_of(place)
+        return bool(system.exists(f"{root}/zarr.json"))
 
 
 @cache
