@@ -16,13 +16,23 @@ import xarray as xr
 from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.grid import on_grid
 from vibroimpact.analysis.dataset.joining import appended_file, blocks_in_order
-from vibroimpact.analysis.dataset.places import dataset_place
+from vibroimpact.analysis.dataset.outputs import DATASET_ENDING, refuse_outputs, writing
+from vibroimpact.analysis.dataset.places import dataset_place, given_place
+from vibroimpact.analysis.dataset.reading import open_dataset
 from vibroimpact.analysis.dataset.store_grid import StoreGrid
 from vibroimpact.analysis.dataset.store_runs import StoreRuns
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter, create_store
 from vibroimpact.analysis.files.atomic import sync_folder, whole_or_absent
 from vibroimpact.analysis.files.fingerprints import seal
-from vibroimpact.analysis.files.stores import Place, is_address, is_store, one_store_error, system_of
+from vibroimpact.analysis.files.stores import (
+    STORE_ENDING,
+    Place,
+    is_address,
+    is_store,
+    one_store_error,
+    system_of,
+)
+from vibroimpact.fmus.errors import UsageError
 
 Shown = Callable[[int, int], None]
 """Called with the number of converted runs and of all runs."""
@@ -32,25 +42,60 @@ def _silent(done: int, runs: int) -> None:
     """Show nothing."""
 
 
-def convert_dataset(given: Place, output: Place, shown: Shown = _silent) -> int:
-    """Write a dataset of runs in the other form: a NetCDF file as a Zarr store, a store as a file.
+def convert(file: Place, output: Place) -> xr.Dataset:
+    """Convert a dataset of runs from NetCDF to Zarr, or back; return the dataset as `open_dataset` opens it.
+
+    Parameters
+    ----------
+    file : path or address
+        A NetCDF file, a Zarr store, its address for fsspec, or the folder of a campaign.
+    output : path or address
+        A name that ends in `.nc`, or the place of a store: a name that ends in `.zarr`, or an address. An older
+        dataset is replaced only when the new one is complete.
+
+    Raises
+    ------
+    DatasetError
+        The dataset is missing, damaged or foreign, or out of reach.
+    UsageError
+        The package zarr is missing, or the output cannot be written.
+
+    Examples
+    --------
+    >>> vi.convert("campaign", "s3://bucket/campaign.zarr")  # doctest: +SKIP
+    """
+    place, target = dataset_place(file), given_place(output)
+    refuse_conversion(place, target)
+    with writing(target):
+        convert_dataset(place, target)
+    return open_dataset(target)
+
+
+def refuse_conversion(place: Place, output: Place) -> None:
+    """Raise UsageError unless a dataset can be written at a place in its other form."""
+    if isinstance(output, str):
+        if is_store(place):
+            raise UsageError(
+                f"{output}: expected a name ending in {DATASET_ENDING}, got the address of a store."
+            )
+        return
+    refuse_outputs([place], Path(output), ending=DATASET_ENDING if is_store(place) else STORE_ENDING)
+
+
+def convert_dataset(place: Place, output: Place, shown: Shown = _silent) -> int:
+    """Write a dataset of runs in the other form; return the number of runs.
 
     Values and attributes are equal. The memory does not grow with the number of runs, except where the runs of several
     shards lie between one another: these shards are in memory together. The result is whole or absent.
 
     Parameters
     ----------
-    given : path or address
-        A file, a store, or the folder of a campaign.
+    place : path or address
+        A file, or a store.
     output : path or address
         Replaced only when the new one is complete. An address gets a store, whose last object makes it whole.
     shown : callable
         Gets the progress.
-
-    Returns
-    -------
-    int
-        Number of runs.
 
     Raises
     ------
@@ -59,7 +104,6 @@ def convert_dataset(given: Place, output: Place, shown: Shown = _silent) -> int:
     OSError
         The result cannot be written.
     """
-    place = dataset_place(given)
     if is_store(place):
         return _to_file(StoreRuns(place), Path(output), shown)
     with FlatFile(place) as flat:

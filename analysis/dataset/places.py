@@ -15,8 +15,21 @@ STORE_NAME = "dataset.zarr"
 _OF_PATH = re.compile(r"([a-z][a-z0-9+]+):/(?!/)")
 
 
+def given_place(given: Place) -> Place:
+    """Return the place that a name stands for itself: a Path, or a str for an address.
+
+    Examples
+    --------
+    >>> given_place(Path("s3://bucket/map.zarr")), given_place("run.nc").name
+    ('s3://bucket/map.zarr', 'run.nc')
+    """
+    text = os.fspath(given)
+    address = text if is_address(text) else _OF_PATH.sub(_with_slashes, text, count=1)
+    return address.rstrip("/") if is_address(address) else Path(text)
+
+
 def dataset_place(given: Place) -> Place:
-    """Return the place that a name stands for: the dataset in the folder of a campaign, or what it names itself.
+    """Return the place of the dataset that a name stands for: in the folder of a campaign, or the name itself.
 
     Parameters
     ----------
@@ -30,18 +43,17 @@ def dataset_place(given: Place) -> Place:
 
     Examples
     --------
-    >>> dataset_place("run.nc").name, dataset_place(Path("memory://map.zarr"))
-    ('run.nc', 'memory://map.zarr')
+    >>> dataset_place("run.nc").name
+    'run.nc'
     """
-    text = os.fspath(given)
-    address = text if is_address(text) else _OF_PATH.sub(_with_slashes, text, count=1)
-    if is_address(address):
-        return _store_in(address.rstrip("/"))
+    place = given_place(given)
+    if isinstance(place, str):
+        return _store_in(place)
     # os.path: False for names that no file can have, where Path.is_dir raises
-    if not os.path.isdir(text) or holds_store(text):
-        return Path(text)
-    names = (name for name in (NETCDF_NAME, STORE_NAME) if os.path.exists(os.path.join(text, name)))
-    return Path(text, next(names, NETCDF_NAME))
+    if not os.path.isdir(place) or holds_store(place):
+        return place
+    names = (name for name in (NETCDF_NAME, STORE_NAME) if os.path.exists(os.path.join(place, name)))
+    return Path(place, next(names, NETCDF_NAME))
 
 
 def _with_slashes(found: re.Match[str]) -> str:

@@ -99,7 +99,7 @@ class StoreRuns:
         whole = {dim: cells.stop - cells.start for dim, cells in zip(grid.dims, block, strict=True)}
         further = [dim for dim in part.dims if dim not in whole]
         spread = part.set_dims({**whole, **{dim: part.sizes[dim] for dim in further}})
-        values = spread.transpose(*grid.dims, *further).values
+        values: NDArray[Any] = spread.transpose(*grid.dims, *further).values
         return values.reshape(-1, *(part.sizes[dim] for dim in further))
 
     def form(self) -> xr.Dataset:

@@ -21,7 +21,7 @@ from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.zarr_store import LABELS, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, attributes_read
-from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, stored_bytes
+from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, size_of
 from vibroimpact.fmus.errors import DatasetError
 
 _DERIVED = ("run_id", *(f"{dim}_run" for dim in RAGGED), "displacement_range")
@@ -43,7 +43,8 @@ class _StoreArray(BackendArray):
     def _values(self, key: tuple[Any, ...]) -> NDArray[Any]:
         forward, turned = _forward(key, self.shape)
         with one_store_error(self._place):
-            return np.asarray(self._read(forward), dtype=self.dtype)[turned]
+            values: NDArray[Any] = np.asarray(self._read(forward), dtype=self.dtype)[turned]
+        return values
 
     def _read(self, key: tuple[Any, ...]) -> Any:
         return self._array[key]
@@ -234,7 +235,7 @@ class StoreContents:
             size = math.prod(self._arrays[name].shape) if ragged is None else int(self.rows[ragged].sum())
             promised += size * _kind(self._arrays[name]).itemsize
         if promised > SPARSE_BYTES:
-            most = max(SPARSE_BYTES, MOST_EXPANSION * stored_bytes(self._place))
+            most = max(SPARSE_BYTES, MOST_EXPANSION * size_of(self._place)[0])
             if promised > most:
                 raise ValueError(f"values of {promised} bytes, at most {most} fit into its objects")
 
@@ -268,7 +269,8 @@ class StoreContents:
         """Return a variable that is read when it is used: in chunks of Dask where it has several."""
         lazily = indexing.LazilyIndexedArray(array)
         if all(size <= _first(part) for size, part in zip(array.shape, chunks, strict=True)):
-            return xr.Variable(dims, indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazily)), attrs)
+            cached: Any = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazily))  # type: ignore[arg-type]  # as xarray does
+            return xr.Variable(dims, cached, attrs)
         variable = xr.Variable(dims, lazily, attrs)
         return variable.chunk(dict(zip(dims, chunks, strict=True)), name=f"{name}-{self._token}")
 

@@ -133,10 +133,13 @@ def system_of(place: Place) -> tuple[Any, str]:
     return system, str(root).rstrip("/")
 
 
-def stored_bytes(place: Place) -> int:
-    """Return the size of all objects of a store, bytes."""
-    system, root = system_of(place)
-    return int(system.du(root))
+def size_of(place: Place) -> tuple[int, int]:
+    """Return the size of a store or a file, bytes, and the number of its objects."""
+    zarr_package()
+    with one_store_error(place):
+        system, root = system_of(place)
+        sizes = system.du(root, total=False)
+        return sum(sizes.values()), len(sizes)
 
 
 def remove_object(place: Place, key: str) -> None:

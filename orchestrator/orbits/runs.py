@@ -16,10 +16,10 @@ from vibroimpact.analysis.dataset import dataset_place, open_dataset
 from vibroimpact.analysis.dataset.outputs import DATASET_ENDING
 from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
 from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.analysis.orbits.recorded import Impacts
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
-from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import coordinate_names
