@@ -17,10 +17,11 @@ from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import structure_problems
+from vibroimpact.analysis.dataset.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.zarr_store import LABELS, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
-from vibroimpact.analysis.files.store_attributes import COORDINATES, attributes_read
+from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
 from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, size_of
 from vibroimpact.fmus.errors import DatasetError
 
@@ -126,6 +127,8 @@ class StoreContents:
         Names of the variables in the order of the schema; derived variables come last.
     linked : list of str
         Names of the coordinates, in the order of the scene.
+    token : str
+        Number of the store, by which its chunks of Dask are named.
     rows : dict
         Number of rows of each shard, by the name of their ragged dimension.
 
@@ -139,6 +142,8 @@ class StoreContents:
         group = opened_group(place, "r")
         with one_store_error(place):
             self._place, self.attrs = place, attributes_read(dict(group.attrs))
+            self.token = str(group.attrs.get(STORE_ID, ""))[:64] or uuid4().hex
+            self._overview = group.get(OVERVIEW)
             arrays = self._arrays = dict(group.arrays())
             refuse_foreign(place, self.attrs, arrays)
             self._take_form()
@@ -154,7 +159,6 @@ class StoreContents:
         self._attrs = {name: dict(array.attrs) for name, array in arrays.items()}
         self._points = self._dims["run_id"]
         self.linked = str(self._attrs["outcome"].get(COORDINATES, "")).split()
-        self._token = uuid4().hex
         self._refuse_sizes()
         self.rows = {dim: self._rows_of(dim) for dim in RAGGED if f"{dim}_rows" in arrays}
         self.names = self._names()
@@ -248,6 +252,18 @@ class StoreContents:
         opened.encoding["source"] = os.fspath(self._place)
         return opened
 
+    def overview(self, name: str) -> NDArray[Any] | None:
+        """Return an array of the overview of a large map, without the blocks beyond its last cells; None without it."""
+        blocks = BlockGrid.of(self.grid)
+        if blocks is None or self._overview is None or name not in self._overview:
+            return None
+        array = self._overview[name]
+        with one_store_error(self._place):
+            if tuple(array.shape) != blocks.shape:
+                raise ValueError(f"{OVERVIEW}/{name}: the shape {array.shape}, expected {blocks.shape}")
+            ends = (slice(0, len(blocks.starts(axis))) for axis in range(len(blocks.shape)))
+            return np.asarray(array[tuple(ends)])
+
     def _variable(self, name: str) -> xr.Variable:
         array, attrs = self._arrays[name], attributes_read(self._attrs[name])
         if self._is_fixed(name):
@@ -272,7 +288,7 @@ class StoreContents:
             cached: Any = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazily))  # type: ignore[arg-type]  # as xarray does
             return xr.Variable(dims, cached, attrs)
         variable = xr.Variable(dims, lazily, attrs)
-        return variable.chunk(dict(zip(dims, chunks, strict=True)), name=f"{name}-{self._token}")
+        return variable.chunk(dict(zip(dims, chunks, strict=True)), name=f"{name}-{self.token}")
 
 
 def refuse_foreign(place: Place, attributes: Collection[object], variables: Collection[object]) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import xarray as xr
@@ -24,9 +25,10 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import Named, new_variable
 from vibroimpact.analysis.dataset.grid import RANGE, RANGE_ENDS, range_attributes, range_over_periods
-from vibroimpact.analysis.dataset.schema import RAGGED, constant_names, swept_names
+from vibroimpact.analysis.dataset.overview import CLASSES, OVERVIEW, BlockGrid, names_of, quantities_of
+from vibroimpact.analysis.dataset.schema import RAGGED, RULES, constant_names, swept_names
 from vibroimpact.analysis.dataset.store_grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
-from vibroimpact.analysis.files.store_attributes import COORDINATES, attributes_stored
+from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_stored
 from vibroimpact.analysis.files.stores import (
     Place,
     announce,
@@ -94,11 +96,12 @@ def create_store(
     """
     group = opened_group(place, "w-")
     with one_store_error(place, writes=True):
-        group.update_attributes(attributes_stored(like.attrs))
+        group.update_attributes({**attributes_stored(like.attrs), STORE_ID: uuid4().hex})
         fixed = {**axes, **_fixed(like)}
         linked = _linked(like, grid, fixed)
         for name, one in _arrays(like, grid, sizes or {}).items():
             _made(group, name, one, linked)
+        _make_overview(group, like, grid)
         for name, variable in fixed.items():
             made = _made(group, name, _whole(variable), "")
             values = variable.values
@@ -178,7 +181,33 @@ class StoreWriter:
                 values = ids if name == "run_id" else _column(columns, name)
                 if values is not None:
                     self._replace(array, block, _on_cells(array, values, places, shape))
+            self._write_overview(block, runs, places, shape)
             return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
+
+    def _write_overview(
+        self, block: Block, runs: Named, places: NDArray[Any], shape: tuple[int, ...]
+    ) -> None:
+        """Write the blocks of a shard into the overview of a large map."""
+        blocks = BlockGrid.of(self.grid)
+        if blocks is None:
+            return
+        columns = runs.variables
+        parts = {}
+        for name, values in quantities_of(columns).items():
+            on_cells = np.full(math.prod(shape), np.nan)
+            on_cells[places] = values
+            reduced = blocks.reduced(on_cells.reshape(shape))
+            parts |= {f"{name}_{part}": found for part, found in reduced.items()}
+        if all(name in columns for name in CLASSES):
+            kinds = []
+            for name in CLASSES:
+                codes = np.full(math.prod(shape), -1, dtype=np.int64)
+                codes[places] = columns[name].values
+                kinds.append(codes.reshape(shape))
+            parts |= dict(zip(CLASSES, blocks.rarest(kinds), strict=True))
+        overview = self._group[OVERVIEW]
+        for name, values in parts.items():
+            self._replace(overview[name], blocks.place(block), values)
 
     @property
     def _ragged(self) -> list[str]:
@@ -258,6 +287,18 @@ def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict
                 new_variable((f"{dim}_shard",), np.zeros(grid.shards, dtype=np.int64), number)
             )
     return found
+
+
+def _make_overview(group: Any, like: xr.Dataset, grid: StoreGrid) -> None:
+    """Make the arrays of the overview of a large map."""
+    blocks = BlockGrid.of(grid)
+    if blocks is None:
+        return
+    overview = group.create_group(OVERVIEW)
+    for name in names_of(like.variables):
+        dtype = RULES[name].dtype if name in CLASSES else np.float64
+        one = _Array(grid.dims, blocks.shape, blocks.in_shard, blocks.in_shard, dtype, {})
+        _made(overview, name, one, "")
 
 
 def _fixed(like: xr.Dataset) -> dict[str, xr.Variable]:

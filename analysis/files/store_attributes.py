@@ -12,7 +12,9 @@ TYPES = "attribute_types"
 """Attribute with the numpy types of the attributes that are numbers."""
 COORDINATES = "coordinates"
 """Attribute with the names of the coordinates, as xarray and CF write it."""
-_IN_STORES = (TYPES, COORDINATES, "_FillValue")
+STORE_ID = "store_id"
+"""Attribute of a store with a number of its own: the chunks of Dask are named by it."""
+_IN_STORES = (TYPES, STORE_ID, COORDINATES, "_FillValue")
 _NUMBERS = "biuf"
 
 
