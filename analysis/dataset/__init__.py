@@ -2,6 +2,7 @@
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
 `writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
+`zarr_store` writes Zarr stores, `zarr_reading` opens them, `converting` makes either form from the other.
 `accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
 importable from here.
 """
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
         file_name_of,
         file_names,
     )
+    from vibroimpact.analysis.dataset.store_runs import read_runs
     from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
 
 __all__ = [
@@ -65,6 +67,7 @@ __all__ = [
     "open_measured",
     "read_flat",
     "read_part",
+    "read_runs",
     "refuse_unlike",
     "take_runs",
     "with_constants",
@@ -76,6 +79,7 @@ _HOMES = {
     "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
     "dataset_place": "places",
+    "read_runs": "store_runs",
     **dict.fromkeys(("Part", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"),
     **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),
 }

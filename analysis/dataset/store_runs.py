@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.assembling import Described, assembled
 from vibroimpact.analysis.dataset.checking import count_problems
 from vibroimpact.analysis.dataset.merging import joined
+from vibroimpact.analysis.dataset.places import dataset_place
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
@@ -181,14 +182,17 @@ class StoreRuns:
         return ("run", *(_DIMS.get(str(d), d) for d in further)), values, attrs
 
 
-def read_runs(place: Place) -> xr.Dataset:
-    """Return all runs of a file or a store, one-dimensional as a file has them.
+def read_runs(given: Place) -> xr.Dataset:
+    """Return all runs of a dataset in memory, one-dimensional as a file has them.
+
+    The dataset is a file, a store, its address, or in the folder of a campaign.
 
     Raises
     ------
     DatasetError
         The dataset is missing, unfinished, damaged or foreign.
     """
+    place = dataset_place(given)
     if not is_store(place):
         return read_flat(place)
     store = StoreRuns(place)

@@ -192,7 +192,7 @@ class StoreWriter:
         if blocks is None:
             return
         columns = runs.variables
-        parts = {}
+        parts: dict[str, NDArray[Any]] = {}
         for name, values in quantities_of(columns).items():
             on_cells = np.full(math.prod(shape), np.nan)
             on_cells[places] = values

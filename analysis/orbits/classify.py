@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_flat
+from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
 from vibroimpact.analysis.dataset.accessor import run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
@@ -195,7 +195,7 @@ class ClassesOfDataset(Study[RunClass]):
     def made(self) -> xr.Dataset:
         """Return the runs of the file with their classes, one-dimensional."""
         assert self.file is not None
-        return with_classes(read_flat(self.file), self.classes, self.runs.attrs["units_system"])
+        return with_classes(read_runs(self.file), self.classes, self.runs.attrs["units_system"])
 
     def print_results(self) -> None:
         """Print the number of runs of each class."""
@@ -252,7 +252,7 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
     """Return a one-dimensional dataset with the classes of its runs, as it is written to a file.
 
-    The dataset comes from `read_flat`; the classes are in the order of its runs.
+    The dataset comes from `read_runs`; the classes are in the order of its runs.
     """
     columns = _columns(classes).items()
     return flat.assign({name: ("run", values, attributes_of(name, units)) for name, values in columns})
