@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -194,24 +194,46 @@ def _grid(
     names = _direction_names(flat)
     if directions.size and (directions != Direction.independent).any():
         present, place = _distinct(directions)
-        labels = np.array([Direction(int(value)).name for value in present])
-        axes["direction"] = new_axis("direction", labels, _plain(flat.variables["direction"]))
-        sizes["direction"] = labels.size
+        labels = [Direction(int(value)).name for value in present]
+        axes["direction"] = direction_axis(labels, _plain(flat.variables["direction"]))
+        sizes["direction"] = len(labels)
         places.append(place)
     elif directions.size:
         scalars["direction"] = new_variable((), np.asarray(names[0]), _plain(flat.variables["direction"]))
     for dimension, names_along in _swept_along(flat).items():
-        values, place = _distinct_points([flat.variables[name] for name in names_along])
-        for name, column in zip(names_along, values.T, strict=True):
-            new = new_axis if name == dimension else new_variable
-            axes[name] = new(dimension, column, flat.variables[name].attrs)
-        sizes[dimension] = len(values)
+        own, place = axis_of(dimension, {name: flat.variables[name] for name in names_along})
+        axes |= own
+        sizes[dimension] = next(iter(own.values())).size
         places.append(place)
     axes |= shared_axes(axes)
     run_id = _run_grid(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
         return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
     return tuple(sizes), axes, scalars, run_id
+
+
+def direction_axis(words: Sequence[str], attributes: Mapping[str, Any] | None = None) -> xr.Variable:
+    """Return the coordinate along the directions of a sweep."""
+    return new_axis("direction", np.array(words), attributes or {"long_name": RULES["direction"].long_name})
+
+
+def axis_of(
+    dimension: str, columns: Mapping[str, xr.Variable]
+) -> tuple[dict[str, xr.Variable], NDArray[np.intp]]:
+    """Return the coordinates of parameters along their dimension, and the place of each run along it.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : mapping of str to xarray.Variable, shape (run,)
+        Values of each parameter that moves along the dimension.
+    """
+    values, place = _distinct_points(list(columns.values()))
+    axes: dict[str, xr.Variable] = {}
+    for (name, variable), column in zip(columns.items(), values.T, strict=True):
+        new = new_axis if name == dimension else new_variable
+        axes[name] = new(dimension, column, variable.attrs)
+    return axes, place
 
 
 def shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:

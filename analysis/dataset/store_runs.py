@@ -153,7 +153,8 @@ class StoreRuns:
 
     def _assembled(self, block: Block, places: NDArray[Any], rows: dict[str, slice]) -> xr.Dataset:
         contents, opened = self._contents, self._opened
-        constant = {name for name in opened.coords if not opened.variables[name].dims} - {"direction"}
+        constant = {name for name in opened.coords if not opened.variables[name].dims}
+        constant -= {"direction", "run_index"}
         data: dict[str, Described | xr.Variable] = {}
         for name in [*contents.names, "direction"]:
             if name in ("run_id", "displacement_range") or name in contents.places:

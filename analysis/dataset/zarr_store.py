@@ -13,7 +13,7 @@ metadata: a store without them is unfinished, and is not opened.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -33,7 +33,9 @@ from vibroimpact.analysis.files.stores import (
     Place,
     announce,
     consolidate,
+    has_object,
     new_array,
+    objects_below,
     one_store_error,
     opened_group,
     remove_object,
@@ -45,6 +47,7 @@ LABELS = {"interface": "connection", "comparison": "compared"}
 MOST_ROWS = 1 << 40
 """Number of rows of a shard for which its arrays are announced until the store is finished."""
 RUN_ID = {"long_name": "position of the run in the file", "units": "1"}
+_SHARDS = tuple((f"{dim}_shard",) for dim in RAGGED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +134,9 @@ class StoreWriter:
             self._of_cells = {
                 name: array
                 for name, array in self._arrays.items()
-                if _dims(array)[: len(self.grid.dims)] == self.grid.dims and name not in kept
+                if _dims(array)[: len(self.grid.dims)] == self.grid.dims
+                and name not in kept
+                and _dims(array)[:1] not in _SHARDS
             }
 
     def write_shard(
@@ -184,6 +189,37 @@ class StoreWriter:
             self._write_overview(block, runs, places, shape)
             return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
 
+    def read_shard(
+        self, block: Block, names: Collection[str], cells: NDArray[np.int64]
+    ) -> dict[str, NDArray[Any]]:
+        """Return the values of the runs of a shard, as `write_shard` took them.
+
+        Parameters
+        ----------
+        block, cells
+            As given to `write_shard`; each cell has a run.
+        names : collection of str
+            Variables of runs and rows; others than those of the store are left out.
+
+        Raises
+        ------
+        DatasetError
+            An object of the store is damaged.
+        """
+        found: dict[str, NDArray[Any]] = {}
+        number = self.grid.number(block)
+        with one_store_error(self._place):
+            for name in self._of_cells.keys() & set(names):
+                array = self._of_cells[name]
+                values = np.asarray(array[block], dtype=_kind(array))
+                found[name] = values.reshape(-1, *values.shape[len(block) :])[cells]
+            for dim in self._ragged:
+                count = int(self._arrays[RAGGED[dim]][block].sum())
+                for name, array in self._arrays.items():
+                    if name in names and _dims(array) == (f"{dim}_shard", f"{dim}_row"):
+                        found[name] = np.asarray(array[number, :count], dtype=_kind(array))
+        return found
+
     def _write_overview(
         self, block: Block, runs: Named, places: NDArray[Any], shape: tuple[int, ...]
     ) -> None:
@@ -229,12 +265,22 @@ class StoreWriter:
 
     def _replace(self, array: Any, block: Block, values: Any) -> None:
         """Write whole shards; the objects that were there are removed first, as they may be damaged."""
-        shard = array.shards or array.chunks
-        block = (*block, *(slice(0, size) for size in array.shape[len(block) :]))
-        spans = [range(s.start // n, -(-s.stop // n)) for s, n in zip(block, shard, strict=True)]
-        for place in product(*spans):
-            remove_object(self._place, f"{array.path}/{array.metadata.encode_chunk_key(place)}")
-        array[block] = values
+        for key in _keys(array, block):
+            remove_object(self._place, key)
+        array[(*block, *(slice(0, size) for size in array.shape[len(block) :]))] = values
+
+    def objects(self, block: Block) -> list[str]:
+        """Return the keys of the objects that a shard has; cells without values have no object."""
+        found: list[str] = []
+        for name, array in self._arrays.items():
+            if name in self._of_cells:
+                found += _keys(array, block)
+            elif _dims(array)[:1] in _SHARDS and array.ndim > 1:
+                found += objects_below(self._place, f"{array.path}/c/{self.grid.number(block)}")
+        blocks = BlockGrid.of(self.grid)
+        for _, array in self._group[OVERVIEW].arrays() if blocks is not None else ():
+            found += _keys(array, blocks.place(block)) if blocks is not None else []
+        return sorted(key for key in found if has_object(self._place, key))
 
     def _refuse_others(self, runs: Named) -> None:
         known = {*self._arrays, "direction", *swept_names(runs)}
@@ -244,12 +290,38 @@ class StoreWriter:
                 f"{self._place}: expected runs with the variables of the store, got {', '.join(others)} too."
             )
 
-    def finish(self) -> None:
+    def finish(
+        self,
+        attrs: Mapping[str, Any] | None = None,
+        *,
+        sizes: Mapping[str, int] | None = None,
+        absent: Collection[str] = (),
+    ) -> None:
         """Write the number of rows of each shard, and the consolidated metadata, which make the store a dataset.
 
         The counts of rows are read from the store, a shard at a time.
+
+        Parameters
+        ----------
+        attrs : mapping, optional
+            Further global attributes.
+        sizes : mapping of str to int, optional
+            Smaller sizes of further dimensions than those announced.
+        absent : collection of str
+            Variables that no run has, which are removed.
         """
         with one_store_error(self._place, writes=True):
+            self._group.update_attributes(attributes_stored(attrs or {}))
+            for name in absent:
+                if self._arrays.pop(name, None) is not None:
+                    self._of_cells.pop(name, None)
+                    del self._group[name]
+            for array in self._arrays.values():
+                shape = tuple(
+                    (sizes or {}).get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True)
+                )
+                if shape != array.shape:
+                    announce(self._place, array.path, shape)
             for dim in self._ragged:
                 counts = self._arrays[RAGGED[dim]]
                 rows = [int(np.maximum(counts[block], 0).sum()) for block in self.grid.blocks()]
@@ -341,6 +413,14 @@ def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
     return new_array(group, name, one.dims, one.shape, one.chunk, one.shard, one.dtype, attributes)
 
 
+def _keys(array: Any, block: Block) -> list[str]:
+    """Return the keys of the objects of an array with these cells, whether they are there or not."""
+    shard = array.shards or array.chunks
+    block = (*block, *(slice(0, size) for size in array.shape[len(block) :]))
+    spans = [range(s.start // n, -(-s.stop // n)) for s, n in zip(block, shard, strict=True)]
+    return [f"{array.path}/{array.metadata.encode_chunk_key(place)}" for place in product(*spans)]
+
+
 def grid_of(run_id: Any) -> StoreGrid:
     """Return the cells of a store, from the array that has a number for each."""
     return StoreGrid(_dims(run_id), run_id.shape, run_id.chunks, run_id.shards or run_id.chunks)
@@ -362,7 +442,7 @@ def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any], shape: tup
     further = array.shape[len(shape) :]
     found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
     found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
-    return found.reshape(*shape, *further)
+    return found.reshape((*shape, *further))
 
 
 def _kind(array: Any) -> Any:

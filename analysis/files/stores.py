@@ -156,6 +156,18 @@ def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
     system.pipe_file(path, json.dumps(json.loads(system.cat_file(path)) | {"shape": shape}).encode())
 
 
+def has_object(place: Place, key: str) -> bool:
+    """Return whether a store has an object."""
+    system, root = system_of(place)
+    return bool(system.isfile(f"{root}/{key}"))
+
+
+def objects_below(place: Place, prefix: str) -> list[str]:
+    """Return the keys of the objects of a store below a prefix."""
+    system, root = system_of(place)
+    return [str(path).removeprefix(f"{root}/") for path in system.find(f"{root}/{prefix}")]
+
+
 def new_array(
     group: Any,
     name: str,
