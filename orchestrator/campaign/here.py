@@ -61,7 +61,7 @@ def opened_here(work: Work) -> Iterator[OpenedScene | None]:
 
 
 def computed_here(
-    work: Work, stage: Stage, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
+    work: Work, stage: Stage, schedule: ChunkSchedule, done: Callable[[ChunkResult], object]
 ) -> Stage | None:
     """Compute a stage until it is complete (None), or until too much is left for this process; return the stage then.
 
@@ -74,18 +74,16 @@ def computed_here(
             with runs_abandoned(time.perf_counter() + HERE_SECONDS):
                 result = run_chunk(work, chunk)
         except RunsAbandonedError:
-            return _with_parts(stage, results, Path(work.parts_folder))
+            return _with_parts(stage, results)
         schedule.finished(chunk, result)
         results.append(result)
         done(result)
         if schedule.seconds_left > HERE_SECONDS:
-            return _with_parts(stage, results, Path(work.parts_folder))
+            return _with_parts(stage, results)
     return None
 
 
-def _with_parts(stage: Stage, results: Iterable[ChunkResult], folder: Path) -> Stage:
+def _with_parts(stage: Stage, results: Iterable[ChunkResult]) -> Stage:
     """Return a stage that also holds the parts of these results."""
-    parts = [
-        StoredPart(folder / one.chunk.part_name, one.chunk, one.carried, one.chunk.count) for one in results
-    ]
+    parts = [StoredPart(Path(one.path), one.chunk, one.carried, one.chunk.count) for one in results]
     return replace(stage, held=sorted([*stage.held, *parts], key=lambda part: part.chunk.first))

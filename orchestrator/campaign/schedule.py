@@ -9,10 +9,13 @@ the end the chunks get shorter, so that all workers finish together (guided self
 takes longer than a chunk is computed piece by piece: its next chunk exists only when the chunk before has ended.
 Several such branches are under way side by side. Branches in lanes share a chunk, however long they take: a single
 branch would take as long as all of them.
+
+A chunk of a store ends with its shard at the latest. A shard that takes less than `SHARD_SECONDS` is one chunk.
 """
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -20,6 +23,7 @@ from dataclasses import dataclass
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.shards import Shard
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene.sweep import Branch
 
@@ -47,6 +51,13 @@ that few lanes wait for the longest branch. The second holds when few are left, 
 
 QUEUED_PER_WORKER = 3
 """Number of chunks handed out for each worker: one runs, and the others follow without a pause."""
+
+SHARD_SECONDS = 60.0
+"""Longest time of a shard, s, that is computed as one chunk: more would be lost with its worker. A longer shard is kept
+in parts until it is complete."""
+
+LAST_SHARD_SECONDS = 5.0
+"""Longest time of one of the last shards, s, computed as one chunk: other workers may wait for it."""
 
 
 @dataclass(slots=True)
@@ -77,13 +88,20 @@ class _BranchRest:
 class ChunkSchedule:
     """Cuts the rest of a campaign into chunks for a number of workers; branches and parts are in run order.
 
-    `in_lanes`: whether branches of one chunk run side by side.
+    `in_lanes`: whether branches of one chunk run side by side. `shards`: shards of a store, which no chunk crosses.
     """
 
     def __init__(
-        self, branches: Sequence[Branch], parts: Sequence[StoredPart], workers: int, *, in_lanes: bool = False
+        self,
+        branches: Sequence[Branch],
+        parts: Sequence[StoredPart],
+        workers: int,
+        *,
+        in_lanes: bool = False,
+        shards: Sequence[Shard] = (),
     ) -> None:
         self._workers, self._in_lanes = workers, in_lanes
+        self._shards, self._shard_stops = shards, [shard.stop for shard in shards]
         self._first_runs = [branch.points.first_index for branch in branches]
         self._chained = branches[0].direction != "independent"
         self._unit = len(branches[0].points) if self._chained else 1
@@ -185,6 +203,7 @@ class ChunkSchedule:
         gap = self._units[0]
         seconds = self._fair_seconds()
         points = max(min(_points_in(seconds, self._pace), gap.most), self._points_beside(gap))
+        points = self._in_shard(gap, points)
         taken = gap.take(max(points // self._unit, 1) * self._unit)
         if gap.first == gap.stop:
             self._units.popleft()
@@ -215,13 +234,27 @@ class ChunkSchedule:
         if gap.stop - gap.first < 1.5 * count:
             # A short rest is taken along, without a chunk of its own.
             count = gap.stop - gap.first
-        taken = gap.take(min(count, gap.most))
+        taken = gap.take(self._in_shard(gap, min(count, gap.most)))
         if gap.first == gap.stop:
             rest.gaps.popleft()
         return self._hand_out(rest.branch, taken, seconds)
 
+    def _in_shard(self, gap: Gap, count: int) -> int:
+        """Return the number of runs of a gap that one chunk takes: a quick shard, or no more than its rest."""
+        if not self._shards:
+            return count
+        shard = self._shards[bisect_right(self._shard_stops, gap.first)]
+        rest = min(gap.stop, shard.stop) - gap.first
+        seconds = rest * self._pace if self._pace else math.inf
+        most = SHARD_SECONDS if self.left > self._workers * shard.count else LAST_SHARD_SECONDS
+        return (
+            rest if rest == shard.count and gap.most >= MOST_POINTS and seconds <= most else min(count, rest)
+        )
+
     def _hand_out(self, branch: int, taken: Gap, seconds: float) -> Chunk:
-        self.left -= taken.stop - taken.first
+        count = taken.stop - taken.first
+        self.left -= count
+        seconds = max(seconds, count * (self._pace or 0.0)) if self._shards else seconds
         return Chunk(branch, taken.first, taken.stop, taken.start, PATIENCE * seconds)
 
 
