@@ -181,11 +181,13 @@ class StoreWriter:
             raise DatasetError(
                 f"{self._place}: expected at most {math.prod(shape)} runs in the shard, each with a cell, got {count}."
             )
+        in_order = count == math.prod(shape) and bool((places == np.arange(count)).all())
         with one_store_error(self._place, writes=True):
             for name, array in self._of_cells.items():
                 values = ids if name == "run_id" else _column(columns, name)
                 if values is not None:
-                    self._replace(array, block, _on_cells(array, values, places, shape))
+                    on_cells = _on_cells(array, values, None if in_order else places, shape)
+                    self._replace(array, block, on_cells)
             self._write_overview(block, runs, places, shape)
             return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
 
@@ -437,9 +439,12 @@ def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | Non
     return None if name not in columns else np.asarray(columns[name].values)
 
 
-def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Return values of runs on the cells of a block, in the form of an array."""
+def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any] | None, shape: tuple[int, ...]) -> Any:
+    """Return values of runs on the cells of a block, in the form of an array; without places, in their order."""
     further = array.shape[len(shape) :]
+    if places is None and values.shape[1:] == further:
+        return np.asarray(values, dtype=_kind(array)).reshape((*shape, *further))
+    places = np.arange(len(values)) if places is None else places
     found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
     found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
     return found.reshape((*shape, *further))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import Outcome, marked
+from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter
@@ -67,7 +67,7 @@ def write_shard(
     Parameters
     ----------
     rows : xarray.Dataset
-        All runs of the shard, one-dimensional, in their order.
+        All runs of the shard, one-dimensional, in their order and marked (`checking.marked`).
     branch : int
         Branch of the first run.
     attrs : mapping
@@ -80,7 +80,6 @@ def write_shard(
     OSError
         The shard cannot be written.
     """
-    rows = marked(rows)
     grid = store.grid(scene)
     assert grid is not None
     writer = _writer(str(store.path), str(attrs["scene_hash"]))
