@@ -23,7 +23,7 @@ from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.fmus.messages import CALL, Message, message
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, get_ready
-from vibroimpact.orchestrator.campaign.destination import ShardParts
+from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
     Kept,
@@ -446,7 +446,10 @@ class _Campaign:
             work, attrs = self._with_manifest(self._work), self._attributes()
             has_messages = self._destination.complete(work, parts, form, attrs)
         except DatasetError as error:
-            unfit = list(unfit_parts([path for path in parts if path.suffix == ".nc"], self._scene))
+            files = [path for path in parts if path.suffix == ".nc"]
+            unfit = (
+                error.found if isinstance(error, UnfitShardsError) else list(unfit_parts(files, self._scene))
+            )
             if not unfit:
                 raise CampaignError(f"{self._home}: the parts do not fit together: {error}") from error
             for path, reason in unfit:

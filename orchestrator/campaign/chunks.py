@@ -12,14 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_dataset
-from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
@@ -29,6 +29,7 @@ from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.points import PointColumns, State, columns_of_points
+from vibroimpact.orchestrator.run.runner import Rows
 from vibroimpact.orchestrator.running.kept import OpenedScene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
@@ -39,6 +40,9 @@ CARRIED_STATE = "carried_state"
 """Attributes of a part: start state of the next run of its branch, as two numbers or an array."""
 MANIFEST = "campaign_manifest"
 """Attribute of a part: the manifest of its campaign, from `manifest.carried_manifest`."""
+
+PIECE_POINTS = 2**17
+"""Number of independent points that run at once: those of a shard at once would take 1.3 GB of a worker's memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,13 +164,29 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
     opened.failed = True  # until the chunk has ended
-    records, carried = opened.runner.rows(points, chunk.start, deadline)
+    records, carried = _rows(opened.runner, points, chunk.start, deadline)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
     path, outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
     opened.failed = Outcome.error.name in outcomes
     return ChunkResult(done, carried, outcomes, seconds, str(path))
+
+
+def _rows(runner: Runner, points: PointColumns, start: State | None, deadline: float) -> Rows:
+    """Return the results of the points that run until a deadline; independent points of a shard run in pieces."""
+    if len(points) <= PIECE_POINTS or not points.are_independent:
+        return runner.rows(points, start, deadline)
+    pieces: list[Sequence[RunRecord] | RunColumns] = []
+    for first in range(0, len(points), PIECE_POINTS):
+        piece = points.chosen(slice(first, first + PIECE_POINTS))
+        done, _ = runner.rows(piece, None, deadline)
+        pieces.append(done)
+        if len(done) < len(piece) or time.perf_counter() > deadline:
+            break
+    if not any(isinstance(piece, RunColumns) for piece in pieces):
+        return [record for piece in pieces for record in cast("Sequence[RunRecord]", piece)], None
+    return joined([one if isinstance(one, RunColumns) else columns_of(one) for one in pieces]), None
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:

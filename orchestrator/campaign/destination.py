@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 
 from vibroimpact.analysis.dataset import read_flat, write_dataset
+from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, read_finished
 from vibroimpact.orchestrator.campaign.manifest import Manifest
@@ -34,6 +35,14 @@ class ShardParts:
     paths: tuple[Path, ...]
     kept: Path | None
     carried: State | None
+
+
+class UnfitShardsError(DatasetError):
+    """Shards of a store do not have the objects that their seals name; `found` has the seals, each with the reason."""
+
+    def __init__(self, found: list[tuple[Path, str]]) -> None:
+        super().__init__(f"{found[0][0].name}: {found[0][1]}")
+        self.found = found
 
 
 class Destination(ABC):
@@ -64,7 +73,8 @@ class Destination(ABC):
     def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the dataset from the rows in these files; return whether a run has a message.
 
-        DatasetError: a part cannot be used; `parts.unfit_parts` finds it. OSError: the dataset cannot be written.
+        DatasetError: a part cannot be used; `parts.unfit_parts` finds it. UnfitShardsError: shards have changed.
+        OSError: the dataset cannot be written.
         """
 
     def make(self) -> None:

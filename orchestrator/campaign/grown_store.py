@@ -28,7 +28,12 @@ from vibroimpact.orchestrator.campaign.chunks import (
     attributes_of_part,
     carried_state,
 )
-from vibroimpact.orchestrator.campaign.destination import Attributes, Destination, ShardParts
+from vibroimpact.orchestrator.campaign.destination import (
+    Attributes,
+    Destination,
+    ShardParts,
+    UnfitShardsError,
+)
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, kept_path
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note, StoredPart
@@ -41,6 +46,7 @@ from vibroimpact.orchestrator.campaign.seals import (
     read_sealed,
     refuse_changed_objects,
     refuse_other_store,
+    seal_path,
     seal_store,
     seals_in,
 )
@@ -229,8 +235,21 @@ class GrownStore(Destination):
         for shard in self.shards:
             if shard.number in self._missing:
                 self.sealed(seal_parts(work, self._of_shard(shard)))
+        self._refuse_changed_shards()
         self._finish(attrs, attributes_of_part(work, None))
         return any(seal.has_messages for seal in self._sealed.values())
+
+    def _refuse_changed_shards(self) -> None:
+        """Raise UnfitShardsError unless all shards are as they were sealed: a worker that was lost may still write."""
+        found = []
+        for number, seal in sorted(self._sealed.items()):
+            try:
+                refuse_changed_objects(self.path, seal.objects)
+            except DatasetError as error:
+                found.append((seal_path(self._seals, number), str(error)))
+                del self._sealed[number]
+        if found:
+            raise UnfitShardsError(found)
 
     def _finish(self, attrs: Attributes, of_seal: Attributes) -> None:
         """Write what is known at the end only, the consolidated metadata, and the seal of the finished store."""

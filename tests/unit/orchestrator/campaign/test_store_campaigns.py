@@ -14,13 +14,16 @@ from support.campaign_scenes import assert_same_datasets, scene_of
 from support.serial_pool import Notes, campaign_here
 from support.store_scenes import BODY, axis
 
+import vibroimpact.orchestrator.campaign.chunks as chunks
 import vibroimpact.orchestrator.campaign.formats as formats
+import vibroimpact.orchestrator.campaign.grown_store as grown_store
 import vibroimpact.orchestrator.campaign.schedule as schedule
 import vibroimpact.orchestrator.campaign.sealing as sealing
 from vibroimpact.analysis import open_dataset
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
 from vibroimpact.orchestrator.campaign.manifest import read_manifest
+from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 UP = [0.1, 0.2, 0.3, 0.4, 0.5]
 FREQUENCY = "forcing.angular_frequency"
@@ -87,6 +90,17 @@ def test_a_store_equals_the_file_of_the_same_campaign(
     assert (again.resumed, again.chunks) == (report.runs, [])
 
 
+@pytest.mark.parametrize("runner", [DEFAULT_RUNNER, "support.busy_runner:SceneRunner"])
+def test_a_shard_that_runs_in_pieces_has_the_same_rows(
+    runner: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = BODY + axis("forcing.amplitude", [0.1 + 0.01 * k for k in range(40)])
+    campaign_here(monkeypatch, text, tmp_path / "whole", runner=runner)
+    monkeypatch.setattr(chunks, "PIECE_POINTS", 3)
+    campaign_here(monkeypatch, text, tmp_path / "pieces", runner=runner, format="zarr")
+    assert_same_datasets(tmp_path / "pieces", tmp_path / "whole")
+
+
 def test_an_unfinished_store_is_not_opened_and_the_same_command_goes_on(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,8 +123,15 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-7])
 
 
-@pytest.mark.parametrize("damage", [flip, cut, Path.unlink])
-@pytest.mark.parametrize("name", ["dataset.zarr/outcome/c/0/0", "seals/shard-000000.json"])
+SHARD_DAMAGES = [
+    ("dataset.zarr/outcome/c/0/0", flip),
+    ("dataset.zarr/final_phase/c/0/0", cut),
+    ("dataset.zarr/impact_time/c/0/0", Path.unlink),
+    ("seals/shard-000000.json", flip),
+]
+
+
+@pytest.mark.parametrize(("name", "damage"), SHARD_DAMAGES)
 def test_a_damaged_shard_is_named_by_its_seal_and_computed_again(
     name: str,
     damage: Callable[[Path], None],
@@ -118,8 +139,6 @@ def test_a_damaged_shard_is_named_by_its_seal_and_computed_again(
     expected: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    if damage is Path.unlink and name.startswith("seals"):
-        pytest.skip("a shard without a seal is not there")
     for finished in (False, True):
         notes = Notes()
         damage(half / name)
@@ -140,6 +159,23 @@ def test_damaged_metadata_are_written_again_and_no_point_is_computed(
         report = campaign_here(monkeypatch, MAP, folder)
         assert (report.resumed, report.chunks) == (20, [])
         assert_same_datasets(folder, expected)
+
+
+def test_a_shard_that_changes_after_its_seal_is_computed_again_by_the_same_command(
+    half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    complete, notes, damaged = grown_store.GrownStore.complete, Notes(), []
+
+    def damage_first(store: grown_store.GrownStore, *others: Any) -> bool:
+        if not damaged:
+            damaged.append(half / "dataset.zarr" / "final_velocity" / "c" / "0" / "0")
+            flip(damaged[0])
+        return complete(store, *others)
+
+    monkeypatch.setattr(grown_store.GrownStore, "complete", damage_first)
+    campaign_here(monkeypatch, MAP, half, notes=notes)
+    assert notes.lines[0].startswith("shard-000000.json was damaged and is removed; its points come again: ")
+    assert_same_datasets(half, expected)
 
 
 def test_a_half_written_shard_is_computed_again(
