@@ -33,6 +33,8 @@ def attributes_stored(attributes: Mapping[Any, Any]) -> dict[str, Any]:
             stored[str(name)] = value
             continue
         array = np.asarray(value)
+        # as NetCDF, where an array of one element is a number
+        array = array.reshape(()) if array.size == 1 else array
         stored[str(name)] = _plain(array.tolist())
         types[str(name)] = array.dtype.name if array.dtype.kind in _NUMBERS else "str"
     return stored | ({TYPES: types} if types else {})
