@@ -122,11 +122,10 @@ class StoreRuns:
             ids, index = self._values("run_id", block), self._values("run_index", block)
             places = np.flatnonzero(index >= 0)
             places = places[np.argsort(index[places])]
-            ends = {dim: np.cumsum(rows) for dim, rows in self._contents.rows.items()}
-            rows = {
-                dim: slice(int(end[number] - self._contents.rows[dim][number]), int(end[number]))
-                for dim, end in ends.items()
-            }
+            rows = {}
+            for dim, count in self._contents.rows.items():
+                first = self._contents.rows_before(dim, number)
+                rows[dim] = slice(first, first + int(count[number]))
             found = self._assembled(block, places, rows)
             problems = count_problems(found)
             if problems:
@@ -153,7 +152,10 @@ class StoreRuns:
 
     def _assembled(self, block: Block, places: NDArray[Any], rows: dict[str, slice]) -> xr.Dataset:
         contents, opened = self._contents, self._opened
-        constant = {name for name in opened.coords if not opened.variables[name].dims} - {"direction"}
+        constant = {name for name in opened.coords if not opened.variables[name].dims} - {
+            "direction",
+            "run_index",
+        }
         data: dict[str, Described | xr.Variable] = {}
         for name in [*contents.names, "direction"]:
             if name in ("run_id", "displacement_range") or name in contents.places:

@@ -3,7 +3,7 @@
 The store has the variables, dimensions, coordinates and attributes that `open_dataset` gives for the NetCDF file.
 Impacts, sticks, samples and events are the exception, since their number is not known before. Their arrays have two
 dimensions, such as `impact_shard` and `impact_row`: the rows of the runs of one shard, those of the first run first.
-`impact_rows` has the number of rows of each shard.
+`impact_rows` has the number of rows of each shard, and `shard_order` the shards in the order of their runs.
 
 `create_store` makes the arrays. A `StoreWriter` in any process writes the runs of one shard at a time: a shard of a
 variable is one object, with one writer. `finish` writes the numbers of rows and, last, the consolidated
@@ -40,10 +40,12 @@ from vibroimpact.analysis.files.stores import (
 )
 from vibroimpact.fmus.errors import DatasetError
 
+SHARD_ORDER = "shard_order"
 LABELS = {"interface": "connection", "comparison": "compared"}
 """Dimensions of a file that are named by a variable in an opened dataset."""
 MOST_ROWS = 1 << 40
 """Number of rows of a shard for which its arrays are announced until the store is finished."""
+_LAST = np.iinfo(np.int32).max
 RUN_ID = {"long_name": "position of the run in the file", "units": "1"}
 
 
@@ -127,11 +129,13 @@ class StoreWriter:
             self._arrays = dict(self._group.arrays())
             self.grid = grid_of(self._arrays["run_id"])
             linked = str(self._arrays["outcome"].attrs.get(COORDINATES, "")).split()
-            kept = {name for name in linked if name != "run_index"}
+            kept = {SHARD_ORDER, *(name for name in linked if name != "run_index")}
             self._of_cells = {
                 name: array
                 for name, array in self._arrays.items()
-                if _dims(array)[: len(self.grid.dims)] == self.grid.dims and name not in kept
+                if name not in kept
+                and not _is_of_rows(_dims(array))
+                and _dims(array)[: len(self.grid.dims)] == self.grid.dims
             }
 
     def write_shard(
@@ -258,6 +262,10 @@ class StoreWriter:
                 for name, array in self._arrays.items():
                     if _dims(array) == (f"{dim}_shard", f"{dim}_row"):
                         announce(self._place, name, (self.grid.shards, most))
+            if self._ragged:
+                index = (self._arrays["run_index"][block] for block in self.grid.blocks())
+                first = [int(each[each >= 0].min(initial=_LAST)) for each in index]
+                self._arrays[SHARD_ORDER][...] = np.argsort(first, kind="stable")
         consolidate(self._place)
 
 
@@ -283,9 +291,9 @@ def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict
             owner = {"long_name": f"run_id of the run of each {dim}", "units": "1"}
             found[f"{dim}_run"] = _rows(dim, grid, np.int32, owner)
             number = {"long_name": f"number of rows of {dim} in each shard", "units": "1"}
-            found[f"{dim}_rows"] = _whole(
-                new_variable((f"{dim}_shard",), np.zeros(grid.shards, dtype=np.int64), number)
-            )
+            found[f"{dim}_rows"] = _of_shards(f"{dim}_shard", grid, number)
+            order = {"long_name": "numbers of the shards in the order of their runs", "units": "1"}
+            found[SHARD_ORDER] = _of_shards("shard", grid, order)
     return found
 
 
@@ -321,6 +329,10 @@ def _rows(dim: str, grid: StoreGrid, dtype: Any, attrs: Mapping[str, Any]) -> _A
     return _Array((f"{dim}_shard", f"{dim}_row"), shape, (1, CHUNK_POINTS), (1, SHARD_POINTS), dtype, attrs)
 
 
+def _of_shards(dim: str, grid: StoreGrid, attrs: Mapping[str, Any]) -> _Array:
+    return _whole(new_variable((dim,), np.zeros(grid.shards, dtype=np.int64), attrs))
+
+
 def _whole(variable: xr.Variable) -> _Array:
     dims, one = tuple(map(str, variable.dims)), (SHARD_POINTS,) * variable.ndim
     size = tuple(min(most, max(n, 1)) for most, n in zip(one, variable.shape, strict=True))
@@ -350,6 +362,10 @@ def _dims(array: Any) -> tuple[str, ...]:
     return tuple(array.metadata.dimension_names or ())
 
 
+def _is_of_rows(dims: tuple[str, ...]) -> bool:
+    return dims[:1] in {(f"{dim}_shard",) for dim in RAGGED}
+
+
 def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | None:
     """Return the values of runs, those of derived variables too; None for a variable that the runs lack."""
     if name == RANGE:
@@ -362,7 +378,7 @@ def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any], shape: tup
     further = array.shape[len(shape) :]
     found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
     found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
-    return found.reshape(*shape, *further)
+    return found.reshape((*shape, *further))
 
 
 def _kind(array: Any) -> Any:

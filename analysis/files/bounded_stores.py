@@ -35,6 +35,8 @@ class BoundedStore(WrapperStore[Any]):
         if byte_range is None:
             byte_range = RangeByteRequest(0, most + 1)
         found = await super().get(key, prototype, byte_range)
+        if found is not None and not len(found):
+            raise ValueError(f"an empty object {key}")
         if found is not None and len(found) > most:
             raise ValueError(f"an object {key} above {most} bytes")
         return found
