@@ -22,7 +22,7 @@ from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.zarr_store import LABELS, SHARD_ORDER, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
-from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, size_of
+from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_of
 from vibroimpact.fmus.errors import DatasetError
 
 _DERIVED = ("run_id", *(f"{dim}_run" for dim in RAGGED), "displacement_range")
@@ -146,8 +146,8 @@ class StoreContents:
         with one_store_error(place):
             self._place, self.attrs = place, attributes_read(dict(group.attrs))
             self.token = str(group.attrs.get(STORE_ID, ""))[:64] or uuid4().hex
-            self._overview = group.get(OVERVIEW)
-            arrays = self._arrays = dict(group.arrays())
+            self._overview = arrays_of(group[OVERVIEW]) if OVERVIEW in group else {}
+            arrays = self._arrays = arrays_of(group)
             refuse_foreign(place, self.attrs, arrays)
             self._take_form()
             problems = structure_problems(self._flat())  # type: ignore[arg-type]  # has what the check uses
@@ -265,16 +265,25 @@ class StoreContents:
     def dataset(self) -> xr.Dataset:
         """Return the dataset on the dimensions of its sweep; values are read when used, those of coordinates now."""
         variables = {name: self._variable(name) for name in self.names}
-        coords = {name: variables.pop(name) for name in self.linked if name in variables}
+        linked = sorted((name for name in self.linked if name in variables), key=self._rank)
+        coords = {name: variables.pop(name) for name in linked}
         with one_store_error(self._place):
             opened = xr.Dataset(variables, coords=coords, attrs=self.attrs)
         opened.encoding["source"] = os.fspath(self._place)
         return opened
 
+    def _rank(self, name: str) -> int:
+        """Return the place of the kind of a coordinate among all, as files are opened with them."""
+        if name == "direction" or self._dims[name]:
+            kinds = (name == "run_index", name in LABELS.values(), False, bool(self._dims[name]), True)
+        else:
+            kinds = (name == "run_index", False, True, True, True)
+        return kinds.index(True)
+
     def overview(self, name: str) -> NDArray[Any] | None:
         """Return an array of the overview of a large map, without the blocks beyond its last cells; None without it."""
         blocks = BlockGrid.of(self.grid)
-        if blocks is None or self._overview is None or name not in self._overview:
+        if blocks is None or name not in self._overview:
             return None
         array = self._overview[name]
         with one_store_error(self._place):

@@ -32,6 +32,7 @@ from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, a
 from vibroimpact.analysis.files.stores import (
     Place,
     announce,
+    arrays_of,
     consolidate,
     new_array,
     one_store_error,
@@ -126,7 +127,8 @@ class StoreWriter:
         self._place = place
         self._group = opened_group(place, "r+")
         with one_store_error(place):
-            self._arrays = dict(self._group.arrays())
+            self._arrays = arrays_of(self._group)
+            self._overview = arrays_of(self._group[OVERVIEW]) if OVERVIEW in self._group else {}
             self.grid = grid_of(self._arrays["run_id"])
             linked = str(self._arrays["outcome"].attrs.get(COORDINATES, "")).split()
             kept = {SHARD_ORDER, *(name for name in linked if name != "run_index")}
@@ -183,8 +185,7 @@ class StoreWriter:
         with one_store_error(self._place, writes=True):
             for name, array in self._of_cells.items():
                 values = ids if name == "run_id" else _column(columns, name)
-                if values is not None:
-                    self._replace(array, block, _on_cells(array, values, places, shape))
+                self._replace(array, block, _on_cells(array, values, places, shape))
             self._write_overview(block, runs, places, shape)
             return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
 
@@ -209,9 +210,8 @@ class StoreWriter:
                 codes[places] = columns[name].values
                 kinds.append(codes.reshape(shape))
             parts |= dict(zip(CLASSES, blocks.rarest(kinds), strict=True))
-        overview = self._group[OVERVIEW]
         for name, values in parts.items():
-            self._replace(overview[name], blocks.place(block), values)
+            self._replace(self._overview[name], blocks.place(block), values)
 
     @property
     def _ragged(self) -> list[str]:
@@ -373,11 +373,12 @@ def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | Non
     return None if name not in columns else np.asarray(columns[name].values)
 
 
-def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Return values of runs on the cells of a block, in the form of an array."""
+def _on_cells(array: Any, values: NDArray[Any] | None, places: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    """Return values of runs on the cells of a block, in the form of an array; None: the runs have none."""
     further = array.shape[len(shape) :]
     found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
-    found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
+    if values is not None:
+        found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
     return found.reshape((*shape, *further))
 
 

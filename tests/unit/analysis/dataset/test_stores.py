@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.command_line import in_this_process
 from support.dataset_examples import (
     coupled_dataset,
     coupled_record,
@@ -104,7 +107,7 @@ def along_one_dimension() -> xr.Dataset:
     return drawn
 
 
-DATASETS = {
+DATASETS: dict[str, Callable[[], xr.Dataset]] = {
     "everything": everything,
     "up and down": up_down,
     "grid": grid_of_runs,
@@ -253,7 +256,10 @@ def test_a_store_is_no_dataset_until_it_is_finished(small_shards: None, tmp_path
     write_dataset(flat, tmp_path / "a.nc")
     with open_dataset(tmp_path / "a.nc") as opened:
         axes = {name: opened[name].variable for name in ("direction", "angular_frequency")}
-        grid, cells = StoreGrid.cut(opened["run_id"].dims, opened["run_id"].shape), opened["run_id"].values
+        grid, cells = (
+            StoreGrid.cut(tuple(map(str, opened["run_id"].dims)), opened["run_id"].shape),
+            opened["run_id"].values,
+        )
     create_store(tmp_path / "a.zarr", flat, grid, axes)
     writer = StoreWriter(tmp_path / "a.zarr")
     whole = read_flat(tmp_path / "a.nc")
@@ -491,3 +497,87 @@ def test_an_address_in_memory_holds_a_store(tmp_path: Path) -> None:
         open_dataset("memory://kept.zarr")
     with pytest.raises(DatasetError, match=r"nosuch://a\.zarr: "):
         open_dataset("nosuch://a.zarr")
+
+
+# ---- the command ----
+
+
+def test_convert_says_the_sizes_and_replaces_only_what_is_the_same(tmp_path: Path) -> None:
+    write_dataset(dataset_of([record(1.0), record(2.0)]), tmp_path / "a.nc")
+    write_dataset(dataset_of([record(1.0)], attrs={"title": "other"}), tmp_path / "b.nc")
+    for output in (tmp_path / "a.zarr", "memory://a.zarr"):
+        for _ in range(2):
+            done = in_this_process("convert", tmp_path / "a.nc", output)
+            assert done.returncode == 0, done.stderr
+        assert re.fullmatch(
+            r"2 runs in .* s: .*a\.zarr, .* MB in \d+ files; .*a\.nc has .* MB in 1 file\.\n", done.stdout
+        )
+        refused = in_this_process("convert", tmp_path / "b.nc", output)
+        assert refused.returncode == 2
+        assert "a.zarr: expected a new file, or one that holds the same" in refused.stderr
+        assert in_this_process("convert", tmp_path / "b.nc", output, "--force").returncode == 0
+        with open_dataset(output) as opened:
+            assert opened.attrs["title"] == "other"
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("a.nc b.nc", "expected a name ending in .zarr, got '.nc'"),
+        ("a.zarr b.zarr", "expected a name ending in .nc, got '.zarr'"),
+        ("a.zarr memory://b.zarr", "expected a name ending in .nc, got the address of a store"),
+        ("a.nc folder.zarr", "expected a place where a file can be written, got a folder"),
+        ("a.nc nowhere/b.zarr", "got no folder of that name"),
+        ("none.nc b.zarr", "expected a dataset file, got no such file"),
+        ("memory://none.zarr b.nc", "expected a Zarr store, got none there"),
+    ],
+)
+def test_convert_refuses_in_one_line(
+    made: Path, monkeypatch: pytest.MonkeyPatch, words: str, reason: str
+) -> None:
+    monkeypatch.chdir(made.parent)
+    Path("folder.zarr").mkdir()
+    done = in_this_process("convert", *words.split())
+    assert done.returncode == 2
+    assert reason in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_conversion_that_fails_leaves_what_was_there(made: Path) -> None:
+    file, before = made.parent / "a.nc", sorted(path.name for path in made.parent.iterdir())
+    path = first_object(made, "final_velocity")
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(DatasetError, match=r"a\.zarr: expected a Zarr store"):
+        convert_dataset(made, file)
+    assert open_dataset(file).sizes["mass"] == 3
+    kept = made.parent / "kept.nc"
+    file.rename(kept)
+    content = bytearray(kept.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    kept.write_bytes(content)
+    with pytest.raises(DatasetError, match=r"kept\.nc"):
+        convert_dataset(kept, made)
+    kept.rename(file)
+    assert sorted(path.name for path in made.parent.iterdir()) == before
+    assert open_dataset(made).sizes["mass"] == 3
+
+
+def test_a_shard_that_is_lost_is_one_error(made: Path) -> None:
+    first_object(made, "final_velocity").unlink()
+    with open_dataset(made) as opened, pytest.raises(DatasetError, match=r"no object final_velocity/c"):
+        opened["final_velocity"].load()
+
+
+@pytest.mark.parametrize(
+    "words", ["describe", "classify", "plot -o a.png", "plot -o a.png --run 3", "estimate impacts --run 3"]
+)
+def test_commands_say_of_a_store_what_they_say_of_its_file(
+    made: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    monkeypatch.chdir(made.parent)
+    name, *more = words.split()
+    command = [name, *([more.pop(0)] if name == "estimate" else [])]
+    of_file, of_store = (in_this_process(*command, each, *more) for each in ("a.nc", "a.zarr"))
+    assert of_store.returncode == of_file.returncode
+    assert of_store.stdout == of_file.stdout.replace("a.nc", "a.zarr")
+    assert of_store.stderr == of_file.stderr.replace("a.nc", "a.zarr")
