@@ -69,6 +69,8 @@ def _naming(study: Study[Any], read: Sequence[Place]) -> Iterator[None]:
     try:
         yield
     except study.named as problem:
+        if str(problem).startswith(f"{read[0]}: "):
+            raise
         raise problem.named(read[0]) from problem
 
 

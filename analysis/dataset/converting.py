@@ -138,8 +138,7 @@ def _to_store(flat: FlatFile, output: Place, shown: Shown) -> int:
             here = ids[block].reshape(-1)
             cells = np.flatnonzero(here >= 0)
             cells = cells[np.argsort(here[cells])]
-            if cells.size:
-                writer.write_shard(block, flat.runs(here[cells]), cells, here[cells])
+            writer.write_shard(block, flat.runs(here[cells]), cells, here[cells])
             done += cells.size
             shown(done, flat.dataset.sizes["run"])
         writer.finish()

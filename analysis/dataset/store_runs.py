@@ -122,11 +122,10 @@ class StoreRuns:
             ids, index = self._values("run_id", block), self._values("run_index", block)
             places = np.flatnonzero(index >= 0)
             places = places[np.argsort(index[places])]
-            ends = {dim: np.cumsum(rows) for dim, rows in self._contents.rows.items()}
-            rows = {
-                dim: slice(int(end[number] - self._contents.rows[dim][number]), int(end[number]))
-                for dim, end in ends.items()
-            }
+            rows = {}
+            for dim, count in self._contents.rows.items():
+                first = self._contents.rows_before(dim, number)
+                rows[dim] = slice(first, first + int(count[number]))
             found = self._assembled(block, places, rows)
             problems = count_problems(found)
             if problems:

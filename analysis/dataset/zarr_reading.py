@@ -19,10 +19,10 @@ from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import structure_problems
 from vibroimpact.analysis.dataset.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
-from vibroimpact.analysis.dataset.zarr_store import LABELS, grid_of
+from vibroimpact.analysis.dataset.zarr_store import LABELS, SHARD_ORDER, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
-from vibroimpact.analysis.files.stores import Place, one_store_error, opened_group, size_of
+from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_of
 from vibroimpact.fmus.errors import DatasetError
 
 _DERIVED = ("run_id", *(f"{dim}_run" for dim in RAGGED), "displacement_range")
@@ -54,9 +54,10 @@ class _StoreArray(BackendArray):
 class _RowsArray(_StoreArray):
     """The rows of all shards, one shard after the other: a dimension of impacts, sticks, samples or events."""
 
-    def __init__(self, place: Place, array: Any, rows: NDArray[np.int64]) -> None:
+    def __init__(self, place: Place, array: Any, rows: NDArray[np.int64], order: NDArray[np.int64]) -> None:
         super().__init__(place, array)
-        self._ends = np.concatenate([[0], np.cumsum(rows)])
+        self._order = order
+        self._ends = np.concatenate([[0], np.cumsum(rows[order])])
         self.shape = (int(self._ends[-1]),)
 
     def _read(self, key: tuple[Any, ...]) -> Any:
@@ -69,10 +70,10 @@ class _RowsArray(_StoreArray):
 
     def _parts(self, first: int, stop: int) -> Iterator[tuple[int, slice]]:
         """Yield the shards with rows from `first` to `stop - 1`, each with its part of them."""
-        for shard, (begin, end) in enumerate(zip(self._ends[:-1], self._ends[1:], strict=True)):
+        for shard, begin, end in zip(self._order, self._ends[:-1], self._ends[1:], strict=True):
             low, high = max(first, begin), min(stop, end)
             if low < high:
-                yield shard, slice(int(low - begin), int(high - begin))
+                yield int(shard), slice(int(low - begin), int(high - begin))
 
 
 def _forward(key: tuple[Any, ...], shape: tuple[int, ...]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -131,6 +132,8 @@ class StoreContents:
         Number of the store, by which its chunks of Dask are named.
     rows : dict
         Number of rows of each shard, by the name of their ragged dimension.
+    order : ndarray of int
+        Numbers of the shards in the order of their runs, which is the order of the rows.
 
     Raises
     ------
@@ -143,8 +146,8 @@ class StoreContents:
         with one_store_error(place):
             self._place, self.attrs = place, attributes_read(dict(group.attrs))
             self.token = str(group.attrs.get(STORE_ID, ""))[:64] or uuid4().hex
-            self._overview = group.get(OVERVIEW)
-            arrays = self._arrays = dict(group.arrays())
+            self._overview = arrays_of(group[OVERVIEW]) if OVERVIEW in group else {}
+            arrays = self._arrays = arrays_of(group)
             refuse_foreign(place, self.attrs, arrays)
             self._take_form()
             problems = structure_problems(self._flat())  # type: ignore[arg-type]  # has what the check uses
@@ -161,6 +164,7 @@ class StoreContents:
         self.linked = str(self._attrs["outcome"].get(COORDINATES, "")).split()
         self._refuse_sizes()
         self.rows = {dim: self._rows_of(dim) for dim in RAGGED if f"{dim}_rows" in arrays}
+        self.order = self._order_of_shards() if self.rows else np.arange(self.grid.shards)
         self.names = self._names()
 
     def _rows_of(self, dim: str) -> NDArray[np.int64]:
@@ -178,6 +182,21 @@ class StoreContents:
                     raise ValueError(f"{name}: fewer rows than {dim}_rows says")
         return rows
 
+    def _order_of_shards(self) -> NDArray[np.int64]:
+        """Return the numbers of the shards in the order of their runs."""
+        array = self._arrays[SHARD_ORDER]
+        if array.shape != (self.grid.shards,):
+            raise ValueError(f"{SHARD_ORDER}: the shape {array.shape}")
+        order = np.asarray(array[...], dtype=np.int64)
+        if not np.array_equal(np.sort(order), np.arange(order.size)):
+            raise ValueError(f"{SHARD_ORDER}: other numbers than those of the shards")
+        return order
+
+    def rows_before(self, dim: str, number: int) -> int:
+        """Return the number of rows before those of a shard."""
+        place = int(np.flatnonzero(self.order == number)[0])
+        return int(self.rows[dim][self.order[:place]].sum())
+
     def _refuse_sizes(self) -> None:
         """Raise ValueError unless each dimension has one size."""
         sizes: dict[str, int] = {}
@@ -188,7 +207,7 @@ class StoreContents:
 
     def _names(self) -> list[str]:
         """Return the names of the variables in the order of the schema; derived variables come last."""
-        hidden = {f"{dim}_rows" for dim in self.rows}
+        hidden = {SHARD_ORDER, *(f"{dim}_rows" for dim in self.rows)}
         first = [name for name in RULES if name in self._arrays]
         others = sorted(self._arrays.keys() - {*first, *hidden, *_DERIVED})
         return [*first, *others, *(name for name in _DERIVED if name in self._arrays)]
@@ -246,16 +265,25 @@ class StoreContents:
     def dataset(self) -> xr.Dataset:
         """Return the dataset on the dimensions of its sweep; values are read when used, those of coordinates now."""
         variables = {name: self._variable(name) for name in self.names}
-        coords = {name: variables.pop(name) for name in self.linked if name in variables}
+        linked = sorted((name for name in self.linked if name in variables), key=self._rank)
+        coords = {name: variables.pop(name) for name in linked}
         with one_store_error(self._place):
             opened = xr.Dataset(variables, coords=coords, attrs=self.attrs)
         opened.encoding["source"] = os.fspath(self._place)
         return opened
 
+    def _rank(self, name: str) -> int:
+        """Return the place of the kind of a coordinate among all, as files are opened with them."""
+        if name == "direction" or self._dims[name]:
+            kinds = (name == "run_index", name in LABELS.values(), False, bool(self._dims[name]), True)
+        else:
+            kinds = (name == "run_index", False, True, True, True)
+        return kinds.index(True)
+
     def overview(self, name: str) -> NDArray[Any] | None:
         """Return an array of the overview of a large map, without the blocks beyond its last cells; None without it."""
         blocks = BlockGrid.of(self.grid)
-        if blocks is None or self._overview is None or name not in self._overview:
+        if blocks is None or name not in self._overview:
             return None
         array = self._overview[name]
         with one_store_error(self._place):
@@ -276,8 +304,8 @@ class StoreContents:
         if _kind(array).kind == "f":
             attrs["_FillValue"] = np.float64(np.nan)
         rows = self.rows[ragged]
-        chunks = (tuple(rows[rows > 0].tolist()) or (0,),)
-        return self._lazy(name, (ragged,), _RowsArray(self._place, array, rows), attrs, chunks)
+        chunks = (tuple(rows[self.order][rows[self.order] > 0].tolist()) or (0,),)
+        return self._lazy(name, (ragged,), _RowsArray(self._place, array, rows, self.order), attrs, chunks)
 
     def _lazy(
         self, name: str, dims: tuple[str, ...], array: _StoreArray, attrs: Any, chunks: Any

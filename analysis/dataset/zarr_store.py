@@ -3,7 +3,7 @@
 The store has the variables, dimensions, coordinates and attributes that `open_dataset` gives for the NetCDF file.
 Impacts, sticks, samples and events are the exception, since their number is not known before. Their arrays have two
 dimensions, such as `impact_shard` and `impact_row`: the rows of the runs of one shard, those of the first run first.
-`impact_rows` has the number of rows of each shard.
+`impact_rows` has the number of rows of each shard, and `shard_order` the shards in the order of their runs.
 
 `create_store` makes the arrays. A `StoreWriter` in any process writes the runs of one shard at a time: a shard of a
 variable is one object, with one writer. `finish` writes the numbers of rows and, last, the consolidated
@@ -32,6 +32,7 @@ from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, a
 from vibroimpact.analysis.files.stores import (
     Place,
     announce,
+    arrays_of,
     consolidate,
     has_object,
     new_array,
@@ -42,12 +43,13 @@ from vibroimpact.analysis.files.stores import (
 )
 from vibroimpact.fmus.errors import DatasetError
 
+SHARD_ORDER = "shard_order"
 LABELS = {"interface": "connection", "comparison": "compared"}
 """Dimensions of a file that are named by a variable in an opened dataset."""
 MOST_ROWS = 1 << 40
 """Number of rows of a shard for which its arrays are announced until the store is finished."""
+_LAST = np.iinfo(np.int32).max
 RUN_ID = {"long_name": "position of the run in the file", "units": "1"}
-_SHARDS = tuple((f"{dim}_shard",) for dim in RAGGED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,16 +129,17 @@ class StoreWriter:
         self._place = place
         self._group = opened_group(place, "r+")
         with one_store_error(place):
-            self._arrays = dict(self._group.arrays())
+            self._arrays = arrays_of(self._group)
+            self._overview = arrays_of(self._group[OVERVIEW]) if OVERVIEW in self._group else {}
             self.grid = grid_of(self._arrays["run_id"])
             linked = str(self._arrays["outcome"].attrs.get(COORDINATES, "")).split()
-            kept = {name for name in linked if name != "run_index"}
+            kept = {SHARD_ORDER, *(name for name in linked if name != "run_index")}
             self._of_cells = {
                 name: array
                 for name, array in self._arrays.items()
-                if _dims(array)[: len(self.grid.dims)] == self.grid.dims
-                and name not in kept
-                and _dims(array)[:1] not in _SHARDS
+                if name not in kept
+                and not _is_of_rows(_dims(array))
+                and _dims(array)[: len(self.grid.dims)] == self.grid.dims
             }
 
     def write_shard(
@@ -185,9 +188,8 @@ class StoreWriter:
         with one_store_error(self._place, writes=True):
             for name, array in self._of_cells.items():
                 values = ids if name == "run_id" else _column(columns, name)
-                if values is not None:
-                    on_cells = _on_cells(array, values, None if in_order else places, shape)
-                    self._replace(array, block, on_cells)
+                on_cells = _on_cells(array, values, None if in_order else places, shape)
+                self._replace(array, block, on_cells)
             self._write_overview(block, runs, places, shape)
             return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
 
@@ -243,9 +245,8 @@ class StoreWriter:
                 codes[places] = columns[name].values
                 kinds.append(codes.reshape(shape))
             parts |= dict(zip(CLASSES, blocks.rarest(kinds), strict=True))
-        overview = self._group[OVERVIEW]
         for name, values in parts.items():
-            self._replace(overview[name], blocks.place(block), values)
+            self._replace(self._overview[name], blocks.place(block), values)
 
     @property
     def _ragged(self) -> list[str]:
@@ -277,10 +278,10 @@ class StoreWriter:
         for name, array in self._arrays.items():
             if name in self._of_cells:
                 found += _keys(array, block)
-            elif _dims(array)[:1] in _SHARDS and array.ndim > 1:
+            elif _is_of_rows(_dims(array)) and array.ndim > 1:
                 found += objects_below(self._place, f"{array.path}/c/{self.grid.number(block)}")
         blocks = BlockGrid.of(self.grid)
-        for _, array in self._group[OVERVIEW].arrays() if blocks is not None else ():
+        for array in arrays_of(self._group[OVERVIEW]).values() if blocks is not None else ():
             found += _keys(array, blocks.place(block)) if blocks is not None else []
         return sorted(key for key in found if has_object(self._place, key))
 
@@ -332,6 +333,10 @@ class StoreWriter:
                 for name, array in self._arrays.items():
                     if _dims(array) == (f"{dim}_shard", f"{dim}_row"):
                         announce(self._place, name, (self.grid.shards, most))
+            if self._ragged:
+                index = (self._arrays["run_index"][block] for block in self.grid.blocks())
+                first = [int(each[each >= 0].min(initial=_LAST)) for each in index]
+                self._arrays[SHARD_ORDER][...] = np.argsort(first, kind="stable")
         consolidate(self._place)
 
 
@@ -357,9 +362,9 @@ def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict
             owner = {"long_name": f"run_id of the run of each {dim}", "units": "1"}
             found[f"{dim}_run"] = _rows(dim, grid, np.int32, owner)
             number = {"long_name": f"number of rows of {dim} in each shard", "units": "1"}
-            found[f"{dim}_rows"] = _whole(
-                new_variable((f"{dim}_shard",), np.zeros(grid.shards, dtype=np.int64), number)
-            )
+            found[f"{dim}_rows"] = _of_shards(f"{dim}_shard", grid, number)
+            order = {"long_name": "numbers of the shards in the order of their runs", "units": "1"}
+            found[SHARD_ORDER] = _of_shards("shard", grid, order)
     return found
 
 
@@ -393,6 +398,10 @@ def _cells(grid: StoreGrid, further: Mapping[str, int], dtype: Any, attrs: Mappi
 def _rows(dim: str, grid: StoreGrid, dtype: Any, attrs: Mapping[str, Any]) -> _Array:
     shape = (grid.shards, MOST_ROWS)
     return _Array((f"{dim}_shard", f"{dim}_row"), shape, (1, CHUNK_POINTS), (1, SHARD_POINTS), dtype, attrs)
+
+
+def _of_shards(dim: str, grid: StoreGrid, attrs: Mapping[str, Any]) -> _Array:
+    return _whole(new_variable((dim,), np.zeros(grid.shards, dtype=np.int64), attrs))
 
 
 def _whole(variable: xr.Variable) -> _Array:
@@ -432,6 +441,10 @@ def _dims(array: Any) -> tuple[str, ...]:
     return tuple(array.metadata.dimension_names or ())
 
 
+def _is_of_rows(dims: tuple[str, ...]) -> bool:
+    return dims[:1] in {(f"{dim}_shard",) for dim in RAGGED}
+
+
 def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | None:
     """Return the values of runs, those of derived variables too; None for a variable that the runs lack."""
     if name == RANGE:
@@ -439,14 +452,17 @@ def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | Non
     return None if name not in columns else np.asarray(columns[name].values)
 
 
-def _on_cells(array: Any, values: NDArray[Any], places: NDArray[Any] | None, shape: tuple[int, ...]) -> Any:
+def _on_cells(
+    array: Any, values: NDArray[Any] | None, places: NDArray[Any] | None, shape: tuple[int, ...]
+) -> Any:
     """Return values of runs on the cells of a block, in the form of an array; without places, in their order."""
     further = array.shape[len(shape) :]
-    if places is None and values.shape[1:] == further:
+    if values is not None and places is None and values.shape[1:] == further:
         return np.asarray(values, dtype=_kind(array)).reshape((*shape, *further))
-    places = np.arange(len(values)) if places is None else places
     found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
-    found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
+    if values is not None:
+        places = np.arange(len(values)) if places is None else places
+        found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
     return found.reshape((*shape, *further))
 
 

@@ -15,7 +15,7 @@ from zarr.codecs import VLenUTF8Codec as ZarrTexts
 from zarr.registry import register_codec
 from zarr.storage import WrapperStore
 
-from vibroimpact.analysis.files.stores import MOST_METADATA_BYTES
+from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES
 
 MOST_OBJECT_BYTES = 1 << 30
 """Largest object of a store that is read, bytes: a shard has 64 MiB of numbers."""
@@ -25,19 +25,29 @@ _BLOSC_HEAD, _ZSTD_HEAD = 16, 18
 
 
 class BoundedStore(WrapperStore[Any]):
-    """A store that gives no object above its bound."""
+    """A store that gives no object above its bound; a finished one has an object for each shard that is read."""
 
     async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:
         """Return an object, or a part of it; one above its bound raises ValueError."""
         most = MOST_METADATA_BYTES if key.endswith("zarr.json") else MOST_OBJECT_BYTES
         if isinstance(byte_range, RangeByteRequest) and byte_range.end - byte_range.start > most:
             raise ValueError(f"a part of {key} above {most} bytes")
-        if byte_range is None:
-            byte_range = RangeByteRequest(0, most + 1)
+        if byte_range is None and await self._size(key) > most:
+            raise ValueError(f"an object {key} above {most} bytes")
         found = await super().get(key, prototype, byte_range)
+        if found is None and self.read_only and not key.endswith("zarr.json"):
+            raise ValueError(f"no object {key}")
+        if found is not None and not len(found):
+            raise ValueError(f"an empty object {key}")
         if found is not None and len(found) > most:
             raise ValueError(f"an object {key} above {most} bytes")
         return found
+
+    async def _size(self, key: str) -> int:
+        try:
+            return int(await self._store.getsize(key))
+        except FileNotFoundError:
+            return 0
 
 
 class BoundedBlosc(BloscCodec):
@@ -85,7 +95,11 @@ def _zstd_content(head: bytes) -> int | None:
 
 
 _BOUNDED = {"blosc": BoundedBlosc, "zstd": BoundedZstd, "vlen-utf8": VLenUTF8Codec}
-CODECS = {f"codecs.{name}": f"{__name__}.{codec.__name__}" for name, codec in _BOUNDED.items()}
-"""Settings of zarr with which an array that is opened gets the bounded codecs."""
+SETTINGS: dict[str, Any] = {
+    # a missing object is then damage, and no shard of missing values
+    "array.write_empty_chunks": True,
+    **{f"codecs.{name}": f"{__name__}.{codec.__name__}" for name, codec in _BOUNDED.items()},
+}
+"""Settings of zarr with which arrays are made and opened."""
 for _name, _codec in _BOUNDED.items():
     register_codec(_name, _codec)

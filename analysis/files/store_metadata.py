@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,199}(/[A-Za-z][A-Za-z0-9_]{0,199})?")
+MOST_METADATA_BYTES = 1 << 26
 MOST_ARRAYS = 4096
 MOST_VALUES = 1 << 40
 """Largest announced number of values of an array."""

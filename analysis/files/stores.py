@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.store_metadata import finished_nodes
+from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 STORE_ENDING = ".zarr"
-MOST_METADATA_BYTES = 1 << 26
 LONGEST_REASON = 200
 Place = str | os.PathLike[str]
 """A path, or an address such as `s3://bucket/map.zarr`."""
@@ -90,15 +89,28 @@ def opened_group(place: Place, mode: str) -> Any:
         There is no store, it is unfinished, or it cannot be reached.
     """
     zarr = zarr_package()
-    from vibroimpact.analysis.files.bounded_stores import CODECS, BoundedStore
+    from vibroimpact.analysis.files.bounded_stores import BoundedStore
 
-    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), zarr.config.set(CODECS):
+    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), _settings():
         store = BoundedStore(_store(place, read_only=mode == "r"))
         if mode == "w-":
             return zarr.create_group(store, zarr_format=3)
         if mode == "r":
             _refuse_unfinished(place)
         return zarr.open_group(store, mode=mode, zarr_format=3, use_consolidated=mode == "r")
+
+
+def _settings() -> Any:
+    """Return the context in which arrays are made and opened: it has the bounded codecs."""
+    from vibroimpact.analysis.files.bounded_stores import SETTINGS
+
+    return zarr_package().config.set(SETTINGS)
+
+
+def arrays_of(group: Any) -> dict[str, Any]:
+    """Return the arrays of a group, by name."""
+    with _settings():
+        return dict(group.arrays())
 
 
 def _store(place: Place, *, read_only: bool) -> Any:
@@ -112,12 +124,13 @@ def _store(place: Place, *, read_only: bool) -> Any:
 def _refuse_unfinished(place: Place) -> None:
     """Raise DatasetError unless a store has the consolidated metadata that are written last."""
     system, root = system_of(place)
+    head = f"{root}/zarr.json"
     try:
-        found = system.cat_file(f"{root}/zarr.json", 0, MOST_METADATA_BYTES + 1)
+        if system.size(head) > MOST_METADATA_BYTES:
+            raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
+        found = system.cat_file(head)
     except FileNotFoundError:
         raise DatasetError(f"{os.fspath(place)}: expected a Zarr store, got none there.") from None
-    if len(found) > MOST_METADATA_BYTES:
-        raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
     if finished_nodes(json.loads(found)) is None:
         raise DatasetError(
             f"{os.fspath(place)}: expected a finished store, got one without consolidated metadata. "
@@ -184,17 +197,18 @@ def new_array(
     kind = np.dtype(dtype).kind
     is_text = kind in "OUT"
     packed = ZstdCodec(level=1) if is_text else BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
-    return group.create_array(
-        name,
-        shape=shape,
-        dtype="string" if is_text else dtype,
-        chunks=chunk,
-        shards=None if shard == chunk else shard,
-        compressors=(packed, Crc32cCodec()),
-        fill_value="" if is_text else math.nan if kind == "f" else -1,
-        attributes=attributes,
-        dimension_names=dims,
-    )
+    with _settings():
+        return group.create_array(
+            name,
+            shape=shape,
+            dtype="string" if is_text else dtype,
+            chunks=chunk,
+            shards=None if shard == chunk else shard,
+            compressors=(packed, Crc32cCodec()),
+            fill_value="" if is_text else math.nan if kind == "f" else -1,
+            attributes=attributes,
+            dimension_names=dims,
+        )
 
 
 @contextmanager
