@@ -1,8 +1,9 @@
 """The door to the dataset: its schema, its writers and its readers.
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
-`writing` builds and writes, `merging` joins parts, `reading` opens. `accessor` is `ds.vibroimpact`, which
-`registering` adds to xarray; `backend` is its engine. Everything public is importable from here.
+`writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
+`accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
+importable from here.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
     from vibroimpact.analysis.dataset.checking import check, marked
+    from vibroimpact.analysis.dataset.joining import join_files
     from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
     from vibroimpact.analysis.dataset.reading import (
         Part,
@@ -56,6 +58,7 @@ __all__ = [
     "dataset_file",
     "file_name_of",
     "file_names",
+    "join_files",
     "marked",
     "merge_datasets",
     "open_dataset",
@@ -70,6 +73,7 @@ __all__ = [
 _HOMES = {
     "VibroimpactAccessor": "accessor",
     **dict.fromkeys(("check", "marked"), "checking"),
+    "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
     **dict.fromkeys(
         ("Part", "dataset_file", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"

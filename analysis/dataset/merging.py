@@ -47,11 +47,24 @@ def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
     parts = [read_flat(path) for path in paths]
     first_index = [part.run_index.values[0] if part.sizes["run"] else -1 for part in parts]
     order = np.argsort(first_index, kind="stable")
-    return _joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
+    return joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
 
 
-def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
-    """Join parts along run and along every ragged dimension, then put the runs in order."""
+def joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
+    """Join one-dimensional datasets along run and along every ragged dimension, then put the runs in order.
+
+    Parameters
+    ----------
+    parts : sequence of xarray.Dataset
+        Attributes are those of the first.
+    names : sequence of str
+        Names of their files, for messages.
+
+    Raises
+    ------
+    DatasetError
+        If they differ in their variables, or a run is in two of them.
+    """
     parts = _completed(parts)
     first = parts[0]
     for name, part in zip(names, parts, strict=True):
@@ -63,12 +76,13 @@ def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
         if not _is_shared(name, variable)
     }
     index = columns["run_index"]
-    if np.unique(index).size != index.size:
-        raise DatasetError(
-            f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
-        )
-    if (np.diff(index) < 0).any():
-        columns = _ordered(columns, first, np.argsort(index))
+    if (np.diff(index) <= 0).any():
+        order = np.argsort(index)
+        if (np.diff(index[order]) == 0).any():
+            raise DatasetError(
+                f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
+            )
+        columns = _ordered(columns, first, order)
     return _with_columns(first, columns)
 
 

@@ -20,6 +20,7 @@ from vibroimpact.analysis.dataset.checking import count_problems, structure_prob
 from vibroimpact.analysis.dataset.grid import on_grid, shared_axes
 from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import (
+    RAGGED,
     SCHEMA_VERSION,
     swept_names,
 )
@@ -28,6 +29,9 @@ from vibroimpact.analysis.files.lazy_store import LazyStore
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.files.probing import check_sound, refuse_changed
 from vibroimpact.fmus.errors import DatasetError
+
+SILENT = "without_messages"
+"""Attribute of a part in which no run has a message: its texts, which cost more than all numbers, are not read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +96,66 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     with _opened(path) as file:
         data = {
-            name: (variable.dimensions, variable[...], _attributes(variable))
+            name: (variable.dimensions, _values(file, name), _attributes(variable))
             for name, variable in file.variables.items()
         }
-        # the library lists variables by the alphabet; this attribute keeps the order of the scene
-        links = " ".join(getattr(variable, "coordinates", "") for variable in file.variables.values())
-        linked = dict.fromkeys(links.split())
-        attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        coords = {name: data.pop(name) for name in linked}
-        return _fitting(path, assembled(data, coords, attrs))
+        return _fitting(path, _as_flat(file, data))
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """The form of a file, and the numbers of its runs.
+
+    Attributes
+    ----------
+    form : xarray.Dataset
+        The file without its runs: the names, the types and the attributes, and the values that all runs share.
+    sizes : dict of str to int
+        Size of the dimension `run`, and of each ragged dimension.
+    first, last : int
+        Lowest and highest run index; -1 in a file without runs.
+    """
+
+    form: xr.Dataset
+    sizes: dict[str, int]
+    first: int
+    last: int
+
+
+def read_head(path: str | os.PathLike[str]) -> Head:
+    """Read the form of a file; DatasetError as in `read_flat`."""
+    with _opened(path) as file:
+        along = ("run", *RAGGED)
+        data: dict[str, Any] = {}
+        for name, variable in file.variables.items():
+            is_shared = variable.dimensions[:1] not in {(dimension,) for dimension in along}
+            none = np.empty(
+                (0, *variable.shape[1:]), dtype=object if variable.dtype is str else variable.dtype
+            )
+            data[name] = (variable.dimensions, variable[...] if is_shared else none, _attributes(variable))
+        index = file.variables["run_index"][:]
+        return Head(
+            _as_flat(file, data),
+            {name: file.dimensions[name].size for name in along if name in file.dimensions},
+            int(index.min(initial=index[0])) if index.size else -1,
+            int(index.max(initial=-1)),
+        )
+
+
+def _as_flat(file: netCDF4.Dataset, data: dict[str, Any]) -> xr.Dataset:
+    """Return the variables of a file as a dataset, with the attributes of the file."""
+    # the library lists variables by the alphabet; this attribute keeps the order of the scene
+    links = " ".join(getattr(variable, "coordinates", "") for variable in file.variables.values())
+    coords = {name: data.pop(name) for name in dict.fromkeys(links.split())}
+    return assembled(data, coords, {name: file.getncattr(name) for name in file.ncattrs() if name != SILENT})
+
+
+def _values(file: netCDF4.Dataset, name: str) -> NDArray[Any]:
+    """Return the values of a stored variable."""
+    if name == "message" and SILENT in file.ncattrs():
+        return np.full(file.dimensions["run"].size, "", dtype=object)
+    values: NDArray[Any] = file.variables[name][...]
+    return values
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:

@@ -387,7 +387,19 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
 
 
 def _store(file: netCDF4.Dataset, one: Stored, compression: int) -> None:
-    """Store one variable with its attributes; floats mark missing values by NaN."""
+    """Store one variable with its attributes."""
+    variable = one.variable
+    placed = define_variable(file, one, variable.size, compression)
+    if variable.dtype.kind == "O":
+        store_texts(placed, variable.values)
+    elif variable.size:
+        placed[...] = variable.values
+
+
+def define_variable(
+    file: netCDF4.Dataset, one: Stored, size: int, compression: int = 0
+) -> netCDF4.Variable[Any]:
+    """Define a variable of `size` elements in a file, with its attributes; floats mark missing values by NaN."""
     variable = one.variable
     is_text = variable.dtype.kind == "O"
     kind: Any = str if is_text else variable.dtype
@@ -400,17 +412,17 @@ def _store(file: netCDF4.Dataset, one: Stored, compression: int) -> None:
         compression="zlib" if compression and not is_text else None,
         complevel=level,
         shuffle=True,
-        chunksizes=[min(_TEXT_CHUNK, variable.size)] if is_text and variable.size else None,
+        chunksizes=[min(_TEXT_CHUNK, size)] if is_text and size else None,
     )
     placed.setncatts({**variable.attrs, "coordinates": one.linked} if one.linked else dict(variable.attrs))
-    if is_text:
-        _store_texts(placed, variable.values)
-    elif variable.size:
-        placed[...] = variable.values
+    return placed
 
 
-def _store_texts(placed: netCDF4.Variable[Any], texts: NDArray[Any]) -> None:
-    """Store the texts that are not empty: an element never stored reads as empty, and takes no space."""
+def store_texts(placed: netCDF4.Variable[Any], texts: NDArray[Any], first: int = 0) -> None:
+    """Store the texts that are not empty, from the element `first` on.
+
+    An element that was never stored reads as empty, and takes no space.
+    """
     places = np.flatnonzero(texts.astype(bool))
     for block in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else ():
-        placed[block[0] : block[-1] + 1] = texts[block]
+        placed[first + block[0] : first + block[-1] + 1] = texts[block]

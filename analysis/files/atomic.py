@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -44,18 +45,33 @@ def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview)
         If the file cannot be written (no space, no permission, no folder, no place for a file), with the system's
         reason.
     """
+    with whole_or_absent(path) as temporary, open(temporary, "xb") as file:
+        for piece in content:
+            file.write(piece)
+
+
+@contextmanager
+def whole_or_absent(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary path; the file that the block writes there replaces `path` once it is on the disk.
+
+    On any failure of the block the temporary file is removed, and its space is free even if a library keeps it open.
+
+    Raises
+    ------
+    OSError
+        See `write_atomically`.
+    """
     target = Path(path)
     refuse_special(target)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
-        with open(temporary, "xb") as file:
-            for piece in content:
-                file.write(piece)
-            file.flush()
+        yield temporary
+        with open(temporary, "r+b") as file:
             os.fsync(file.fileno())
         os.replace(temporary, target)
     except BaseException as problem:
         with suppress(OSError):
+            os.truncate(temporary, 0)
             temporary.unlink()
         if isinstance(problem, OSError):
             # The error of a write has no file name, and a person knows the target, not the temporary name.

@@ -48,6 +48,22 @@ def sealed(image: bytes | memoryview) -> tuple[memoryview, bytes]:
     return content, closing_line(content)
 
 
+def seal(path: str | os.PathLike[str]) -> None:
+    """Append the closing line to a NetCDF-4 file on the disk; bytes after the end that its header says are cut off.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read or written.
+    """
+    with open(path, "r+b") as file:
+        length = content_length(file.read(_HEAD)) or os.fstat(file.fileno()).st_size
+        file.truncate(length)
+        file.seek(0)
+        digits = _hash_of(file, length)
+        file.write(_BEGIN + digits + _END)
+
+
 def content_length(head: bytes | memoryview) -> int | None:
     """Return the end of the content of an HDF5 file according to its first bytes; None for another kind of file."""
     if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in _END_OF_FILE:

@@ -7,6 +7,7 @@ scene once and uses them for all its chunks. The results of a point never depend
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,16 +21,18 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
-from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, tally
+from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.points import PointColumns, State, columns_of_points
 from vibroimpact.orchestrator.running.kept import OpenedScene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import Branch, expand
+from vibroimpact.orchestrator.scene.sweep import Branch, Paths, expand
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
@@ -56,7 +59,7 @@ class Work:
     """Execution with which the campaign began; empty: the scene's own."""
     kept: str = ""
     """File with the runs of an earlier sweep, which all chunks leave out; it may be absent."""
-    branches: tuple[Branch, ...] = ()
+    branches: Sequence[Branch] = ()
     """The points of a round of an adaptive sweep; empty: the points of the scene's sweep."""
     manifest: str = ""
     """Manifest in each part, from which `campaign.json` can be made again; empty: none is written."""
@@ -68,7 +71,7 @@ class Chunk:
 
     A chunk is a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the run
     before; None is the scene's own start state. A chunk that takes longer than `most_seconds` ends early, after a
-    point; other chunks compute the rest.
+    point; so does one whose results take more than `most_bytes`. Other chunks compute the rest.
     """
 
     branch: int
@@ -76,6 +79,7 @@ class Chunk:
     stop: int
     start: State | None = None
     most_seconds: float = math.inf
+    most_bytes: int = MOST_BYTES
 
     @property
     def count(self) -> int:
@@ -100,29 +104,42 @@ class ChunkResult:
     """Number of runs by outcome."""
     compute_seconds: float
     """Wall time of the runs, s."""
+    size: int = 0
+    """Size of the results, bytes, where they are columns; else 0."""
 
 
-_at_work: dict[Work, tuple[tuple[Branch, ...], OpenedScene]] = {}
-"""The scene that this process has opened for chunks, with its branches: one scene at most."""
+class _AtWork(threading.local):
+    """The scene that this thread has opened for chunks, with its branches."""
+
+    key: Work | None = None
+    branches: Sequence[Branch] = ()
+    opened: OpenedScene | None = None
 
 
-def _opened(work: Work) -> tuple[tuple[Branch, ...], OpenedScene]:
-    """Return the branches of a scene, and the opened scene that runs their points in this process."""
-    key = Work(work.scene, "", work.runner, execution=work.execution)
-    if key not in _at_work:
-        take_up(key, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
-    return _at_work[key]
+_at_work = _AtWork()
+
+
+def _opened(work: Work) -> tuple[Sequence[Branch], OpenedScene]:
+    """Return the branches of a scene, and the opened scene that runs their points in this thread."""
+    if _at_work.opened is None or _at_work.key != _key(work):
+        take_up(work, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
+    assert _at_work.opened is not None
+    return _at_work.branches, _at_work.opened
+
+
+def _key(work: Work) -> Work:
+    return Work(work.scene, "", work.runner, execution=work.execution)
 
 
 def take_up(work: Work, opened: OpenedScene) -> None:
-    """Use a scene that is open in this process for the following chunks."""
+    """Use an opened scene for the following chunks of this thread."""
     lay_down()
-    _at_work[Work(work.scene, "", work.runner, execution=work.execution)] = expand(work.scene), opened
+    _at_work.key, _at_work.branches, _at_work.opened = _key(work), expand(work.scene), opened
 
 
 def lay_down() -> None:
-    """Forget the opened scene of chunks, without closing it."""
-    _at_work.clear()
+    """Forget the opened scene of the chunks of this thread, without closing it."""
+    _at_work.key, _at_work.branches, _at_work.opened = None, (), None
     _kept_runs.cache_clear()
 
 
@@ -153,13 +170,14 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
     opened.failed = True  # until the chunk has ended
-    records, carried = opened.runner.rows(points, chunk.start, deadline)
+    records, carried = run_in_pieces(opened.runner, points, chunk.start, deadline, chunk.most_bytes)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
     outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
     opened.failed = Outcome.error.name in outcomes
-    return ChunkResult(done, carried, outcomes, seconds)
+    size = records.nbytes if isinstance(records, RunColumns) else 0
+    return ChunkResult(done, carried, outcomes, seconds, size)
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
@@ -189,7 +207,8 @@ def _refuse_other_runner(work: Work, runner: Runner) -> None:
 
 def points_of(branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
     """Return the points of a chunk, which may span several branches."""
-    return columns_of_points(branches[chunk.branch :], chunk.first, chunk.stop)
+    left = branches if isinstance(branches, Paths) else branches[chunk.branch :]
+    return columns_of_points(left, chunk.first, chunk.stop)
 
 
 def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
@@ -236,6 +255,8 @@ def write_part(
     path = Path(work.parts_folder, chunk.part_name)
     try:
         dataset = form.dataset(points, records, attrs)
+        if not has_messages(dataset):
+            dataset.attrs[SILENT] = 1
         write_dataset(dataset, path)
     except OSError as error:
         raise CampaignError(

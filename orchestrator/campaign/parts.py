@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import (
     check,
-    merge_datasets,
+    join_files,
     read_flat,
     read_part,
     refuse_unlike,
-    write_dataset,
 )
 from vibroimpact.analysis.dataset.assembling import wrapped
 from vibroimpact.analysis.files.fingerprints import has_recorded_hash
@@ -130,19 +129,22 @@ def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) ->
     return StoredPart(path, chunk, carried_state(part.attrs), part.run_index.size)
 
 
-def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """Write the rows of all parts as one dataset, with the numbers that are not swept, and return the dataset.
+def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> bool:
+    """Write the rows of all parts as one dataset, with the numbers that are not swept.
 
-    The file is written as a whole or not at all. DatasetError: a part cannot be read or joined with the others;
-    `unfit_parts` finds the part. OSError: the dataset cannot be written.
+    It returns whether any row has a message. The file is written as a whole or not at all. DatasetError: a part cannot
+    be read or joined with the others; `unfit_parts` finds the part. OSError: the dataset cannot be written.
     """
-    dataset = merge_datasets(parts)
     # Attributes of the first part, which do not hold for all runs.
     own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
-    dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
-    dataset = dataset.assign_coords(wrapped(form.constants()))
-    write_dataset(dataset, target)
-    return dataset
+
+    def finished(rows: xr.Dataset) -> xr.Dataset:
+        kept = {name: value for name, value in rows.attrs.items() if name not in own}
+        described = rows.assign_coords(wrapped(form.constants()))
+        described.attrs = kept | dict(attrs)
+        return described
+
+    return join_files(parts, target, finished)
 
 
 def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,8 +12,17 @@ from hypothesis import strategies as st
 from support.dataset_examples import CONNECTIONS, coupled_dataset, coupled_record, dataset_of, failed, record
 
 from vibroimpact.analysis import open_dataset
-from vibroimpact.analysis.dataset import Direction, RunRecord, file_names, merge_datasets, write_dataset
+from vibroimpact.analysis.dataset import (
+    Direction,
+    RunRecord,
+    file_names,
+    join_files,
+    merge_datasets,
+    read_flat,
+    write_dataset,
+)
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
+from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
 
 Lengths = st.lists(st.tuples(*(st.integers(0, 4),) * 3), min_size=1, max_size=8)
 
@@ -63,8 +73,25 @@ def test_parts_in_any_order_merge_into_what_one_build_gives(
             if chosen:
                 paths.append(Path(folder, f"{first}.nc"))
                 write_dataset(part_of(runs, chosen), paths[-1])
-        merged = merge_datasets(data.draw(st.permutations(paths)))
+        shuffled = data.draw(st.permutations(paths))
+        merged = merge_datasets(shuffled)
+        whole, joined = Path(folder, "whole.nc"), Path(folder, "joined.nc")
+        write_dataset(merged, whole)
+        assert join_files(shuffled, joined) == any(run.message for run in runs)
+        assert_same_files(joined, whole)
     xr.testing.assert_identical(merged, part_of(runs, list(range(len(runs)))))
+
+
+def assert_same_files(one: Path, other: Path) -> None:
+    assert matches_recorded_hash(one)
+    with netCDF4.Dataset(one) as first, netCDF4.Dataset(other) as second:
+        assert list(first.variables) == list(second.variables)
+        assert first.ncattrs() == second.ncattrs()
+        for name, variable in first.variables.items():
+            again = second.variables[name]
+            assert (variable.dtype, variable.dimensions) == (again.dtype, again.dimensions)
+            assert (variable.ncattrs(), variable.chunking()) == (again.ncattrs(), again.chunking())
+    xr.testing.assert_identical(read_flat(one), read_flat(other))
 
 
 def part_of(runs: list[RunRecord], chosen: list[int]) -> xr.Dataset:
@@ -97,6 +124,8 @@ def test_events_and_residuals_of_parts_in_any_order_come_back_run_by_run(
         merged = merge_datasets(paths)
         xr.testing.assert_identical(merged, coupled_dataset(runs))
         write_dataset(merged, Path(folder, "merged.nc"))
+        join_files(paths, Path(folder, "joined.nc"))
+        assert_same_files(Path(folder, "joined.nc"), Path(folder, "merged.nc"))
         with open_dataset(Path(folder, "merged.nc")) as opened:
             shuffled = opened.isel(mass=order)
             for k, run in enumerate(runs):

@@ -35,6 +35,7 @@ from vibroimpact.analysis.dataset import (
     check,
     file_name_of,
     file_names,
+    join_files,
     marked,
     merge_datasets,
     read_flat,
@@ -893,3 +894,25 @@ def test_sampled_elements_of_a_body_are_described_by_the_schema() -> None:
     assert dataset["modal_energy_12"].attrs == {"long_name": "energy of mode 12", "units": "J"}
     assert dataset["energy_damping_loss"].attrs["units"] == "J"
     check(dataset)
+
+
+@pytest.mark.parametrize("reserves", [True, False])
+def test_a_full_disk_while_files_are_joined_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reserves: bool
+) -> None:
+    resource = pytest.importorskip("resource")
+    parts = [written(up_down(), tmp_path, "part.nc")]
+    target = tmp_path / "joined.nc"
+    target.write_bytes(b"old")
+    if not reserves:
+        monkeypatch.delattr(os, "posix_fallocate", raising=False)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
+    try:
+        with pytest.raises(OSError, match="File too large" if reserves else "HDF error") as caught:
+            join_files(parts, target)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.filename == str(target)
+    assert target.read_bytes() == b"old"
+    assert sorted(tmp_path.iterdir()) == [target, *parts]
