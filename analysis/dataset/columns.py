@@ -30,6 +30,11 @@ class Ragged:
     count: NDArray[np.int64]
     rows: Floats
 
+    @property
+    def nbytes(self) -> int:
+        """Size of the arrays, bytes."""
+        return self.count.nbytes + self.rows.nbytes
+
     def taken(self, first: int, stop: int) -> Ragged:
         """Return the rows of the runs `first` to `stop - 1`."""
         begin, end = int(self.count[:first].sum()), int(self.count[:stop].sum())
@@ -64,6 +69,12 @@ class RunColumns:
 
     def __len__(self) -> int:
         return len(self.outcome)
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the arrays, bytes."""
+        values = (getattr(self, name) for name in self.__slots__)
+        return sum(value.nbytes for value in values if value is not None)
 
     def taken(self, first: int, stop: int) -> RunColumns:
         """Return the runs `first` to `stop - 1`."""

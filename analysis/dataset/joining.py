@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.checking import marked
-from vibroimpact.analysis.dataset.merging import joined, take_runs
+from vibroimpact.analysis.dataset.merging import joined, refuse_unlike, take_runs
 from vibroimpact.analysis.dataset.reading import read_flat, read_head
 from vibroimpact.analysis.dataset.storing import stored_variables
 from vibroimpact.analysis.dataset.writing import define_variable, store_texts
@@ -63,14 +63,12 @@ def join_files(
     if not paths:
         raise DatasetError("merge: expected at least one file, got none.")
     form, files, sizes = _survey(paths)
-    is_silent = True
     with whole_or_absent(target) as temporary:
         with appended_file(temporary, marked(finished(form)), sizes) as file:
             for block in blocks_in_order(files, form, os.fspath(paths[0])):
                 file.append(marked(block))
-                is_silent = is_silent and not block.variables["message"].values.any()
         seal(temporary)
-    return not is_silent
+    return file.has_messages
 
 
 # ---- the files ----
@@ -97,7 +95,9 @@ def _survey(paths: Sequence[str | os.PathLike[str]]) -> tuple[xr.Dataset, list[_
     files, sizes, first_name = [], dict[str, int](), os.fspath(paths[0])
     for path in [os.fspath(path) for path in paths]:
         head = read_head(path)
-        form = head.form if form is None else joined([form, head.form], [first_name, path])
+        form = head.form if form is None else form
+        if not _are_alike(form, head.form):
+            form = joined([form, head.form], [first_name, path])
         sizes = {name: sizes.get(name, 0) + head.sizes.get(name, 0) for name in sizes | head.sizes}
         if head.sizes["run"]:
             files.append(_File(path, head.first, head.last))
@@ -134,8 +134,22 @@ def blocks_in_order(files: Sequence[Piece], form: xr.Dataset, form_name: str) ->
             waiting.pop()
         pieces = {file.path: _between(part, begin, end) for file, part in rows.items()}
         rows = {file: part for file, part in rows.items() if file.last >= end}
-        if any(piece.sizes["run"] for piece in pieces.values()):
-            yield joined([form, *pieces.values()], [form_name, *pieces])
+        found = {path: piece for path, piece in pieces.items() if piece.sizes["run"]}
+        if len(found) == 1 and _are_alike(form, *found.values()):
+            for path, piece in found.items():
+                refuse_unlike(path, piece, form_name, form)
+                yield piece
+        elif found:
+            yield joined([form, *found.values()], [form_name, *found])
+
+
+def _are_alike(one: xr.Dataset, other: xr.Dataset) -> bool:
+    """Return whether two datasets have the same variables, with equal dimensions besides their runs and rows."""
+    forms = [
+        {name: (variable.dims, variable.shape[1:]) for name, variable in rows.variables.items()}
+        for rows in (one, other)
+    ]
+    return forms[0] == forms[1]
 
 
 def _between(rows: xr.Dataset, begin: int, end: int) -> xr.Dataset:
@@ -154,7 +168,7 @@ class _AppendedFile:
     """A NetCDF-4 file of known size, to which runs are appended in their order."""
 
     def __init__(self, file: netCDF4.Dataset, form: xr.Dataset, sizes: Mapping[str, int]) -> None:
-        self._file, self._reached = file, dict.fromkeys(sizes, 0)
+        self._file, self._reached, self.has_messages = file, dict.fromkeys(sizes, 0), False
         # Every value is written once: filling first would write everything twice.
         file.set_fill_off()
         file.setncatts(dict(form.attrs))
@@ -177,11 +191,12 @@ class _AppendedFile:
         for name in self._reached:
             self._reached[name] += block.sizes[name]
 
-    @staticmethod
-    def _store(placed: netCDF4.Variable[Any], variable: xr.Variable, first: int) -> None:
+    def _store(self, placed: netCDF4.Variable[Any], variable: xr.Variable, first: int) -> None:
         values = variable.values
         if values.dtype.kind == "O":
-            store_texts(placed, values, first)
+            if any(values.tolist()):
+                store_texts(placed, values, first)
+                self.has_messages |= placed.name == "message"
         elif not variable.dims:
             placed[...] = values
         elif values.size:

@@ -1,4 +1,4 @@
-"""A block of samples of one body in one call, with the force held between samples: the loop over samples, in C."""
+"""A block of samples of one body in one call, with its input held or linear between samples: the loop, in C."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ class HoldPlan(Structure):
     """The plan, common to all blocks; the fields are explained in `door/stepping.h`."""
 
     _fields_ = [
-        ("force", c_uint32),
-        ("force_rate", c_uint32),
+        ("input", c_uint32),
+        ("input_rate", c_uint32),
         ("outputs", RunsVariables),
+        ("reads_begin", c_int32),
         ("magnet", POINTER(Magnet)),
         *((name, c_uint32) for name in ("displacement", "record_count", "record_taken", "record_rows")),
         ("row_capacity", c_int32),
@@ -45,7 +46,7 @@ class HoldBlock(Structure):
 
     _fields_ = [
         ("count", c_int64),
-        *((name, c_void_p) for name in ("ends", "forces", "renewed", "samples")),
+        *((name, c_void_p) for name in ("ends", "inputs", "rates", "renewed", "samples")),
         ("at", c_int64),
         ("time", c_double),
         ("begun", c_int32),

@@ -39,7 +39,7 @@ from vibroimpact.orchestrator.campaign.formats import (
     destination_of,
     earlier_store,
 )
-from vibroimpact.orchestrator.campaign.here import computed_here, may_begin_here, opened_here
+from vibroimpact.orchestrator.campaign.here import FEW_SECONDS, computed_here, may_begin_here, opened_here
 from vibroimpact.orchestrator.campaign.manifest import (
     add_build,
     carried_manifest,
@@ -65,10 +65,12 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
+from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
+from vibroimpact.orchestrator.campaign.threads import BYTES_OF_A_THREAD, compute_in_threads, thread_count
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
@@ -113,8 +115,8 @@ def run_campaign(
     folder : path
         Folder of this campaign alone; made when absent.
     workers : int, optional
-        Worker processes on this machine. By default the campaign begins in this process. Where more than 2 s of work
-        are left, one worker for each processor goes on with it.
+        Worker processes on this machine. By default the campaign begins in this process. If more than 2 s of work are
+        left, one worker for each processor goes on. Points in lanes stay here, in threads, on up to four processors.
     scheduler : str or dask.distributed.Client, optional
         Address of a Dask scheduler, or a client of a scheduler, to use instead.
     runner : str
@@ -308,9 +310,9 @@ class _Campaign:
         ]
 
     def _read_kept(self) -> Kept | None:
-        for path in own_files(self._parts_folder):
+        for path in own_files(self._parts_folder):  # files of earlier sweeps go
             if path.name.startswith("kept-") and path != self._kept_path:
-                path.unlink()  # it belongs to an earlier sweep
+                path.unlink()
         if not self._kept_path.exists():
             return None
         try:
@@ -368,12 +370,15 @@ class _Campaign:
                 self._manifest = read_manifest(self._manifest_path)
             work = self._with_manifest(replace(self._work, identity=identity))
             with self._computing():
+                threads = thread_count(identity.execution)
                 for stage in stages:
-                    left = computed_here(
-                        self._of_stage(work, stage), stage, self._schedule(work, stage, 1), self._take
-                    )
-                    if left is not None:
+                    own, schedule = self._of_stage(work, stage), self._schedule(work, stage, 1)
+                    left = computed_here(own, stage, schedule, self._take, FEW_SECONDS if threads else None)
+                    if left is not None and not threads:
                         return chain([left], stages)
+                    if left is not None:
+                        schedule = self._schedule(work, left, threads, BYTES_OF_A_THREAD)
+                        compute_in_threads(own, schedule, threads, self._take)
         return iter(())
 
     def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
@@ -391,11 +396,17 @@ class _Campaign:
             self._report.lost_workers += pool.lost_workers
             pool.cancel_all()
 
-    def _schedule(self, work: Work, stage: Stage, workers: int) -> ChunkSchedule:
+    def _schedule(self, work: Work, stage: Stage, workers: int, size: int = MOST_BYTES) -> ChunkSchedule:
         """Return the schedule of a stage, and start its progress."""
         in_lanes = work.identity is not None and work.identity.execution == "lanes"
-        shards = self._destination.shards
-        schedule = ChunkSchedule(stage.branches, stage.held, workers, in_lanes=in_lanes, shards=shards)
+        schedule = ChunkSchedule(
+            stage.branches,
+            stage.held,
+            workers,
+            in_lanes=in_lanes,
+            most_bytes=size,
+            shards=self._destination.shards,
+        )
         self._report.runs = stage.runs
         self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
         return schedule

@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.run.points import independent_points
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import dimensions, most_points, run_count
+from vibroimpact.orchestrator.scene.sweep import dimensions, most_points, run_count, values_at
 
 MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
@@ -27,12 +27,12 @@ LANE_TRIALS, FEWEST_LANE_TRIALS = 64, 8
 """Largest and least number of points that are tried together in lanes; slow points are tried in smaller numbers."""
 GOLDEN = 0.6180339887498949
 """Multiples of this number (and of its powers) fill [0, 1) evenly."""
-SECONDS_BESIDE = 3e-5
-"""Time of a point besides its run, s: handing it out, arranging and writing it."""
+SECONDS_BESIDE, LANE_SECONDS_BESIDE = 3e-5, 1e-6
+"""Time of a point, alone and in lanes, besides its run, s: handing it out, arranging and writing it."""
 BYTES_BESIDE = 28_000
 """Size of a dataset besides its values, bytes: names, attributes, the text of the scene."""
-COPIES_IN_RUN, COPIES_IN_CAMPAIGN = 4, 2
-"""Memory for arranging and writing all results, over the size of the results."""
+COPIES_IN_RUN = 4
+"""Memory for arranging and writing all results, over the size of the results; a campaign needs it for a chunk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,8 @@ class SceneCost:
         """Return the wall time of all points, without the start of workers, s; None when no point was tried."""
         if self.trial is None:
             return None
-        return self.points * (self.trial.seconds_of_a_point + SECONDS_BESIDE) / min(workers, self.branches)
+        beside = SECONDS_BESIDE if self.trial.lane_seconds is None else LANE_SECONDS_BESIDE
+        return self.points * (self.trial.seconds_of_a_point + beside) / min(workers, self.branches)
 
 
 def cost_of(scene: Scene) -> SceneCost:
@@ -174,7 +175,7 @@ def _lane_seconds(scene: Scene, count: int) -> float:
     values: dict[str, NDArray[np.float64]] = {}
     for number, members in enumerate(dimensions(scene.sweep)):
         place = (share * GOLDEN ** (number + 1) % 1.0 * len(members[0].values)).astype(np.int64)
-        values |= {axis.key: np.array(axis.values)[place] for axis in members}
+        values |= {axis.key: values_at(axis.values, place) for axis in members}
     points = independent_points(values, count)
     with open_scene(scene) as runner:
         for _ in range(2):  # the first call of a process is slower than all others

@@ -7,42 +7,40 @@ scene once and uses them for all its chunks. The results of a point never depend
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_dataset
-from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
+from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
 from vibroimpact.orchestrator.campaign.sealing import GrowingStore, write_shard
 from vibroimpact.orchestrator.campaign.seals import seal_path
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.points import PointColumns, State, columns_of_points
-from vibroimpact.orchestrator.run.runner import Rows
 from vibroimpact.orchestrator.running.kept import OpenedScene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import Branch, expand
+from vibroimpact.orchestrator.scene.sweep import Branch, Paths, expand
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
 """Attributes of a part: start state of the next run of its branch, as two numbers or an array."""
 MANIFEST = "campaign_manifest"
 """Attribute of a part: the manifest of its campaign, from `manifest.carried_manifest`."""
-
-PIECE_POINTS = 2**17
-"""Number of independent points that run at once: those of a shard at once would take 1.3 GB of a worker's memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +61,7 @@ class Work:
     """Execution with which the campaign began; empty: the scene's own."""
     kept: str = ""
     """File with the runs of an earlier sweep, which all chunks leave out; it may be absent."""
-    branches: tuple[Branch, ...] = ()
+    branches: Sequence[Branch] = ()
     """The points of a round of an adaptive sweep; empty: the points of the scene's sweep."""
     manifest: str = ""
     """Manifest in each part, from which `campaign.json` can be made again; empty: none is written."""
@@ -77,7 +75,7 @@ class Chunk:
 
     A chunk is a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the run
     before; None is the scene's own start state. A chunk that takes longer than `most_seconds` ends early, after a
-    point; other chunks compute the rest.
+    point; so does one whose results take more than `most_bytes`. Other chunks compute the rest.
     """
 
     branch: int
@@ -85,6 +83,7 @@ class Chunk:
     stop: int
     start: State | None = None
     most_seconds: float = math.inf
+    most_bytes: int = MOST_BYTES
 
     @property
     def count(self) -> int:
@@ -109,31 +108,44 @@ class ChunkResult:
     """Number of runs by outcome."""
     compute_seconds: float
     """Wall time of the runs, s."""
+    size: int = 0
+    """Size of the results, bytes, where they are columns; else 0."""
     path: str = ""
     """File of the part, or the seal of the shard."""
 
 
-_at_work: dict[Work, tuple[tuple[Branch, ...], OpenedScene]] = {}
-"""The scene that this process has opened for chunks, with its branches: one scene at most."""
+class _AtWork(threading.local):
+    """The scene that this thread has opened for chunks, with its branches."""
+
+    key: Work | None = None
+    branches: Sequence[Branch] = ()
+    opened: OpenedScene | None = None
 
 
-def _opened(work: Work) -> tuple[tuple[Branch, ...], OpenedScene]:
-    """Return the branches of a scene, and the opened scene that runs their points in this process."""
-    key = Work(work.scene, "", work.runner, execution=work.execution)
-    if key not in _at_work:
-        take_up(key, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
-    return _at_work[key]
+_at_work = _AtWork()
+
+
+def _opened(work: Work) -> tuple[Sequence[Branch], OpenedScene]:
+    """Return the branches of a scene, and the opened scene that runs their points in this thread."""
+    if _at_work.opened is None or _at_work.key != _key(work):
+        take_up(work, OpenedScene(work.scene, named_runner(work.scene, work.runner, work.execution or None)))
+    assert _at_work.opened is not None
+    return _at_work.branches, _at_work.opened
+
+
+def _key(work: Work) -> Work:
+    return Work(work.scene, "", work.runner, execution=work.execution)
 
 
 def take_up(work: Work, opened: OpenedScene) -> None:
-    """Use a scene that is open in this process for the following chunks."""
+    """Use an opened scene for the following chunks of this thread."""
     lay_down()
-    _at_work[Work(work.scene, "", work.runner, execution=work.execution)] = expand(work.scene), opened
+    _at_work.key, _at_work.branches, _at_work.opened = _key(work), expand(work.scene), opened
 
 
 def lay_down() -> None:
-    """Forget the opened scene of chunks, without closing it."""
-    _at_work.clear()
+    """Forget the opened scene of the chunks of this thread, without closing it."""
+    _at_work.key, _at_work.branches, _at_work.opened = None, (), None
     _kept_runs.cache_clear()
 
 
@@ -164,29 +176,14 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     deadline = began + chunk.most_seconds
     opened.failed = True  # until the chunk has ended
-    records, carried = _rows(opened.runner, points, chunk.start, deadline)
+    records, carried = run_in_pieces(opened.runner, points, chunk.start, deadline, chunk.most_bytes)
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
     path, outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
     opened.failed = Outcome.error.name in outcomes
-    return ChunkResult(done, carried, outcomes, seconds, str(path))
-
-
-def _rows(runner: Runner, points: PointColumns, start: State | None, deadline: float) -> Rows:
-    """Return the results of the points that run until a deadline; independent points of a shard run in pieces."""
-    if len(points) <= PIECE_POINTS or not points.are_independent:
-        return runner.rows(points, start, deadline)
-    pieces: list[Sequence[RunRecord] | RunColumns] = []
-    for first in range(0, len(points), PIECE_POINTS):
-        piece = points.chosen(slice(first, first + PIECE_POINTS))
-        done, _ = runner.rows(piece, None, deadline)
-        pieces.append(done)
-        if len(done) < len(piece) or time.perf_counter() > deadline:
-            break
-    if not any(isinstance(piece, RunColumns) for piece in pieces):
-        return [record for piece in pieces for record in cast("Sequence[RunRecord]", piece)], None
-    return joined([one if isinstance(one, RunColumns) else columns_of(one) for one in pieces]), None
+    size = records.nbytes if isinstance(records, RunColumns) else 0
+    return ChunkResult(done, carried, outcomes, seconds, size, str(path))
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
@@ -216,7 +213,8 @@ def _refuse_other_runner(work: Work, runner: Runner) -> None:
 
 def points_of(branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
     """Return the points of a chunk, which may span several branches."""
-    return columns_of_points(branches[chunk.branch :], chunk.first, chunk.stop)
+    left = branches if isinstance(branches, Paths) else branches[chunk.branch :]
+    return columns_of_points(left, chunk.first, chunk.stop)
 
 
 def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> PointColumns:

@@ -59,7 +59,14 @@ from vibroimpact.orchestrator.run.dataset import (
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, SweepAxis, dimensions, run_count
+from vibroimpact.orchestrator.scene.sweep import (
+    DIRECTIONS,
+    Dimension,
+    SweepAxis,
+    dimensions,
+    run_count,
+    values_at,
+)
 
 Runs = NDArray[np.int64]
 
@@ -253,7 +260,7 @@ def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
     layout, names = _Layout(scene.sweep), coordinate_names(scene)
     places = np.unravel_index(runs, layout.shape) if layout.shape else ()
     found = {
-        names[axis.key]: np.array(axis.values)[place]
+        names[axis.key]: values_at(axis.values, place)
         for members, place in zip(layout.dimensions, places, strict=False)
         for axis in members
     }

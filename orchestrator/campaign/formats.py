@@ -13,6 +13,7 @@ from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.campaign.destination import Destination, JoinedFile
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note
+from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.sealing import SEALS, STORE, GrowingStore
 from vibroimpact.orchestrator.campaign.seals import finished_store, has_rows
 from vibroimpact.orchestrator.run.parameters import most_elements
@@ -24,10 +25,10 @@ DatasetFormat = Literal["netcdf", "zarr"]
 FILE_POINTS = 10**7
 """Number of points from which on the default is a store: a file is joined by one process, 5 us a point."""
 
-SHARD_BYTES = 2**28
-"""Largest size of the results of a shard in memory, bytes; a worker holds it three times while it writes."""
+SHARD_BYTES = MOST_BYTES
+"""Largest size of the results of a shard in memory, bytes: a worker computes the shard as one chunk."""
 
-_RUN_NUMBERS = 12
+_RUN_NUMBERS = 6
 """Numbers of a run that every scene records."""
 _PERIOD_NUMBERS, _IMPACT_NUMBERS = 5, 8
 _IMPACTS_PER_PERIOD = 2

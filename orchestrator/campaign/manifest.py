@@ -25,6 +25,7 @@ from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
 from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import SpacedValues
 
 FORMAT, STORE_FORMAT = 2, 3
 _FORMATS = (1, FORMAT, STORE_FORMAT)
@@ -87,18 +88,18 @@ def flat_scene(scene: Scene) -> dict[str, Any]:
     >>> flat_scene(parse_scene(text, "free.toml"))["body.mass"]
     2.0
     """
-    document = scene.model_dump(mode="json", by_alias=True, exclude={"source", "text"})
+    document = scene.model_dump(mode="json", by_alias=True, exclude={"source", "text", "sweep"})
     document["stop"] = document.pop("stops")
     document["sweep"] = {
-        axis["key"]: {
-            "values": axis["values"],
-            "path": axis["path"],
+        axis.key: {
+            "values": asdict(axis.values) if isinstance(axis.values, SpacedValues) else list(axis.values),
+            "path": axis.path,
             "place": place,
             # absent in campaigns of versions without such axes
-            "together": axis["together"] or None,
-            "adaptive": axis["adaptive"],
+            "together": axis.together or None,
+            "adaptive": axis.adaptive and asdict(axis.adaptive),
         }
-        for place, axis in enumerate(document["sweep"], start=1)
+        for place, axis in enumerate(scene.sweep, start=1)
     }
     return dict(sorted(_flat("", document)))
 

@@ -36,7 +36,7 @@ Stored = Callable[[], Sequence[StoredPart]]
 class Stage:
     """Points that can be computed together."""
 
-    branches: tuple[Branch, ...]
+    branches: Sequence[Branch]
     held: list[StoredPart]
     """Parts of the runs before `runs` that need not be computed."""
     runs: int

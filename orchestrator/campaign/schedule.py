@@ -1,8 +1,9 @@
 """The cut of a campaign's runs into chunks while they are computed.
 
 A chunk should take about `CHUNK_SECONDS`: long enough that scheduling and writing do not count, short enough
-that little is lost when a process dies. The campaign measures the time of a point as it goes. A chunk that takes much
-longer than planned ends early, and its rest is handed out again.
+that little is lost when a process dies. Chunks of many workers take longer, so that one scheduler hands out all of
+them. The campaign measures time and size of a point as it goes. A chunk that takes much longer than planned, or whose
+results are large, ends early, and its rest is handed out again.
 
 Runs are cut in whole *units*: a single independent run, or a whole branch of a continuation sweep. Towards
 the end the chunks get shorter, so that all workers finish together (guided self-scheduling). A branch that
@@ -23,15 +24,20 @@ from dataclasses import dataclass
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.shards import Shard
 from vibroimpact.orchestrator.run.points import State
-from vibroimpact.orchestrator.scene.sweep import Branch
+from vibroimpact.orchestrator.scene.sweep import Branch, first_runs
 
-CHUNK_SECONDS = 1.0
-"""Planned time of one chunk, s."""
+CHUNK_SECONDS = 2.0
+"""Planned time of one chunk, s, of up to 200 workers."""
 
 SHORTEST_SECONDS = 0.1
-"""Least planned time of a chunk, s, for the last chunks of a sweep."""
+"""Least planned time of a chunk, s, for the last chunks of a sweep, of up to 20 workers."""
+
+MOST_RATE = 100.0
+"""Number of chunks that all workers end in a second, 1/s, twice as many towards the end of a sweep. A chunk takes some
+3 ms of a processor of client and scheduler."""
 
 FIRST_POINTS = 64
 """Number of points in a chunk before the time of a point is known; a slow chunk ends early."""
@@ -39,8 +45,11 @@ FIRST_POINTS = 64
 PATIENCE = 2.0
 """Time of a chunk over its planned time, above which it ends early, since points differ."""
 
-MOST_POINTS = 20_000
-"""Largest number of points in one chunk, so that a part fits in memory."""
+MOST_POINTS = 1 << 21
+"""Largest number of points in one chunk, whatever they cost; the size of their results bounds it, too."""
+
+MOST_IN_LANES = 20_000
+"""Number of points up to which a chunk takes on branches so that its lanes are full."""
 
 LOST_PIECES = 16
 """Number of pieces into which a chunk is cut that killed its worker, to find the point at fault."""
@@ -88,7 +97,8 @@ class _BranchRest:
 class ChunkSchedule:
     """Cuts the rest of a campaign into chunks for a number of workers; branches and parts are in run order.
 
-    `in_lanes`: whether branches of one chunk run side by side. `shards`: shards of a store, which no chunk crosses.
+    `in_lanes`: whether branches of one chunk run side by side; `most_bytes`: size of the results of a chunk.
+    `shards`: shards of a store, which no chunk crosses.
     """
 
     def __init__(
@@ -98,14 +108,18 @@ class ChunkSchedule:
         workers: int,
         *,
         in_lanes: bool = False,
+        most_bytes: int = MOST_BYTES,
         shards: Sequence[Shard] = (),
     ) -> None:
         self._workers, self._in_lanes = workers, in_lanes
+        self._most_bytes = MOST_BYTES if shards else most_bytes
         self._shards, self._shard_stops = shards, [shard.stop for shard in shards]
-        self._first_runs = [branch.points.first_index for branch in branches]
+        self._first_runs = first_runs(branches)
         self._chained = branches[0].direction != "independent"
         self._unit = len(branches[0].points) if self._chained else 1
         self._pace: float | None = None
+        self._size = 0.0
+        self._in_flight = 0
         self._units: deque[Gap] = deque()
         self._waiting: deque[_BranchRest] = deque()
         self._open_branches: dict[int, _BranchRest] = {}
@@ -125,7 +139,12 @@ class ChunkSchedule:
         return self.left * (self._pace or 0.0)
 
     def next_chunk(self) -> Chunk | None:
-        """Return the next chunk to compute; None while all remaining chunks wait for the end of another chunk."""
+        """Return the next chunk to compute; None while all remaining chunks wait for the end of another chunk.
+
+        Before the time of a point is known, each worker gets one chunk.
+        """
+        if self._pace is None and self._in_flight >= self._workers:
+            return None
         if self._units and len(self._open_branches) < self.most_in_flight:
             return self._cut_units()
         if self._waiting:
@@ -135,6 +154,8 @@ class ChunkSchedule:
     def finished(self, planned: Chunk, result: ChunkResult) -> None:
         """Record a finished chunk, with the runs that it left out and the time that it took."""
         done = result.chunk
+        self._in_flight -= 1
+        self._size = result.size / done.count if result.size else self._size
         if result.compute_seconds > 0.0:
             latest = result.compute_seconds / done.count
             self._pace = latest if self._pace is None else 0.5 * (self._pace + latest)
@@ -151,6 +172,7 @@ class ChunkSchedule:
 
     def lost(self, chunk: Chunk) -> None:
         """Take back a chunk that killed its worker, to be handed out again in small pieces."""
+        self._in_flight -= 1
         rest = self._open_branches.get(chunk.branch)
         if rest is None and self._chained and chunk.count <= self._unit:
             rest = self._open_branches[chunk.branch] = _BranchRest(chunk.branch, deque())
@@ -202,7 +224,7 @@ class ChunkSchedule:
     def _cut_units(self) -> Chunk:
         gap = self._units[0]
         seconds = self._fair_seconds()
-        points = max(min(_points_in(seconds, self._pace), gap.most), self._points_beside(gap))
+        points = max(min(self._points_in(seconds, self._pace), gap.most), self._points_beside(gap))
         points = self._in_shard(gap, points)
         taken = gap.take(max(points // self._unit, 1) * self._unit)
         if gap.first == gap.stop:
@@ -219,18 +241,24 @@ class ChunkSchedule:
             return 0
         share = -(-(gap.stop - gap.first) // (self._unit * self._workers))
         beside = min(BRANCHES_IN_LANES, max(share, FEWEST_IN_LANES))
-        return min(beside, MOST_POINTS // self._unit) * self._unit
+        return min(beside, min(MOST_IN_LANES, MOST_POINTS) // self._unit) * self._unit
 
     def _fair_seconds(self) -> float:
         """Return the planned time of the next chunk of units, s: half of a worker's share of the rest."""
         share = self.left * (self._pace or 0.0) / (2 * self._workers)
-        return min(CHUNK_SECONDS, max(share, SHORTEST_SECONDS))
+        shortest = max(SHORTEST_SECONDS, self._workers / (2.0 * MOST_RATE))
+        return min(self._chunk_seconds, max(share, shortest))
+
+    @property
+    def _chunk_seconds(self) -> float:
+        """Planned time of one chunk, s."""
+        return max(CHUNK_SECONDS, self._workers / MOST_RATE)
 
     def _cut_branch(self, rest: _BranchRest) -> Chunk:
         gap = rest.gaps[0]
         pace = rest.pace or self._pace
-        seconds = SHORTEST_SECONDS if pace is None else CHUNK_SECONDS
-        count = _points_in(seconds, pace)
+        seconds = SHORTEST_SECONDS if pace is None else self._chunk_seconds
+        count = self._points_in(seconds, pace)
         if gap.stop - gap.first < 1.5 * count:
             # A short rest is taken along, without a chunk of its own.
             count = gap.stop - gap.first
@@ -247,22 +275,22 @@ class ChunkSchedule:
         rest = min(gap.stop, shard.stop) - gap.first
         seconds = rest * self._pace if self._pace else math.inf
         most = SHARD_SECONDS if self.left > self._workers * shard.count else LAST_SHARD_SECONDS
-        return (
-            rest if rest == shard.count and gap.most >= MOST_POINTS and seconds <= most else min(count, rest)
-        )
+        is_quick = seconds <= most and rest * self._size <= self._most_bytes
+        return rest if rest == shard.count and gap.most >= MOST_POINTS and is_quick else min(count, rest)
 
     def _hand_out(self, branch: int, taken: Gap, seconds: float) -> Chunk:
         count = taken.stop - taken.first
         self.left -= count
+        self._in_flight += 1
         seconds = max(seconds, count * (self._pace or 0.0)) if self._shards else seconds
-        return Chunk(branch, taken.first, taken.stop, taken.start, PATIENCE * seconds)
+        return Chunk(branch, taken.first, taken.stop, taken.start, PATIENCE * seconds, self._most_bytes)
 
-
-def _points_in(seconds: float, pace: float | None) -> int:
-    """Return the number of points in a chunk of `seconds`, s, at a pace, s per point."""
-    if pace is None:
-        return FIRST_POINTS
-    return max(1, min(int(seconds / max(pace, 1e-9)), MOST_POINTS))
+    def _points_in(self, seconds: float, pace: float | None) -> int:
+        """Return the number of points in a chunk of `seconds`, s, at a pace, s per point."""
+        if pace is None:
+            return FIRST_POINTS
+        fitting = self._most_bytes / self._size if self._size else math.inf
+        return max(1, int(min(seconds / max(pace, 1e-9), MOST_POINTS, fitting)))
 
 
 def gaps_between(parts: Sequence[StoredPart], runs: int) -> Iterator[Gap]:

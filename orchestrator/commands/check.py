@@ -12,7 +12,6 @@ from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import SceneCost, cost_of
 from vibroimpact.orchestrator.campaign.check import (
     BYTES_BESIDE,
-    COPIES_IN_CAMPAIGN,
     COPIES_IN_RUN,
     LANE_TRIALS,
     MOST_TRIAL_SECONDS,
@@ -20,8 +19,10 @@ from vibroimpact.orchestrator.campaign.check import (
 )
 from vibroimpact.orchestrator.campaign.here import HERE_SECONDS, may_begin_here
 from vibroimpact.orchestrator.campaign.processors import processor_count
+from vibroimpact.orchestrator.campaign.threads import thread_count
 from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
+from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
@@ -73,17 +74,25 @@ def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
     if cost.first:
         yield "run", "refused: the points of adaptive axes are found by `vibroimpact campaign`"
     elif refused or cost.trial is not None:
-        yield "run", refused or _time(cost) + _memory(cost, COPIES_IN_RUN)
+        yield "run", refused or _time(cost) + _memory(cost)
     if cost.trial is None:
         return
     most = "at most " if cost.first else ""
     if cost.points > 1:
-        here = may_begin_here(scene, DEFAULT_RUNNER, cost.points) and (cost.seconds() or 0.0) <= HERE_SECONDS
-        workers = 1 if here else min(processor_count(), cost.branches)
-        on = " in this process" if here else f" on {counted(workers, 'worker')} and some seconds to start"
-        yield "campaign", f"{most}{_time(cost, workers)}{on}{_memory(cost, COPIES_IN_CAMPAIGN)}"
+        yield "campaign", f"{most}{_campaign(scene, cost)}"
     if not cost.trial.given_up:
         yield "dataset", f"{most}about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
+
+
+def _campaign(scene: Scene, cost: SceneCost) -> str:
+    """Return the time of a campaign, and where it computes."""
+    begins_here = may_begin_here(scene, DEFAULT_RUNNER, cost.points)
+    workers = min(processor_count(), cost.branches)
+    if begins_here and (cost.seconds() or 0.0) <= HERE_SECONDS:
+        return f"{_time(cost)} in this process"
+    if begins_here and goes_by_lanes(scene) and thread_count("lanes"):
+        return f"{_time(cost, workers)} in {counted(workers, 'thread')} of this process"
+    return f"{_time(cost, workers)} on {counted(workers, 'worker')} and some seconds to start"
 
 
 def _points(cost: SceneCost) -> str:
@@ -128,7 +137,7 @@ def _time(cost: SceneCost, workers: int = 1) -> str:
     return f"{'more than' if given_up else 'about'} {duration(seconds)}"
 
 
-def _memory(cost: SceneCost, copies: int) -> str:
+def _memory(cost: SceneCost) -> str:
     if cost.trial is None or cost.trial.given_up:
         return ""
-    return f"; at its end {size(copies * cost.points * cost.trial.size)} of memory for results"
+    return f"; at its end {size(COPIES_IN_RUN * cost.points * cost.trial.size)} of memory for results"

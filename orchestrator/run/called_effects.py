@@ -51,13 +51,13 @@ def called_by_numbers(scene: Parts) -> set[str]:
 def _largest(scene: Parts) -> dict[str, float]:
     """Return the largest magnitude of each number of a scene over its sweep, by key."""
     numbers = [axis for axis in scene.sweep if axis.key != RECORDING_KEY]
-    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in numbers}
+    swept = {axis.key: max(axis.highest, -axis.lowest) for axis in numbers}
     return {key: abs(number) for key, number in scene.constants().items()} | swept
 
 
 def called_by_components(scene: Parts) -> set[str]:
     """Return the effects that the components of a scene ask for at one or more points of its sweep."""
-    swept = {axis.key: max(map(abs, axis.values)) for axis in scene.sweep}
+    swept = {axis.key: max(axis.highest, -axis.lowest) for axis in scene.sweep}
     found: set[str] = set()
     for component in scene.components:
         kind = shipped_kind(component)

@@ -157,14 +157,41 @@ class BodyDriver(RecordedBody):
             self._held = tuple(outputs)
         if forces is None:
             forces, renewed = np.zeros(len(ends)), np.zeros(len(ends), dtype=np.uint8)
-        read = np.array([self.references[name] for name in outputs], dtype=np.uint32)
-        plan = self._hold_plan(read, exciter, recording=recording)
-        samples = np.empty((len(ends), len(outputs)))
-        rows = np.empty((ROW_CAPACITY if recording else 0, ROW_WIDTH))
+        read = self._references_of(outputs)
+        plan = self._hold_plan("force", read, exciter, recording=recording)
+        return self._run_block(plan, ends, forces, renewed=renewed)
+
+    def follow(
+        self, times: NDArray[np.float64], name: str, inputs: NDArray[np.float64], rates: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Advance through all instants by one call; return the sampled variables at the begin of each step.
+
+        The instants, s, ascend from the time reached, shape (step + 1,). At each but the last the input `name` is set,
+        with its slope over the step; then the variables are read, shape (step, variable). Errors as of `hold`.
+        """
+        self._held = None
+        read = self._references_of(self._sampled_names)
+        plan = self._hold_plan(name, read, None, recording=True)
+        plan.reads_begin = 1
+        return self._run_block(plan, times[1:], inputs, rates=rates)
+
+    def _run_block(
+        self,
+        plan: stepping.HoldPlan,
+        ends: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        *,
+        rates: NDArray[np.float64] | None = None,
+        renewed: NDArray[np.uint8] | None = None,
+    ) -> NDArray[np.float64]:
+        """Advance through all samples by calls of C, and return the outputs of the plan."""
+        samples = np.empty((len(ends), plan.outputs.count))
+        rows = np.empty((plan.row_capacity, ROW_WIDTH))
         block = stepping.HoldBlock(
             count=len(ends),
             ends=runs.address(ends),
-            forces=runs.address(forces),
+            inputs=runs.address(inputs),
+            rates=None if rates is None else runs.address(rates),
             renewed=None if renewed is None else runs.address(renewed),
             samples=runs.address(samples),
             time=self.instance.time,
@@ -192,14 +219,18 @@ class BodyDriver(RecordedBody):
             self.instance.fail("DoStep", f"refused the step to the sample at time {ends[block.at]:.17g}")
         return samples
 
+    def _references_of(self, names: Sequence[str]) -> NDArray[np.uint32]:
+        return np.array([self.references[name] for name in names], dtype=np.uint32)
+
     def _hold_plan(
-        self, read: NDArray[np.uint32], exciter: HeldExciter | None, *, recording: bool
+        self, name: str, read: NDArray[np.uint32], exciter: HeldExciter | None, *, recording: bool
     ) -> stepping.HoldPlan:
+        """Return the plan of a block with an input; `read` are references of outputs, which the caller keeps."""
         references = self.references
         plan = stepping.HoldPlan(
             # a chain has other inputs, which are not set here
-            force=references.get("force", 0),
-            force_rate=references.get("force_rate", 0),
+            input=references.get(name, 0),
+            input_rate=references.get(f"{name}_rate", 0),
             outputs=runs.RunsVariables(runs.address(read), len(read)),
         )
         if exciter is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction
-from vibroimpact.orchestrator.scene.sweep import Branch, Point
+from vibroimpact.orchestrator.scene.sweep import Branch, Paths, Point
 
 State = tuple[float, ...]
 """Displacement (m) and velocity (m/s) of an oscillator; N displacements, then N velocities of a structure."""
@@ -75,6 +75,10 @@ def independent_points(values: Mapping[str, NDArray[np.float64]], count: int) ->
 
 def columns_of_points(branches: Sequence[Branch], first: int, stop: int) -> PointColumns:
     """Return the points `first` to `stop - 1` of branches, in the order of their index."""
+    if isinstance(branches, Paths):
+        index = np.arange(first, stop)
+        values, place = branches.columns(index)
+        return PointColumns(values, branches.directions(index), index, place == 0, {})
     pieces: list[PointColumns] = []
     for branch in branches:
         begin = branch.points.first_index

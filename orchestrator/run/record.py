@@ -59,23 +59,23 @@ class _Limit:
 
 _UNLIMITED = _Limit()
 _LIMIT: ContextVar[_Limit] = ContextVar("limit of runs")
-_ABANDONED: ContextVar[float] = ContextVar("time at which runs are abandoned", default=math.inf)
+_ABANDONED: ContextVar[Callable[[], bool] | None] = ContextVar("whether runs are abandoned", default=None)
 
 
 class RunsAbandonedError(Exception):
-    """Runs took longer than their caller wants to wait; their results do not count."""
+    """The caller of runs waits for them no longer; their results do not count."""
 
 
 @contextmanager
-def runs_abandoned(time_of_it: float) -> Iterator[None]:
-    """Abandon the runs of this thread that are under way at a time, s of `time.perf_counter`.
+def runs_abandoned(is_over: Callable[[], bool]) -> Iterator[None]:
+    """Abandon the run of this thread that is under way as soon as `is_over` returns True.
 
     Raises
     ------
     RunsAbandonedError
         Raised inside the run that is under way then.
     """
-    before = _ABANDONED.set(time_of_it)
+    before = _ABANDONED.set(is_over)
     try:
         yield
     finally:
@@ -84,7 +84,8 @@ def runs_abandoned(time_of_it: float) -> Iterator[None]:
 
 def refuse_abandoned() -> None:
     """Raise RunsAbandonedError if the runs of this thread are abandoned."""
-    if time.perf_counter() > _ABANDONED.get():
+    is_over = _ABANDONED.get()
+    if is_over is not None and is_over():
         raise RunsAbandonedError
 
 

@@ -174,21 +174,34 @@ class Session:
         -------
         ndarray, shape (step + 1, outputs)
         """
-        rows = np.empty((len(times), len(self.outputs)))
-        driver, group = self._driver, self._inputs
-        buffer = group.values
-        place = None if name is None else self._input_names.index(name)
         slopes = np.zeros(len(times)) if values is None else np.append(np.diff(values) / np.diff(times), 0.0)
-        given = np.zeros((len(times), 2)) if values is None else np.column_stack([values, slopes])
-        sample = driver.sampled if self._plan.is_plain(self._forcing) else self.sample
-        advance, pass_on = driver.advance, group.set
+        if not isinstance(self._driver, BodyDriver):
+            return self._follow_coupled(times, name, values, slopes)
+        if name is None or values is None:
+            found = [self._driver.sampled().copy(), self._driver.advance_sampling(times[1:])]
+        else:
+            found = [self._driver.follow(times, name, np.ascontiguousarray(values), slopes)]
+            self._set_input(name, values[-1], 0.0)
+            found.append(self._driver.sampled())
+        plan = self._plan
+        return plan.rows(np.vstack(found), plan.variables, self._forcing, self._parameters, times)
+
+    def _follow_coupled(
+        self, times: Floats, name: str | None, values: Floats | None, slopes: Floats
+    ) -> Floats:
+        """Follow the instants by one call of the importer for each step."""
+        rows = np.empty((len(times), len(self.outputs)))
         for i, time in enumerate(times.tolist()):
-            advance(time)
-            if place is not None and values is not None:
-                buffer[place : place + 2] = given[i]
-                pass_on()
-            rows[i] = sample()
+            self._driver.advance(time)
+            if name is not None and values is not None:
+                self._set_input(name, values[i], slopes[i])
+            rows[i] = self.sample()
         return rows
+
+    def _set_input(self, name: str, value: float, slope: float) -> None:
+        place = self._input_names.index(name)
+        self._inputs.values[place : place + 2] = value, slope
+        self._inputs.set()
 
     def hold(self, times: Floats, forces: Floats) -> Floats:
         """Advance through all instants with a force held between them; return the outputs at the end of each step.

@@ -291,7 +291,7 @@ def _contact_values(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
 
 def _number_problems(axis: SweepAxis, field: FieldInfo) -> Iterator[Problem]:
     rule, (low, high, is_open) = rule_of(field), bounds_of(field)
-    for value in axis.values:
+    for value in axis.bounding:
         if not low <= value <= high or (is_open and value == low):
             yield Problem(key_path(("sweep", axis.key)), rule.expected, quoted(value), rule.hint)
             return

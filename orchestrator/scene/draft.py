@@ -141,7 +141,7 @@ class Draft(DraftTables):
         """Return the lowest and highest value of a key over all points; None if its table is invalid."""
         for axis in self.axes:
             if axis.key == text:
-                return min(axis.values), max(axis.values)
+                return axis.lowest, axis.highest
         key = numeric_key(text)
         owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
         number = number_of(owner, key)

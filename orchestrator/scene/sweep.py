@@ -12,8 +12,9 @@ Run order (the `run` dimension of the dataset) is fixed by the scene alone:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import prod
 from typing import Any, Literal, Protocol, overload
@@ -21,7 +22,7 @@ from typing import Any, Literal, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.schema import SCATTERED
+from vibroimpact.analysis.dataset.schema import SCATTERED, Direction
 
 SweepPath = Literal["independent", "up", "down", "up-down"]
 SweepDirection = Literal["independent", "up", "down"]
@@ -32,6 +33,80 @@ DIRECTIONS: dict[SweepPath, tuple[SweepDirection, ...]] = {
     "down": ("down",),
     "up-down": ("up", "down"),
 }
+
+
+MOST_LISTED = 10**6
+"""Number of values of a range, above which they are computed on access (`SpacedValues`) and not kept as a tuple."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpacedValues(Sequence[float]):
+    """Evenly spaced values, both ends included, computed on access; the bits are those of `numpy.linspace`.
+
+    Attributes
+    ----------
+    start, stop : float
+        Ends in the order of the range.
+    points : int
+        Number of values, 2 or more.
+    backwards : bool
+        Whether the values go from `stop` to `start`.
+    """
+
+    start: float
+    stop: float
+    points: int
+    backwards: bool = False
+
+    def __len__(self) -> int:
+        return self.points
+
+    @overload
+    def __getitem__(self, place: int) -> float: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[float]: ...
+    def __getitem__(self, place: int | slice) -> float | Sequence[float]:
+        if place == slice(None, None, -1):
+            return replace(self, backwards=not self.backwards)
+        if isinstance(place, slice):
+            return tuple(self.at(np.arange(self.points)[place]).tolist())
+        return float(self.at(np.array([range(self.points)[place]]))[0])
+
+    def __iter__(self) -> Iterator[float]:
+        for block in self.blocks():
+            yield from block.tolist()
+
+    def blocks(self) -> Iterator[NDArray[np.float64]]:
+        """Yield all values in blocks of at most `MOST_LISTED`."""
+        for first in range(0, self.points, MOST_LISTED):
+            yield self.at(np.arange(first, min(first + MOST_LISTED, self.points)))
+
+    @property
+    def differ(self) -> bool:
+        """Whether all values differ; they never turn back, so equal values are neighbours."""
+        step = abs(self.stop / 2.0 - self.start / 2.0) / (self.points - 1)
+        if step > 2.0 * math.ulp(max(abs(self.start), abs(self.stop)) / 2.0):
+            return True
+        return all((np.diff(block) != 0.0).all() for block in self.blocks())
+
+    def at(self, places: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the values at some places, from 0 on."""
+        places = self.points - 1 - places if self.backwards else places
+        # Halved ends keep the span of the range finite for any two finite numbers; scaling by 2 is exact.
+        start, stop = self.start / 2.0, self.stop / 2.0
+        step = (stop - start) / (self.points - 1)
+        # as numpy does where the quotient underflows
+        shift = places * step if step else places / (self.points - 1) * (stop - start)
+        return 2.0 * np.where(places == self.points - 1, stop, shift + start)
+
+
+def values_at(values: Sequence[float], places: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the values of an axis at some places."""
+    if isinstance(values, SpacedValues):
+        return values.at(places)
+    # an axis may have 10^6 values: only the values in use become an array
+    low, high = (int(places.min()), int(places.max())) if places.size else (0, 0)
+    return np.array(values[low : high + 1], dtype=np.float64)[places - low]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +136,7 @@ class SweepAxis:
     ----------
     key : str
         The swept key with 1-based indices, for example `stop[1].position`.
-    values : tuple of float
+    values : tuple of float, or SpacedValues
         Values in the unit of the key; ascending on a continuation axis, else in the order of the scene.
     path : {"independent", "up", "down", "up-down"}
         Whether each point starts from the scene's start state, or from its predecessor's final state.
@@ -74,7 +149,7 @@ class SweepAxis:
     """
 
     key: str
-    values: tuple[float, ...]
+    values: Sequence[float]
     path: SweepPath = "independent"
     span: tuple[float, float, int] | None = field(default=None, compare=False, repr=False)
     together: str = ""
@@ -90,11 +165,29 @@ class SweepAxis:
         """Whether the state is carried from point to point along this axis."""
         return self.path != "independent"
 
+    @property
+    def lowest(self) -> float:
+        """Lowest value."""
+        return min(self.bounding)
+
+    @property
+    def highest(self) -> float:
+        """Highest value."""
+        return max(self.bounding)
+
+    @property
+    def bounding(self) -> Sequence[float]:
+        """Values among which are the lowest and the highest."""
+        return (self.values[0], self.values[-1]) if isinstance(self.values, SpacedValues) else self.values
+
 
 @lru_cache(maxsize=8)
 def axis_of_range(key: str, start: float, stop: float, points: int, path: SweepPath) -> SweepAxis:
     """Return an axis of evenly spaced values, both ends included."""
-    # Halved ends keep the span of the range finite for any two finite numbers; scaling by 2 is exact.
+    if points > MOST_LISTED:
+        backwards = path != "independent" and start > stop
+        return SweepAxis(key, SpacedValues(start, stop, points, backwards), path, (start, stop, points))
+    # Halved ends: see `SpacedValues`.
     values = (2.0 * np.linspace(start / 2.0, stop / 2.0, points)).tolist()
     ordered = values if path == "independent" else sorted(values)
     return SweepAxis(key, tuple(ordered), path, (start, stop, points))
@@ -164,7 +257,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Points(Sequence[Point]):
-    """The points of a branch, computed on access: a sweep may have 10^8 points."""
+    """The points of a branch, computed on access: a sweep may have 10^9 points."""
 
     first_index: int
     fixed: Mapping[str, float]
@@ -187,14 +280,16 @@ class Points(Sequence[Point]):
 
     def columns(self, first: int, stop: int) -> dict[str, NDArray[np.float64]]:
         """Return the values of every swept key at the positions `first` to `stop - 1`, shape (point,) each."""
-        rest = np.arange(first, stop)
+        return self.columns_at(np.arange(first, stop))
+
+    def columns_at(self, positions: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
+        """Return the values of every swept key at some positions, shape (point,) each."""
+        rest = positions
         swept: dict[str, NDArray[np.float64]] = {}
         for members in reversed(self.dimensions):
             rest, place = np.divmod(rest, len(members[0].values))
-            # an axis may have 10^6 values: only the values in use become an array
-            low, high = (int(place.min()), int(place.max())) if place.size else (0, 0)
-            swept |= {axis.key: np.array(axis.values[low : high + 1])[place - low] for axis in members}
-        fixed = {key: np.full(stop - first, value) for key, value in self.fixed.items()}
+            swept |= {axis.key: values_at(axis.values, place) for axis in members}
+        fixed = {key: np.full(len(positions), value) for key, value in self.fixed.items()}
         return fixed | swept
 
     def _point(self, position: int) -> Point:
@@ -238,7 +333,66 @@ class Swept(Protocol):
         """The axes in the order of the scene file."""
 
 
-def expand(scene: Swept) -> tuple[Branch, ...]:
+@dataclass(frozen=True, slots=True)
+class Paths(Sequence[Branch]):
+    """The branches of a sweep along a path, computed on access: a sweep may have 10^8 branches.
+
+    Attributes
+    ----------
+    carried : SweepAxis
+        The axis along which the state is carried.
+    spanning : tuple of Dimension
+        The other axes; each combination of their values has one branch in each direction.
+    """
+
+    carried: SweepAxis
+    spanning: tuple[Dimension, ...]
+
+    def __len__(self) -> int:
+        return len(Points(0, {}, self.spanning)) * len(DIRECTIONS[self.carried.path])
+
+    @overload
+    def __getitem__(self, number: int) -> Branch: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Branch, ...]: ...
+    def __getitem__(self, number: int | slice) -> Branch | tuple[Branch, ...]:
+        if isinstance(number, slice):
+            return tuple(self._branch(place) for place in range(len(self))[number])
+        return self._branch(range(len(self))[number])
+
+    @property
+    def first_runs(self) -> range:
+        """First run of each branch."""
+        length = len(self.carried.values)
+        return range(0, len(self) * length, length)
+
+    def columns(self, runs: NDArray[np.int64]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64]]:
+        """Return the values of every swept key at some runs, and the place of each run on its branch."""
+        directions = DIRECTIONS[self.carried.path]
+        branch, place = np.divmod(runs, len(self.carried.values))
+        combination, direction = np.divmod(branch, len(directions))
+        is_down = np.array([each == "down" for each in directions])[direction]
+        along = np.where(is_down, len(self.carried.values) - 1 - place, place)
+        values = Points(0, {}, self.spanning).columns_at(combination)
+        return values | {self.carried.key: values_at(self.carried.values, along)}, place
+
+    def directions(self, runs: NDArray[np.int64]) -> NDArray[np.int8]:
+        """Return the direction of the branch of some runs, as `schema.Direction`."""
+        codes = np.array([Direction[each] for each in DIRECTIONS[self.carried.path]], dtype=np.int8)
+        found: NDArray[np.int8] = codes[runs // len(self.carried.values) % len(codes)]
+        return found
+
+    def _branch(self, number: int) -> Branch:
+        directions = DIRECTIONS[self.carried.path]
+        combination = Points(0, {}, self.spanning)[number // len(directions)].values
+        direction = directions[number % len(directions)]
+        values = self.carried.values[::-1] if direction == "down" else self.carried.values
+        travelled = SweepAxis(self.carried.key, values, self.carried.path)
+        points = Points(number * len(values), combination, ((travelled,),))
+        return Branch(direction, combination, points)
+
+
+def expand(scene: Swept) -> Sequence[Branch]:
     """Return the branches of a scene's sweep, in run order.
 
     Parameters
@@ -248,7 +402,7 @@ def expand(scene: Swept) -> tuple[Branch, ...]:
 
     Returns
     -------
-    tuple of Branch
+    sequence of Branch
         Their points cover the `run` dimension once, without gaps.
 
     Examples
@@ -261,19 +415,14 @@ def expand(scene: Swept) -> tuple[Branch, ...]:
     carried = next((axis for axis in scene.sweep if axis.continuation), None)
     if carried is None:
         return (Branch("independent", {}, Points(0, {}, dimensions(scene.sweep))),)
-    spanning = dimensions([axis for axis in scene.sweep if axis is not carried])
-    return tuple(_continuation_branches(carried, spanning))
+    return Paths(carried, dimensions([axis for axis in scene.sweep if axis is not carried]))
 
 
-def _continuation_branches(carried: SweepAxis, spanning: Sequence[Dimension]) -> Iterator[Branch]:
-    first_index = 0
-    travelled = {"up": carried, "down": SweepAxis(carried.key, carried.values[::-1], carried.path)}
-    combinations = Points(0, {}, tuple(spanning))
-    for combination in combinations:
-        for direction in DIRECTIONS[carried.path]:
-            points = Points(first_index, combination.values, ((travelled[direction],),))
-            yield Branch(direction, combination.values, points)
-            first_index += len(carried.values)
+def first_runs(branches: Sequence[Branch]) -> Sequence[int]:
+    """Return the first run of each branch."""
+    if isinstance(branches, Paths):
+        return branches.first_runs
+    return [branch.points.first_index for branch in branches]
 
 
 def run_count(axes: Sequence[SweepAxis]) -> int:

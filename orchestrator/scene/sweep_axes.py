@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 from pydantic import ValidationError
 
@@ -24,14 +24,16 @@ from vibroimpact.orchestrator.scene.designs import (
 from vibroimpact.orchestrator.scene.fields import listed
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, problems_of, quoted, read_table
 from vibroimpact.orchestrator.scene.sweep import (
+    MOST_LISTED,
     Adaptive,
+    SpacedValues,
     SweepAxis,
     axis_of_range,
     dimensions,
     log_axis,
     run_count,
 )
-from vibroimpact.orchestrator.scene.sweep_models import MOST_POINTS_PER_AXIS, AxisTable, SampleTable
+from vibroimpact.orchestrator.scene.sweep_models import AxisTable, SampleTable
 
 FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 SAMPLE = "sample"
@@ -107,6 +109,10 @@ def _range_problems(key: str, table: AxisTable, given: Sequence[str]) -> Iterato
     elif table.points == 1 and table.start != table.stop:
         hint = "One point cannot be at both ends; make stop equal to start, or give values."
         yield Problem(key_path(("sweep", key, "points")), "a whole number >= 2", "1", hint)
+    elif table.points > MOST_LISTED and (table.spacing == "log" or table.adaptive is not None):
+        kind = "an adaptive axis" if table.adaptive is not None else 'a range with spacing = "log"'
+        where = key_path(("sweep", key, "points"))
+        yield Problem(where, f"at most {MOST_LISTED} values of {kind}", str(table.points), "Lower points.")
 
 
 def _distribution_problems(key: str, table: AxisTable) -> Iterator[Problem]:
@@ -241,8 +247,8 @@ def _design_problems(design: SampleTable, keys: Sequence[str]) -> Iterator[Probl
         yield Problem(
             key_path(("sweep", SAMPLE, "design")), "two drawn keys or more beside saltelli", keys[0], hint
         )
-    elif design.design == "saltelli" and points * (len(keys) + 2) > MOST_POINTS_PER_AXIS:
-        most = 1 << ((MOST_POINTS_PER_AXIS // (len(keys) + 2)).bit_length() - 1)
+    elif design.design == "saltelli" and points * (len(keys) + 2) > MOST_LISTED:
+        most = 1 << ((MOST_LISTED // (len(keys) + 2)).bit_length() - 1)
         got = f"{points}, which is {points * (len(keys) + 2)} runs of {len(keys)} keys"
         yield Problem(
             place, f"at most {most} points of a saltelli design", got, "It has keys + 2 runs for each."
@@ -291,8 +297,7 @@ def _group_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
                 "Each point takes one of each.",
             )
             continue
-        together = zip(*(axis.values for axis in members), strict=True)
-        values, times = Counter(together).most_common(1)[0]
+        values, times = _most_repeated(members)
         if times > 1:
             hint = "Each point is run once: remove the repeated value or lower points."
             if name == DRAW:
@@ -301,6 +306,18 @@ def _group_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
             yield Problem(where, "values that differ from each other", got, hint)
         if name and name in {axis.key.rpartition(".")[2] for axis in axes}:
             yield Problem(where, "a zip that is no name of a swept key", quoted(name), "Choose another.")
+
+
+def _most_repeated(members: Sequence[SweepAxis]) -> tuple[tuple[float, ...], int]:
+    """Return the values of axes that move together which most points have, and the number of these points."""
+    spaced = [axis.values for axis in members if isinstance(axis.values, SpacedValues)]
+    if not spaced:
+        return Counter(zip(*(axis.values for axis in members), strict=True)).most_common(1)[0]
+    for values in spaced:
+        if values.differ:
+            return (values[0],), 1
+    blocks = zip(*(axis.values for axis in members), strict=True)
+    return Counter(islice(blocks, MOST_LISTED)).most_common(1)[0]
 
 
 def _adaptive_problems(adaptive: Sequence[SweepAxis], axes: Sequence[SweepAxis]) -> Iterator[Problem]:

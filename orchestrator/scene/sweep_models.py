@@ -9,9 +9,10 @@ from pydantic import Field
 from vibroimpact.orchestrator.scene.designs import DesignName
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, SceneTable
-from vibroimpact.orchestrator.scene.sweep import SweepPath
+from vibroimpact.orchestrator.scene.sweep import MOST_LISTED, SweepPath
 
-MOST_POINTS_PER_AXIS = 10**6
+MOST_POINTS_PER_AXIS = 10**8
+"""Largest number of values of a range; values that are listed, drawn or refined are at most `MOST_LISTED`."""
 
 
 class SampleTable(SceneTable):
@@ -26,7 +27,7 @@ class SampleTable(SceneTable):
     ]
     points: Annotated[
         int,
-        Field(ge=1, le=MOST_POINTS_PER_AXIS),
+        Field(ge=1, le=MOST_LISTED),
         Rule(doc="number of drawn points; a larger number can keep the earlier points, see below"),
     ]
     seed: Annotated[int, Field(ge=0, le=10**9), Rule(doc="another seed draws other points")] = 0
@@ -42,7 +43,7 @@ class AdaptiveTable(SceneTable):
     ]
     at_most: Annotated[
         int | None,
-        Field(ge=2, le=MOST_POINTS_PER_AXIS),
+        Field(ge=2, le=MOST_LISTED),
         Rule(
             doc="largest number of points of the sweep; of two adaptive axes one has it, or both the same",
             default="required",
@@ -66,7 +67,10 @@ class AxisTable(SceneTable):
     points: Annotated[
         int | None,
         Field(ge=1, le=MOST_POINTS_PER_AXIS),
-        Rule(doc="number of values of a range; at least 2 unless start = stop"),
+        Rule(
+            doc="number of values of a range; at least 2 unless start = stop; at most 10^6 if `adaptive` or "
+            '`spacing = "log"`'
+        ),
     ] = None
     spacing: Annotated[
         Literal["linear", "log"],

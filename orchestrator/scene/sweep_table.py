@@ -182,7 +182,7 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
             return [replace(value_problem(("sweep", axis.key), field, broken[0]), expected=expected)]
     annotated: Any = Annotated
     rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
-    for value in (min(axis.values), max(axis.values)):
+    for value in (axis.lowest, axis.highest):
         try:
             rule.validate_python(key.typed(value) if key.element is None else (value,), strict=True)
         except ValidationError:

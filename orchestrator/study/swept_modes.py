@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -13,7 +13,7 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.designs import unit_design
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
-from vibroimpact.orchestrator.scene.sweep import Dimension, dimensions
+from vibroimpact.orchestrator.scene.sweep import Dimension, SpacedValues, dimensions
 from vibroimpact.orchestrator.study.convergence import Convergence, ModeRuns, Note, converged_modes
 
 MOST_ENDS = 16
@@ -99,13 +99,17 @@ def _ends_of(members: Dimension) -> list[int]:
     """Return the indices of the lowest and the highest value of each key of a dimension."""
     ends = []
     for axis in members:
-        indices = range(len(axis.values))
+        last = len(axis.values) - 1
+        # the ends of a range have its lowest and its highest value
+        indices: Sequence[int] = (0, last) if isinstance(axis.values, SpacedValues) else range(last + 1)
         ends += [min(indices, key=axis.values.__getitem__), max(indices, key=axis.values.__getitem__)]
     return list(dict.fromkeys(ends))
 
 
 def _middle_of(members: Dimension) -> int:
     values = members[0].values
+    if isinstance(values, SpacedValues):
+        return (len(values) - (values[0] > values[-1])) // 2
     return sorted(range(len(values)), key=values.__getitem__)[len(values) // 2]
 
 

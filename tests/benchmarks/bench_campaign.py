@@ -1,20 +1,22 @@
 """Cost of a map of many points: overhead of a point, memory of client and workers, bytes, opening.
 
-A map over frequency and amplitude of a forced oscillator with a rigid stop, 100 periods before 20 recorded ones, with
-two workers. For each number of points it prints
+A map over frequency and amplitude of a forced oscillator with a rigid stop, 100 periods before 20 recorded ones.
+Threads of this process compute it, or worker processes (`--workers 2`). For each number of points it prints
 
 - `overhead`: wall time of the workers per point, us. It counts from the first chunk's start to the last one's end,
   without the time of the body (`point_seconds`);
-- the peak memory of the client (it holds Dask's scheduler) and of the largest worker, MB;
+- the processor time of this process, s, and of its ended children;
+- the peak memory of the client (it holds threads, or Dask's scheduler) and of the largest worker, MB;
 - the size of the dataset per point, and its opening time in a process that has read it before.
 
-Run with `python tests/benchmarks/bench_campaign.py [--points 10000 100000 1000000] [--impacts]`.
+Run with `python tests/benchmarks/bench_campaign.py [--points 10000 100000 1000000] [--impacts] [--workers 2]`.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import os
 import resource
 import statistics
 import subprocess
@@ -25,9 +27,9 @@ from pathlib import Path
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
-WORKERS = 2
 OPENINGS = 5
 
 SCENE = """
@@ -60,12 +62,12 @@ def map_of(points: int, impacts: bool) -> Scene:
     return parse_scene(text, "map.toml")
 
 
-def measured(points: int, impacts: bool) -> None:
+def measured(points: int, impacts: bool, workers: int | None) -> None:
     """Run one campaign and print its costs."""
     scene = map_of(points, impacts)
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        report = run_campaign(scene, Path(folder, "map"), workers=WORKERS)
+        report = run_campaign(scene, Path(folder, "map"), workers=workers)
         wall = time.perf_counter() - began
         openings = []
         for _ in range(OPENINGS):
@@ -75,14 +77,15 @@ def measured(points: int, impacts: bool) -> None:
         with open_dataset(report.dataset) as opened:
             own = float(opened.point_seconds.sum())
         size = report.dataset.stat().st_size
-    client, workers = (
+    client, largest = (
         resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
-    overhead = (WORKERS * report.compute_seconds - own) / report.runs
+    overhead = ((workers or processor_count()) * report.compute_seconds - own) / report.runs
     print(
-        f"{report.runs:>8} points: {wall:.1f} s, computing {report.compute_seconds:.1f} s, joining "
-        f"{report.compaction_seconds:.1f} s; {own / report.runs * 1e6:.0f} us a point in the body, overhead "
-        f"{overhead * 1e6:.1f} us; client {client:.0f} MB, largest worker {workers:.0f} MB; "
+        f"{report.runs:>8} points: {wall:.1f} s, processor {sum(os.times()[:4]):.1f} s, computing "
+        f"{report.compute_seconds:.1f} s, joining {report.compaction_seconds:.1f} s; "
+        f"{own / report.runs * 1e6:.0f} us a point in the body, overhead {overhead * 1e6:.1f} us; "
+        f"client {client:.0f} MB, largest worker {largest:.0f} MB; "
         f"{size / report.runs:.0f} bytes a point; opened in {statistics.median(openings) * 1e3:.0f} ms",
         flush=True,
     )
@@ -95,12 +98,14 @@ def main() -> None:
     )
     parser.add_argument("--points", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
     parser.add_argument("--impacts", action="store_true", help="keep the rows of impacts too")
+    parser.add_argument("--workers", type=int, help="worker processes; threads of this process without it")
     chosen = parser.parse_args()
     if len(chosen.points) == 1:
-        measured(chosen.points[0], chosen.impacts)
+        measured(chosen.points[0], chosen.impacts, chosen.workers)
         return
     for points in chosen.points:
         more = ["--impacts"] if chosen.impacts else []
+        more += ["--workers", str(chosen.workers)] if chosen.workers else []
         subprocess.run([sys.executable, __file__, "--points", str(points), *more], check=True)
 
 

@@ -1,8 +1,9 @@
-"""Saturation of a campaign with many workers: up to 200 of them in one process, whose points sleep.
+"""Saturation of a campaign with many workers: up to 1,000 of them in one process, whose points sleep.
 
 Schedule, client and scheduler are those of a campaign; a worker sleeps for the time of its points, and writes no part.
-All share this process and its interpreter lock, unlike workers on other machines: the rates are lower bounds. The ideal
-rate is the number of workers over the seconds of a point.
+Up to 200 workers share this process and its interpreter lock, unlike workers on other machines: the rates are lower
+bounds. The ideal rate is the number of workers over the seconds of a point. The processor time and the peak memory
+are those of this process.
 
 Run with `python tests/benchmarks/bench_scale.py [--output results/benchmarks]`, on a quiet machine.
 """
@@ -12,11 +13,13 @@ from __future__ import annotations
 import argparse
 import csv
 import logging
+import resource
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import dask
@@ -30,14 +33,20 @@ from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.scene.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, axis_of_range, expand
 
 matplotlib.use("Agg")
 WORKERS = (1, 2, 5, 10, 20, 50, 100, 200)
-POINT_MILLISECONDS = (1.0, 10.0, 100.0)
-SECONDS = 3.0
-"""Duration of a measurement with ideal workers, s."""
-MOST_POINTS = 400_000
+MANY_WORKERS = 1000
+MANY_PROCESSES = 4
+"""Number of processes of many workers, each a thread there; this process has client and scheduler alone."""
+POINT_MILLISECONDS = (0.005, 1.0, 10.0, 100.0)
+SECONDS, MANY_SECONDS = 10.0, 60.0
+"""Duration of a measurement with ideal workers, and with many ideal workers, s."""
+POINT_BYTES = 78
+"""Size of the results of a point, bytes, which bounds the points of a chunk."""
+AXIS_POINTS = 10_000
+"""Number of points along one of two axes."""
 SATURATED = 0.8
 """Share of the ideal rate below which a campaign counts as saturated."""
 SCENE = """
@@ -56,7 +65,7 @@ restitution = 0.7
 transient_periods = 10
 recorded_periods = 2
 [sweep]
-"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points} }}
+"forcing.angular_frequency" = { start = 0.6, stop = 1.6, points = 2 }
 """
 
 Rate = tuple[float, int, float]
@@ -71,20 +80,22 @@ class Sleeper:
 
     def __call__(self, work: Work, chunk: Chunk) -> ChunkResult:
         began = time.perf_counter()
-        count = min(chunk.count, max(1, int(chunk.most_seconds / self._seconds)))
+        fitting = min(chunk.most_seconds / self._seconds, chunk.most_bytes / POINT_BYTES)
+        count = min(chunk.count, max(1, int(fitting)))
         time.sleep(count * self._seconds)
         done = Chunk(chunk.branch, chunk.first, chunk.first + count, None, chunk.most_seconds)
-        return ChunkResult(done, None, {"ok": count}, time.perf_counter() - began)
+        return ChunkResult(done, None, {"ok": count}, time.perf_counter() - began, POINT_BYTES * count)
 
 
 @contextmanager
-def workers_of_this_process(number: int) -> Iterator[Cluster]:
-    """Open workers that are threads of this process."""
+def sleeping_workers(number: int) -> Iterator[Cluster]:
+    """Open workers that are threads of this process, or many workers that are threads of some others."""
+    processes = number if number < MANY_WORKERS else MANY_PROCESSES
     with (
         LocalCluster(
-            n_workers=number,
-            threads_per_worker=1,
-            processes=False,
+            n_workers=processes,
+            threads_per_worker=number // processes,
+            processes=number >= MANY_WORKERS,
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
             memory_limit=0,
@@ -92,31 +103,47 @@ def workers_of_this_process(number: int) -> Iterator[Cluster]:
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
-        client.wait_for_workers(number)
-        yield Cluster(client, number)
+        client.wait_for_workers(processes)
+        yield Cluster(client, processes)
 
 
-def rate(number: int, point_seconds: float) -> float:
-    """Return the points per second of `number` workers."""
-    points = min(int(SECONDS * number / point_seconds), MOST_POINTS)
-    scene = parse_scene(SCENE.format(points=points), "scale.toml")
-    done = 0
+def sweep_of(points: int) -> Sequence[Branch]:
+    """Return at least this many independent points; a scene would have 10^9 at most."""
+    others = SweepAxis("forcing.amplitude", tuple(map(float, range(-(-points // AXIS_POINTS)))))
+    axis = axis_of_range("forcing.angular_frequency", 0.6, 1.6, AXIS_POINTS, "independent")
+    return expand(SimpleNamespace(sweep=(others, axis)))
+
+
+def rate(number: int, point_seconds: float, seconds: float) -> float:
+    """Return the points per second of `number` workers, which would take about `seconds`, s, if they were ideal."""
+    branches = sweep_of(int(seconds * number / point_seconds))
+    points = sum(len(branch.points) for branch in branches)
+    scene = parse_scene(SCENE, "scale.toml")
+    done = chunks = 0
 
     def take(result: ChunkResult) -> None:
-        nonlocal done
-        done += result.chunk.count
+        nonlocal done, chunks
+        done, chunks = done + result.chunk.count, chunks + 1
 
     with dask.config.set(QUIET), patch.object(computation, "run_chunk", Sleeper(point_seconds)):
-        pool = WorkerPool(lambda: workers_of_this_process(number), "this process", Progress())
+        pool = WorkerPool(lambda: sleeping_workers(number), "this process", Progress())
         with pool.connection:
             pool.wait_for_workers()
-            schedule = ChunkSchedule(expand(scene), [], number)
-            began = time.perf_counter()
+            schedule = ChunkSchedule(branches, [], number)
+            began, busy = time.perf_counter(), time.process_time()
             computation.Computation(pool, Work(scene, "", "", ""), schedule, take).run()
-            seconds = time.perf_counter() - began
+            spent = time.perf_counter() - began
+            busy = time.process_time() - busy
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(
+        f"points of {point_seconds * 1e3:g} ms, {number} workers: {points / spent:.0f} points/s, "
+        f"{points * point_seconds / spent / number:.0%} of the ideal; {chunks} chunks, {busy / chunks * 1e3:.1f} ms of "
+        f"processor each, {memory:.0f} MB",
+        flush=True,
+    )
     if done != points:
         raise AssertionError(f"{done} points of {points}")
-    return points / seconds
+    return points / spent
 
 
 def draw(rates: Sequence[Rate], path: Path) -> None:
@@ -160,13 +187,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print, write a table and a figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("results", "benchmarks"))
+    parser.add_argument("--workers", type=int, nargs="*", default=WORKERS)
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     rates: list[Rate] = []
-    for milliseconds in POINT_MILLISECONDS:
-        for number in WORKERS:
-            rates.append((milliseconds, number, rate(number, milliseconds / 1e3)))
-            print(f"points of {milliseconds:g} ms, {number} workers: {rates[-1][2]:.0f} points/s", flush=True)
+    runs = [(each, number, SECONDS) for each in POINT_MILLISECONDS for number in options.workers]
+    runs += [(POINT_MILLISECONDS[0], MANY_WORKERS, MANY_SECONDS)]
+    for milliseconds, number, seconds in runs:
+        rates.append((milliseconds, number, rate(number, milliseconds / 1e3, seconds)))
     with (options.output / "bench_scale.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("point_ms", "workers", "points_per_second"))

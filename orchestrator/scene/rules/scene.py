@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
 from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
-MOST_POINTS = 10**8
+MOST_POINTS = 10**9
 PERIOD_KEYS = ("transient_periods", "recorded_periods")
 TIME_KEYS = ("transient_time", "recorded_time")
 COUPLING_KEYS = ("macro_step", "exchange", "guard")

@@ -38,14 +38,14 @@ static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_blo
     return VI_HOLD_DONE;
 }
 
-/* Set the force of the step to sample `at`, which begins now. */
-static int set_force(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
+/* Set the input of the step to sample `at`, which begins now. */
+static int set_input(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
 {
     if (b->renewed != NULL && !b->renewed[b->at]) {
         return VI_HOLD_DONE;
     }
-    const uint32_t inputs[] = {plan->force, plan->force_rate};
-    double values[] = {b->forces[b->at], 0.0};
+    const uint32_t inputs[] = {plan->input, plan->input_rate};
+    double values[] = {b->inputs[b->at], b->rates == NULL ? 0.0 : b->rates[b->at]};
     if (plan->magnet != NULL) {
         double displacement = 0.0;
         if (!went_well(f->get_float64(f->instance, &plan->displacement, 1, &displacement, 1))) {
@@ -91,16 +91,22 @@ static int read_sample(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_
     return good ? VI_HOLD_DONE : VI_HOLD_REFUSED;
 }
 
+static int begin_step(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
+{
+    const int result = set_input(f, plan, b);
+    return result == VI_HOLD_DONE && plan->reads_begin ? read_sample(f, plan, b) : result;
+}
+
 VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_hold_block *block)
 {
     const double call = vi_seconds_now();
     while (block->at < block->count) {
-        int result = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
+        int result = block->begun ? VI_HOLD_DONE : begin_step(fmu, plan, block);
         if (result == VI_HOLD_DONE) {
             block->begun = 1;
             result = advance(fmu, plan, block);
         }
-        if (result == VI_HOLD_DONE) {
+        if (result == VI_HOLD_DONE && !plan->reads_begin) {
             result = read_sample(fmu, plan, block);
         }
         if (result != VI_HOLD_DONE) {

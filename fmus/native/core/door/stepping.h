@@ -1,4 +1,4 @@
-/* One body stepped from sample to sample under a held force: the loop over a block of samples.
+/* One body stepped from sample to sample under an input that is held, or linear: the loop over a block of samples.
  *
  * The steps use an instance of the body's FMU with the calls of an importer, so the samples are the same bit for bit.
  */
@@ -21,8 +21,9 @@ enum {
 };
 
 typedef struct {
-    uint32_t force, force_rate; /* inputs of the body */
+    uint32_t input, input_rate; /* of the body: a force, or the acceleration of its base, and its slope */
     vi_runs_variables outputs;  /* read at each sample */
+    int32_t reads_begin;        /* outputs are read at the begin of each step, after its input is set */
     const vi_magnet *magnet;    /* turns voltages into forces; NULL: forces are given */
     uint32_t displacement;      /* of the body at the magnet */
     /* The body's record; row_capacity 0: no record. */
@@ -34,12 +35,13 @@ typedef struct {
 typedef struct {
     int64_t count;
     const double *ends;     /* [count] s, ascending: time of each sample */
-    const double *forces;   /* [count] N, held over the step to each sample; V with a magnet */
-    const uint8_t *renewed; /* [count] is the force set anew at the start of the step to a sample? NULL: always */
+    const double *inputs;   /* [count] N or m/s^2 at the begin of the step to each sample; V with a magnet */
+    const double *rates;    /* [count] slope of the input over each step, N/s or m/s^3; NULL: the input is held */
+    const uint8_t *renewed; /* [count] is the input set anew at the begin of the step to a sample? NULL: always */
     double *samples;        /* [count][outputs] */
     int64_t at;
     double time; /* reached by the body, s */
-    int32_t begun; /* the force of the step to sample `at` is set */
+    int32_t begun; /* the input of the step to sample `at` is set */
     double *rows;  /* [rows_room][VI_RECORD_WIDTH]; rows_room >= row_capacity */
     int64_t rows_room, rows_used;
 } vi_hold_block;

@@ -90,6 +90,7 @@ def test_a_point_that_takes_long_is_left_to_workers_before_it_ends(
     tmp_path: Path, opened: list[str], monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
     monkeypatch.setattr(here, "HERE_SECONDS", 0.0)
+    monkeypatch.setattr(campaign, "thread_count", lambda _: 0)
     text = frequency_text(3).replace("transient_periods = 10", "transient_periods = 2000")
     scene = scene_of(f'{text}\n[execution]\nhow = "{how}"\n')
     report = run(scene, tmp_path / "campaign", DEFAULT_RUNNER)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
@@ -5,6 +6,7 @@ from vibroimpact.orchestrator.campaign.schedule import (
     CHUNK_SECONDS,
     FIRST_POINTS,
     MOST_POINTS,
+    MOST_RATE,
     QUEUED_PER_WORKER,
     SHORTEST_SECONDS,
     ChunkSchedule,
@@ -53,12 +55,12 @@ def test_quick_points_do_not_make_a_part_that_fills_the_memory() -> None:
 
 
 def test_chunks_get_shorter_towards_the_end_so_that_workers_finish_together() -> None:
-    schedule = ChunkSchedule(branches(5000), [], workers=2)
+    schedule = ChunkSchedule(branches(50_000), [], workers=2)
     counts = []
     while chunk := schedule.next_chunk():
         counts.append(chunk.count)
         schedule.finished(chunk, ended(chunk, 1e-3))
-    assert sum(counts) == 5000
+    assert sum(counts) == 50_000
     assert max(counts) == round(CHUNK_SECONDS / 1e-3)
     assert counts[-1] <= 1.5 * SHORTEST_SECONDS / 1e-3
 
@@ -102,3 +104,26 @@ def test_a_chunk_that_killed_its_worker_comes_back_in_pieces() -> None:
 
 def test_workers_never_wait_for_the_next_chunk_of_independent_points() -> None:
     assert ChunkSchedule(branches(10), [], workers=4).most_in_flight == 4 * QUEUED_PER_WORKER
+
+
+def test_before_the_time_of_a_point_is_known_each_worker_gets_one_chunk() -> None:
+    schedule = ChunkSchedule(branches(100_000), [], workers=2)
+    first, _ = next_chunk(schedule), next_chunk(schedule)
+    assert schedule.next_chunk() is None
+    schedule.finished(first, ended(first, 1e-3))
+    assert next_chunk(schedule).count == round(CHUNK_SECONDS / 1e-3)
+
+
+def test_large_results_make_a_chunk_of_fewer_points() -> None:
+    schedule = ChunkSchedule(branches(10_000_000), [], workers=2, most_bytes=10_000)
+    first = next_chunk(schedule)
+    schedule.finished(first, replace(ended(first, 1e-6), size=100 * first.count))
+    chunk = next_chunk(schedule)
+    assert (chunk.count, chunk.most_bytes) == (100, 10_000)
+
+
+def test_chunks_of_many_workers_take_as_long_as_one_scheduler_needs() -> None:
+    schedule = ChunkSchedule(branches(10_000_000, others=100), [], workers=1000)
+    first = next_chunk(schedule)
+    schedule.finished(first, ended(first, 1e-3))
+    assert next_chunk(schedule).count == round(1000 / MOST_RATE / 1e-3)

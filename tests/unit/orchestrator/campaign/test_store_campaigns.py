@@ -14,9 +14,9 @@ from support.campaign_scenes import assert_same_datasets, scene_of
 from support.serial_pool import Notes, campaign_here
 from support.store_scenes import BODY, axis
 
-import vibroimpact.orchestrator.campaign.chunks as chunks
 import vibroimpact.orchestrator.campaign.formats as formats
 import vibroimpact.orchestrator.campaign.grown_store as grown_store
+import vibroimpact.orchestrator.campaign.pieces as pieces
 import vibroimpact.orchestrator.campaign.schedule as schedule
 import vibroimpact.orchestrator.campaign.sealing as sealing
 from vibroimpact.analysis import open_dataset
@@ -96,7 +96,7 @@ def test_a_shard_that_runs_in_pieces_has_the_same_rows(
 ) -> None:
     text = BODY + axis("forcing.amplitude", [0.1 + 0.01 * k for k in range(40)])
     campaign_here(monkeypatch, text, tmp_path / "whole", runner=runner)
-    monkeypatch.setattr(chunks, "PIECE_POINTS", 3)
+    monkeypatch.setattr(pieces, "PIECE_POINTS", 3)
     campaign_here(monkeypatch, text, tmp_path / "pieces", runner=runner, format="zarr")
     assert_same_datasets(tmp_path / "pieces", tmp_path / "whole")
 

@@ -93,6 +93,47 @@ def test_a_block_of_samples_is_bit_for_bit_what_single_steps_give(scene: str) ->
     np.testing.assert_array_equal(rows, single)
 
 
+FORCED = STOPPED.replace("[record]", "[forcing]\namplitude = 2\nfrequency = 3\n[record]").replace(
+    "recorded_time = 1", "recorded_periods = 1"
+)
+
+
+@pytest.mark.parametrize("name", ["force", "base_acceleration"])
+@pytest.mark.parametrize("scene", [STOPPED, FREE + YIELDING, FORCED], ids=["rigid", "yielding", "forced"])
+def test_a_linear_input_is_bit_for_bit_what_single_steps_give(scene: str, name: str) -> None:
+    values = 4.0 * np.sin(0.02 * np.arange(3001)) + 2.0
+    times = np.concatenate([[0.0], np.cumsum(np.random.default_rng(1).uniform(1e-4, 2e-3, 3000))])
+    outputs = ["displacement", "velocity", "acceleration", "contact_force"]
+    with Session(parse_scene(scene, "stop.toml"), outputs) as session:
+        session.begin()
+        rows = session.follow(times, name, values)
+        impacts, state = session.impacts(), session.observed()
+        session.begin()
+        single = []
+        for k, time in enumerate(times):
+            session._driver.advance(float(time))
+            slope = (values[k + 1] - values[k]) / (times[k + 1] - time) if k + 1 < len(times) else 0.0
+            session._set_input(name, values[k], slope)
+            single.append(session.sample())
+        np.testing.assert_array_equal(session.impacts(), impacts)
+        assert len(impacts) > 5
+        assert session.observed() == state
+    np.testing.assert_array_equal(rows, single)
+
+
+def test_instants_without_an_input_are_bit_for_bit_single_steps() -> None:
+    times = np.linspace(0.0, 1.0, 200)
+    with Session(parse_scene(FORCED, "stop.toml"), ["acceleration", "displacement"]) as session:
+        session.begin()
+        rows = session.follow(times)
+        session.begin()
+        single = [session.sample()]
+        for time in times[1:]:
+            session._driver.advance(float(time))
+            single.append(session.sample())
+    np.testing.assert_array_equal(rows, single)
+
+
 def test_a_block_that_cannot_be_is_one_clear_error() -> None:
     two = np.array([0.0, 0.1])
     with Session(parse_scene(FREE, "free.toml")) as session:

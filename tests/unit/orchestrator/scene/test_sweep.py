@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import pickle
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +15,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import (
     Branch,
+    SpacedValues,
     SweepAxis,
     SweepPath,
     axis_of_range,
     expand,
+    first_runs,
     log_axis,
     run_count,
 )
@@ -40,7 +45,7 @@ def frequencies(branch: Branch) -> list[float]:
     return [point.values[FREQUENCY] for point in branch.points]
 
 
-def indices(branches: tuple[Branch, ...]) -> list[int]:
+def indices(branches: Sequence[Branch]) -> list[int]:
     return [point.index for branch in branches for point in branch.points]
 
 
@@ -152,3 +157,48 @@ def test_a_logarithmic_range_in_a_scene_and_what_is_none() -> None:
     ):
         with pytest.raises(SceneError, match=re.escape(message)):
             parse_scene(f'{text}"body.velocity_start" = {entry}', "a")
+
+
+numbers = st.floats(-1e300, 1e300)
+
+
+@given(start=numbers, stop=numbers, points=st.integers(2, 40))
+def test_values_on_access_have_the_bits_of_listed_ones(start: float, stop: float, points: int) -> None:
+    listed = axis_of_range(MASS, start, stop, points, "independent").values
+    spaced = SpacedValues(start, stop, points)
+    assert np.array(list(spaced)).tobytes() == np.array(listed).tobytes()
+    assert list(spaced[::-1]) == list(listed)[::-1]
+    assert [spaced[place] for place in range(-points, points)] == [*listed, *listed]
+    assert spaced[1:-1] == listed[1:-1]
+    assert spaced.differ == (len(set(listed)) == points)
+    with pytest.raises(IndexError):
+        spaced[points]
+
+
+def test_a_range_of_a_hundred_million_values_is_not_held_in_memory() -> None:
+    axis = axis_of_range(MASS, 2.0, 1.0, 10**8, "up-down")
+    up, down = expand(Swept((axis,)))
+    assert (up.points[0].values, down.points[0].values) == ({MASS: 1.0}, {MASS: 2.0})
+    assert (axis.lowest, axis.highest, down.points.first_index) == (1.0, 2.0, 10**8)
+    assert pickle.loads(pickle.dumps(axis)) == axis
+    assert len(pickle.dumps(axis)) < 1000
+
+
+lists = st.lists(st.floats(-9, 9), min_size=1, max_size=4).map(tuple)
+
+
+@given(st.data(), lists, lists, lists, st.sampled_from(["up", "down", "up-down"]))
+def test_columns_of_many_branches_are_those_of_each_branch(
+    data: st.DataObject, masses: Any, frequencies: Any, positions: Any, path: SweepPath
+) -> None:
+    axes = (SweepAxis(MASS, masses), SweepAxis(FREQUENCY, frequencies, path), SweepAxis(POSITION, positions))
+    branches, runs = expand(Swept(axes)), run_count(axes)
+    first = data.draw(st.integers(0, runs - 1))
+    stop = data.draw(st.integers(first + 1, runs))
+    together, one_by_one = (columns_of_points(each, first, stop) for each in (branches, tuple(branches)))
+    assert {key: column.tolist() for key, column in together.values.items()} == {
+        key: column.tolist() for key, column in one_by_one.values.items()
+    }
+    for name in ("direction", "index", "first"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(one_by_one, name))
+    assert list(first_runs(branches)) == first_runs(tuple(branches))

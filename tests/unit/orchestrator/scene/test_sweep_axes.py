@@ -150,6 +150,12 @@ BAD = {
         UNIFORM % (1, 2),
         (UNIFORM % (1, 2)).replace("mass", "stiffness"),
     ],
+    'expected at most 1000000 values of a range with spacing = "log"': [
+        '"body.mass" = { start = 1, stop = 2, points = 1000001, spacing = "log" }'
+    ],
+    "expected values that differ from each other": [
+        '"body.mass" = { start = 1, stop = 1.0000000000000002, points = 1000001 }'
+    ],
     "expected a distribution beside them, got low": [
         '"body.mass" = { start = 1, stop = 2, points = 3, low = 0 }'
     ],
@@ -174,6 +180,9 @@ def test_a_wrong_axis_is_one_line_that_says_what_to_do(text: str) -> None:
 
 RANGE = "start = 1, stop = 2, points = 5"
 BAD_ADAPTIVE = {
+    "expected at most 1000000 values of an adaptive axis, got 1000001": [
+        '"body.mass" = { start = 1, stop = 2, points = 1000001, adaptive = { tolerance = 1e-9, at_most = 90 } }'
+    ],
     "expected a tolerance >= 1.78e-15, got 1e-16": [
         f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-16, at_most = 90 }} }}'
     ],
