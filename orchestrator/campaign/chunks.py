@@ -200,7 +200,7 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     points = _points_left(work, work.branches or expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in range(len(points))]
     path, written = write_part(work, chunk, DatasetForm(work.scene), points, records, chunk.start)
-    return ChunkResult(chunk, chunk.start, written, 0.0, str(path))
+    return ChunkResult(chunk, chunk.start, written, 0.0, path=str(path))
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:

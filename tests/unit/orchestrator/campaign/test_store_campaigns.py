@@ -164,7 +164,8 @@ def test_damaged_metadata_are_written_again_and_no_point_is_computed(
 def test_a_shard_that_changes_after_its_seal_is_computed_again_by_the_same_command(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    complete, notes, damaged = grown_store.GrownStore.complete, Notes(), []
+    complete, notes = grown_store.GrownStore.complete, Notes()
+    damaged: list[Path] = []
 
     def damage_first(store: grown_store.GrownStore, *others: Any) -> bool:
         if not damaged:
