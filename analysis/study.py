@@ -12,7 +12,6 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import xarray as xr
@@ -20,6 +19,7 @@ import xarray as xr
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.dataset.reading import opened_in_memory
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.terminal import Terminal
 
@@ -82,8 +82,8 @@ class Study(ABC, Generic[Row]):
         """
 
     @classmethod
-    def reads(cls, options: Any) -> Sequence[Path]:
-        """Return the files that the arguments name; the studied file comes first."""
+    def reads(cls, options: Any) -> Sequence[Place]:
+        """Return the files and stores that the arguments name; the studied file comes first."""
         return [options.scene]
 
     @classmethod

@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
     from vibroimpact import fmus as fmus
     from vibroimpact.analysis import figures as figures
     from vibroimpact.analysis.dataset import open_dataset as open_dataset
+    from vibroimpact.analysis.dataset.converting import convert as convert
     from vibroimpact.analysis.dataset.reading import open_measured as open_measured
     from vibroimpact.analysis.dataset.results import write_results as write_results
     from vibroimpact.analysis.decay import curve_of as curve_of
@@ -91,6 +92,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
 
 _NAMES = {
     "analysis.dataset": ("open_dataset",),
+    "analysis.dataset.converting": ("convert",),
     "analysis.dataset.reading": ("open_measured",),
     "analysis.dataset.results": ("write_results",),
     "analysis.decay": ("curve_of", "decay_samples", "estimate_decay", "fit_resonance", "frequency_response"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import xarray as xr
 
@@ -26,6 +26,7 @@ def campaign(
     *,
     workers: int | None = None,
     scheduler: str | Client | None = None,
+    format: Literal["netcdf", "zarr"] | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
     """Compute all points of a scene's sweep with many workers; the same call resumes an interrupted campaign.
@@ -35,12 +36,16 @@ def campaign(
     scene : Scene, path or mapping
         A scene with a sweep, the file of a scene or of a system (SSP), or the tables of a scene.
     folder : path
-        Folder of this campaign alone; it is made when absent. The dataset is its file `dataset.nc`.
+        Folder of this campaign alone; it is made when absent. The dataset is its file `dataset.nc`, or its store
+        `dataset.zarr`.
     workers : int, optional
         Number of worker processes on this machine. By default the campaign begins in this process. One worker for
         each processor takes over where more than 2 s of work are left.
     scheduler : str or dask.distributed.Client, optional
         Dask scheduler whose workers to use instead: its address, or a client of it.
+    format : {"netcdf", "zarr"}, optional
+        Format of the dataset: one file, or a Zarr store that grows without being joined. By default a file; a store
+        from 10^7 points on, where zarr is installed (`pip install "vibroimpact[store]"`).
     progress : bool
         Whether to show the progress.
 
@@ -77,5 +82,6 @@ def campaign(
             workers=workers,
             scheduler=scheduler,
             progress=shown,
+            format=format,
         )
     return open_dataset(report.dataset)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,9 +15,12 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import RULES
+from vibroimpact.analysis.dataset import RULES, dataset_place, read_runs
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG
+from vibroimpact.analysis.dataset.writing import image_of
+from vibroimpact.analysis.files.open_files import netcdf_lock
 from vibroimpact.analysis.files.opening import opened_netcdf
+from vibroimpact.analysis.files.stores import is_store
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.service.run_classes import ClassColumns, can_be_classified
 
@@ -162,14 +166,15 @@ class LandedReader:
     def _remembered(
         self, path: Path, question: Hashable, read: Callable[[netCDF4.Dataset], Later[tuple[Found, int]]]
     ) -> Found:
-        state = path.stat()
+        # an object of a store is replaced only before this one, which is written last
+        state = (path / "zarr.json" if is_store(path) else path).stat()
         key = (path, state.st_mtime_ns, state.st_size, question)
         with READING:
             if key in self._known:
                 self._known.move_to_end(key)
                 known: Found = self._known[key][0]
                 return known
-            with opened_netcdf(path) as file:
+            with opened_runs(path) as file:
                 make = read(file)
         answer = make()
         with READING:
@@ -180,11 +185,24 @@ class LandedReader:
 
 
 def files_of(campaign: Path) -> list[Path]:
-    """Return the files with finished points of a campaign: its dataset, else its parts in the order of their runs."""
-    dataset = campaign / "dataset.nc"
-    if dataset.is_file():
+    """Return the files with finished points of a campaign: file or store of its dataset, else its parts in order."""
+    dataset = Path(dataset_place(campaign))
+    if dataset.is_file() or is_store(dataset):
         return [dataset]
     return sorted((campaign / "parts").glob("*.nc"), key=lambda path: path.name.partition("_runs-")[2])
+
+
+@contextmanager
+def opened_runs(path: Path) -> Iterator[netCDF4.Dataset]:
+    """Open a file of runs, or a store of them, which becomes a file in memory."""
+    if not is_store(path):
+        with opened_netcdf(path) as file:
+            yield file
+        return
+    content = bytes(image_of(read_runs(path)))
+    with netcdf_lock(), netCDF4.Dataset("runs.nc", memory=content) as file:
+        file.set_auto_maskandscale(False)
+        yield file
 
 
 def axes_of(file: netCDF4.Dataset) -> list[str]:

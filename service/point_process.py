@@ -16,9 +16,10 @@ from vibroimpact.analysis.dataset import (
     RunRecord,
     merge_datasets,
     read_flat,
+    read_runs,
 )
 from vibroimpact.analysis.dataset.schema import attributes_of, known_unit, unit_in
-from vibroimpact.analysis.files.opening import opened_netcdf
+from vibroimpact.analysis.files.stores import is_store
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.manifest import read_manifest
 from vibroimpact.orchestrator.campaign.rounds import Rounds, adaptive_axes
@@ -28,7 +29,7 @@ from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.models import TimeSeries
 from vibroimpact.orchestrator.scene.sweep import Branch, expand
-from vibroimpact.service.landed import files_of
+from vibroimpact.service.landed import files_of, opened_runs
 from vibroimpact.service.slices import finite
 
 MOST_PERIODS = 20
@@ -93,7 +94,9 @@ def _as_it_ran(given: Scene, results: Path) -> Scene:
 def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branch]:
     """Return a point and its branch; in an adaptive sweep, the earlier rounds determine both."""
     if adaptive_axes(scene):
-        branch = Rounds(scene).branch_of(merge_datasets(files_of(results)), run)
+        files = files_of(results)
+        rows = read_runs(files[0]) if files and is_store(files[0]) else merge_datasets(files)
+        branch = Rounds(scene).branch_of(rows, run)
     else:
         ends = ((one, one.points.first_index + len(one.points)) for one in expand(scene))
         branch = next((one for one, end in ends if run < end), None)
@@ -111,7 +114,7 @@ def _start_of(results: Path, branch: Branch, run: int) -> State | None:
         return None
     first, known = branch.points.first_index, dict[int, State | None]()
     for path in files_of(results):
-        with opened_netcdf(path) as file:
+        with opened_runs(path) as file:
             runs, outcomes = file["run_index"][:], file["outcome"][:]
             if "final_state" in file.variables:
                 states = file["final_state"][:]

@@ -10,7 +10,7 @@ import xarray as xr
 from rich.table import Table
 
 from vibroimpact.analysis.commands.opened_file import opened_file
-from vibroimpact.analysis.dataset import dataset_file
+from vibroimpact.analysis.dataset import dataset_place
 from vibroimpact.analysis.operations.describe import Describe
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.recording.table import print_recording
@@ -34,7 +34,7 @@ _NOTES = ("title", "history", "engine", "channel", "verdict")
 
 def describe_file(options: Describe) -> None:
     """Print the contents of a file of this package; a missing, damaged or foreign file raises DatasetError."""
-    file = dataset_file(options.file)
+    file = dataset_place(options.file)
     console = wide_terminal()
     with opened_file(file) as data:
         console.print(f"{file}: {_kind(data)}", soft_wrap=True)

@@ -16,9 +16,9 @@ from vibroimpact.analysis.commands.estimate_scene import (
     side_of_stop,
 )
 from vibroimpact.analysis.dataset.outputs import refuse_places, writing
-from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.dataset.schema import scene_of
+from vibroimpact.analysis.dataset.store_runs import read_runs
 from vibroimpact.analysis.decay.estimate import print_estimates, print_remarks
 from vibroimpact.analysis.decay.free_decay import estimate_decay, print_decay
 from vibroimpact.analysis.decay.frequency_response import frequency_response
@@ -126,7 +126,7 @@ def _estimating(options: Estimation, spelling: Spelling) -> Iterator[Terminal]:
 
 
 def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
-    attrs = read_flat(data).attrs
+    attrs = read_runs(data).attrs
     amplitude = force_amplitude(scene_of(attrs))
     known = amplitude is not None and amplitude > 0.0
     curve, remarks = swept_response(data, amplitude or 1.0 if known else 1.0, "N" if known else "1", band)

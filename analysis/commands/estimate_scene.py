@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import file_name_of, scene_of, swept_names
+from vibroimpact.analysis.dataset.store_runs import read_runs
 from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording
@@ -49,7 +49,7 @@ def kind_of(data: Path, *, one_run: bool) -> str:
     """
     if is_recording(data):
         return "decay"
-    flat = read_flat(data)
+    flat = read_runs(data)
     if not one_run and flat.sizes["run"] > 1 and {"angular_frequency", "frequency"} & set(swept_names(flat)):
         return "response"
     return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values > 0) else "decay"
@@ -60,7 +60,7 @@ def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, An
     if not recording.attrs.get("simulated"):
         return {}
     scene = scene_of(recording.attrs)
-    flat = read_flat(data)
+    flat = read_runs(data)
     row = 0 if run is None else flat.run_index.values.tolist().index(run)
     for key in scene.get("sweep", {}):
         owner, _, name = str(key).rpartition(".")

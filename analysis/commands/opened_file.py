@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from pathlib import Path
 
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset, open_measured
 from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
 from vibroimpact.analysis.files.opening import DAMAGE, file_attributes, unreadable
+from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.analysis.recording import Recording, open_recording
 
 
 @contextmanager
-def opened_file(file: Path) -> Iterator[xr.Dataset | Recording]:
-    """Open a file; values are read when first used, so that damage may show only then.
+def opened_file(file: Place) -> Iterator[xr.Dataset | Recording]:
+    """Open a file or a store; values are read when first used, so that damage may show only then.
 
     Raises
     ------
@@ -28,12 +28,14 @@ def opened_file(file: Path) -> Iterator[xr.Dataset | Recording]:
             yield data
     except DAMAGE as problem:
         # A file with the hash of its writer is as it was written: the fault is not the file's then.
-        if isinstance(problem, OSError | RuntimeError) or not matches_recorded_hash(file):
+        if is_store(file) or isinstance(problem, OSError | RuntimeError) or not matches_recorded_hash(file):
             raise unreadable(file, problem) from problem
         raise
 
 
-def _opened(file: Path) -> AbstractContextManager[xr.Dataset | Recording]:
+def _opened(file: Place) -> AbstractContextManager[xr.Dataset | Recording]:
+    if is_store(file):
+        return open_dataset(file)
     attributes = file_attributes(file)
     if "recording_schema" in attributes:
         return nullcontext(open_recording(file))

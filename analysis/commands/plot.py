@@ -8,7 +8,7 @@ import xarray as xr
 
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.commands.opened_file import opened_file
-from vibroimpact.analysis.dataset import dataset_file
+from vibroimpact.analysis.dataset import dataset_place
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
 from vibroimpact.analysis.operations.plot import Plot
 from vibroimpact.analysis.recording import Recording
@@ -21,9 +21,9 @@ _DRAWN = ("recording", "start", "stop", "periods", "segment", "variable", "title
 
 def draw_file(options: Plot) -> None:
     """Draw a file that this package wrote, or draw one file over another."""
-    file, output = dataset_file(options.file), options.output
+    file, output = dataset_place(options.file), options.output
     drawn = {name: getattr(options, name) for name in _DRAWN}
-    below = None if options.over is None else dataset_file(options.over)
+    below = None if options.over is None else dataset_place(options.over)
     refuse_outputs([file, *([] if below is None else [below])], None, output)
     with opened_file(file) as data, nullcontext() if below is None else opened_file(below) as other:
         if isinstance(other, Recording):

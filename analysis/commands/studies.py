@@ -13,6 +13,7 @@ import typer
 from vibroimpact.analysis.dataset import write_dataset
 from vibroimpact.analysis.dataset.outputs import Places, refuse_places, writing
 from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.analysis.study import INCOMPLETE, Study
 from vibroimpact.fmus.errors import DatasetError, VibroimpactError
 from vibroimpact.fmus.operations.declaring import ROOT
@@ -63,11 +64,13 @@ def conduct(options: Studied) -> None:
 
 
 @contextmanager
-def _naming(study: Study[Any], read: Sequence[Path]) -> Iterator[None]:
+def _naming(study: Study[Any], read: Sequence[Place]) -> Iterator[None]:
     """Add the name of the studied file to errors that do not name it."""
     try:
         yield
     except study.named as problem:
+        if str(problem).startswith(f"{read[0]}: "):
+            raise
         raise problem.named(read[0]) from problem
 
 

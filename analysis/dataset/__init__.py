@@ -2,6 +2,7 @@
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
 `writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
+`zarr_store` writes Zarr stores, `zarr_reading` opens them, `converting` makes either form from the other.
 `accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
 importable from here.
 """
@@ -16,9 +17,9 @@ if TYPE_CHECKING:
     from vibroimpact.analysis.dataset.checking import check, marked
     from vibroimpact.analysis.dataset.joining import join_files
     from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
+    from vibroimpact.analysis.dataset.places import dataset_place
     from vibroimpact.analysis.dataset.reading import (
         Part,
-        dataset_file,
         open_dataset,
         open_measured,
         read_flat,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
         file_name_of,
         file_names,
     )
+    from vibroimpact.analysis.dataset.store_runs import read_runs
     from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
 
 __all__ = [
@@ -55,7 +57,7 @@ __all__ = [
     "build_dataset",
     "check",
     "constant_names",
-    "dataset_file",
+    "dataset_place",
     "file_name_of",
     "file_names",
     "join_files",
@@ -65,6 +67,7 @@ __all__ = [
     "open_measured",
     "read_flat",
     "read_part",
+    "read_runs",
     "refuse_unlike",
     "take_runs",
     "with_constants",
@@ -75,9 +78,9 @@ _HOMES = {
     **dict.fromkeys(("check", "marked"), "checking"),
     "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
-    **dict.fromkeys(
-        ("Part", "dataset_file", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"
-    ),
+    "dataset_place": "places",
+    "read_runs": "store_runs",
+    **dict.fromkeys(("Part", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"),
     **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),
 }
 

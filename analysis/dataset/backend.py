@@ -32,14 +32,15 @@ class VibroimpactBackend(BackendEntrypoint):
         DatasetError
             The file is missing, damaged or foreign, or the dataset is open already.
         """
-        from vibroimpact.analysis.dataset.reading import dataset_file, open_dataset, open_measured
+        from vibroimpact.analysis.dataset.places import dataset_place
+        from vibroimpact.analysis.dataset.reading import open_dataset, open_measured
         from vibroimpact.analysis.files.opening import file_attributes
         from vibroimpact.fmus.errors import DatasetError
 
         if not isinstance(filename_or_obj, str | os.PathLike):
             kind = type(filename_or_obj).__name__
             raise DatasetError(f"dataset: expected the path of a file or folder, got {kind}.")
-        file = dataset_file(filename_or_obj)
+        file = dataset_place(filename_or_obj)
         is_result = "results_kind" in file_attributes(file)
         opened = open_measured(file) if is_result else open_dataset(file)
         kept = opened.drop_vars([] if drop_variables is None else drop_variables, errors="ignore")

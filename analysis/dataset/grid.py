@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -25,6 +25,8 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 
+RANGE, RANGE_ENDS = "displacement_range", ("displacement_max", "displacement_min")
+"""Derived variable: the displacement range of a run, and the variables that it comes from."""
 # Grid points per run above which a sweep (scattered points) would waste memory on a grid; `run` stays its dimension.
 _LARGEST_GRID_PER_RUN = 10
 
@@ -89,8 +91,8 @@ def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
         dims, run_id, {"long_name": "position of the run in the file", "units": "1"}
     )
     variables |= _row_owners(labelled)
-    if "displacement_max" in labelled.variables:
-        variables["displacement_range"] = _displacement_range(labelled, place)
+    if RANGE_ENDS[0] in labelled.variables:
+        variables[RANGE] = _displacement_range(labelled, place)
     coordinates = {"run_index": variables.pop("run_index")}
     coordinates |= {name: variables.pop(name) for name in ("connection", "compared") if name in variables}
     coordinates |= {name: labelled.variables[name] for name in constants}
@@ -144,16 +146,26 @@ def _displacement_range(flat: Flat, place: _Placing) -> xr.Variable:
     """Return the largest minus the smallest displacement over the recorded periods, without NaN periods."""
 
     def read() -> NDArray[np.float64]:
-        largest = np.fmax.reduce(flat.variables["displacement_max"].values, axis=1, initial=-np.inf)
-        smallest = np.fmin.reduce(flat.variables["displacement_min"].values, axis=1, initial=np.inf)
-        return np.where(largest >= smallest, largest - smallest, np.nan)
+        return range_over_periods(*(flat.variables[name].values for name in RANGE_ENDS))
 
-    attributes = {
-        "long_name": "displacement range over the recorded periods",
-        "units": flat.variables["displacement_max"].attrs["units"],
-    }
+    attributes = range_attributes(flat.variables[RANGE_ENDS[0]])
     array = _RunArray(read, place.run_id, flat.variables["final_displacement"])
     return place.laid_out(place.dims, array, attributes)
+
+
+def range_over_periods(largest: NDArray[np.float64], smallest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the range of each run, shape (run,), from the extremes of its periods, shape (run, period)."""
+    top = np.fmax.reduce(largest, axis=1, initial=-np.inf)
+    bottom = np.fmin.reduce(smallest, axis=1, initial=np.inf)
+    return np.where(top >= bottom, top - bottom, np.nan)
+
+
+def range_attributes(largest: xr.Variable) -> dict[str, str]:
+    """Return the attributes of the range, whose unit is that of the extremes."""
+    return {
+        "long_name": "displacement range over the recorded periods",
+        "units": str(largest.attrs["units"]),
+    }
 
 
 def _row_owners(flat: Flat) -> dict[str, xr.Variable]:
@@ -182,24 +194,46 @@ def _grid(
     names = _direction_names(flat)
     if directions.size and (directions != Direction.independent).any():
         present, place = _distinct(directions)
-        labels = np.array([Direction(int(value)).name for value in present])
-        axes["direction"] = new_axis("direction", labels, _plain(flat.variables["direction"]))
-        sizes["direction"] = labels.size
+        labels = [Direction(int(value)).name for value in present]
+        axes["direction"] = direction_axis(labels, _plain(flat.variables["direction"]))
+        sizes["direction"] = len(labels)
         places.append(place)
     elif directions.size:
         scalars["direction"] = new_variable((), np.asarray(names[0]), _plain(flat.variables["direction"]))
     for dimension, names_along in _swept_along(flat).items():
-        values, place = _distinct_points([flat.variables[name] for name in names_along])
-        for name, column in zip(names_along, values.T, strict=True):
-            new = new_axis if name == dimension else new_variable
-            axes[name] = new(dimension, column, flat.variables[name].attrs)
-        sizes[dimension] = len(values)
+        own, place = axis_of(dimension, {name: flat.variables[name] for name in names_along})
+        axes |= own
+        sizes[dimension] = next(iter(own.values())).size
         places.append(place)
     axes |= shared_axes(axes)
     run_id = _run_grid(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
         return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
     return tuple(sizes), axes, scalars, run_id
+
+
+def direction_axis(words: Sequence[str], attributes: Mapping[str, Any] | None = None) -> xr.Variable:
+    """Return the coordinate along the directions of a sweep."""
+    return new_axis("direction", np.array(words), attributes or {"long_name": RULES["direction"].long_name})
+
+
+def axis_of(
+    dimension: str, columns: Mapping[str, xr.Variable]
+) -> tuple[dict[str, xr.Variable], NDArray[np.intp]]:
+    """Return the coordinates of parameters along their dimension, and the place of each run along it.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : mapping of str to xarray.Variable, shape (run,)
+        Values of each parameter that moves along the dimension.
+    """
+    values, place = _distinct_points(list(columns.values()))
+    axes: dict[str, xr.Variable] = {}
+    for (name, variable), column in zip(columns.items(), values.T, strict=True):
+        new = new_axis if name == dimension else new_variable
+        axes[name] = new(dimension, column, variable.attrs)
+    return axes, place
 
 
 def shared_axes(columns: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:

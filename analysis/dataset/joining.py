@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import netCDF4
 import numpy as np
@@ -64,8 +64,8 @@ def join_files(
         raise DatasetError("merge: expected at least one file, got none.")
     form, files, sizes = _survey(paths)
     with whole_or_absent(target) as temporary:
-        with _appended(temporary, marked(finished(form)), sizes) as file:
-            for block in _blocks(files, form, os.fspath(paths[0])):
+        with appended_file(temporary, marked(finished(form)), sizes) as file:
+            for block in blocks_in_order(files, form, os.fspath(paths[0])):
                 file.append(marked(block))
         seal(temporary)
     return file.has_messages
@@ -76,7 +76,7 @@ def join_files(
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file with its lowest and its highest run index."""
+    """A `Piece` that is a file."""
 
     path: str
     first: int
@@ -105,9 +105,28 @@ def _survey(paths: Sequence[str | os.PathLike[str]]) -> tuple[xr.Dataset, list[_
     return form, sorted(files, key=lambda file: file.first), sizes
 
 
-def _blocks(files: Sequence[_File], form: xr.Dataset, form_name: str) -> Iterator[xr.Dataset]:
+class Piece(Protocol):
+    """Runs of a dataset, such as one of its files, with the lowest and the highest run index."""
+
+    @property
+    def path(self) -> str:
+        """Name in messages."""
+
+    @property
+    def first(self) -> int:
+        """Lowest run index."""
+
+    @property
+    def last(self) -> int:
+        """Highest run index."""
+
+    def rows(self) -> xr.Dataset:
+        """Return the runs in the order of their index."""
+
+
+def blocks_in_order(files: Sequence[Piece], form: xr.Dataset, form_name: str) -> Iterator[xr.Dataset]:
     """Yield the runs of all files in blocks, ordered by their index; a block ends where a file begins or ends."""
-    waiting, rows = list(reversed(files)), dict[_File, xr.Dataset]()
+    waiting, rows = list(reversed(files)), dict[Piece, xr.Dataset]()
     ends = sorted({file.first for file in files} | {file.last + 1 for file in files})
     for begin, end in pairwise(ends):
         while waiting and waiting[-1].first == begin:
@@ -185,7 +204,7 @@ class _AppendedFile:
 
 
 @contextmanager
-def _appended(path: Path, form: xr.Dataset, sizes: Mapping[str, int]) -> Iterator[_AppendedFile]:
+def appended_file(path: Path, form: xr.Dataset, sizes: Mapping[str, int]) -> Iterator[_AppendedFile]:
     """Make a file of a known size, to which the block appends runs."""
     size = _HEAD_BYTES + sum(
         prod(sizes.get(str(name), length) for name, length in variable.sizes.items())

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vibroimpact.analysis.files.opening import file_attributes
+from vibroimpact.analysis.files.stores import STORE_ENDING, Place, holds_store, is_address, is_store
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
@@ -17,6 +18,7 @@ FIGURE_ENDINGS = (".png", ".pdf", ".svg")
 DATASET_ENDING = ".nc"
 FILE_ENDINGS = (
     DATASET_ENDING,
+    STORE_ENDING,
     *FIGURE_ENDINGS,
     ".csv",
     ".txt",
@@ -34,14 +36,14 @@ LONGEST_NAME = 200
 
 
 def refuse_outputs(
-    read: Iterable[Path], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
+    read: Iterable[Place], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
 ) -> None:
     """Refuse outputs that would overwrite a file to be read, lie in no folder, or have the ending of another kind.
 
     Parameters
     ----------
-    read : iterable of Path
-        Files that the command reads.
+    read : iterable of Path or str
+        Files and stores that the command reads.
     output, figure : Path or None
         Files that the command will write.
     ending : str
@@ -63,7 +65,7 @@ def refuse_outputs(
         _refuse_long_name(target)
         if any(_same(target, file) for file in files):
             raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
-        if target.is_dir():
+        if target.is_dir() and not (ending == STORE_ENDING and is_store(target)):
             raise UsageError(f"{target}: expected a place where a file can be written, got a folder.")
         if not os.access(target.parent, os.W_OK | os.X_OK):
             got = "one that cannot be written to" if target.parent.is_dir() else "no folder of that name"
@@ -107,13 +109,14 @@ def refuse_folder(folder: Path) -> None:
 
 
 def refuse_overwriting(
-    output: Path | None, force: bool, is_same: Callable[[Mapping[str, Any]], bool]
+    output: Place | None, force: bool, is_same: Callable[[Mapping[str, Any]], bool]
 ) -> None:
     """Refuse to overwrite a dataset with other contents; a command may be repeated, and figures are drawn anew.
 
     Parameters
     ----------
-    output : Path or None
+    output : Path, str or None
+        A str is the address of a store.
     force : bool
         Whether the user allows it all the same.
     is_same : callable
@@ -124,7 +127,10 @@ def refuse_overwriting(
     UsageError
         With the file and what to do.
     """
-    if output is None or force or not output.exists() or is_same(file_attributes(output)):
+    if output is None or force:
+        return
+    is_there = holds_store(output) if is_address(output) else os.path.exists(output)
+    if not is_there or is_same(file_attributes(output)):
         return
     raise UsageError(
         f"{output}: expected a new file, or one that holds the same, got one that holds something else. "
@@ -148,7 +154,7 @@ class Places(Protocol):
         """Whether a file with other contents may be replaced."""
 
 
-def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None:
+def refuse_places(options: Places, read: Iterable[Place], **same: object) -> None:
     """Raise UsageError for places that cannot be written, or that hold other contents.
 
     Parameters
@@ -171,7 +177,7 @@ def refuse_places(options: Places, read: Iterable[Path], **same: object) -> None
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Place) -> Iterator[None]:
     """Turn an operating system's error of writing, such as a full disk, into an error that names the file.
 
     Raises
@@ -192,7 +198,7 @@ def writing(path: Path) -> Iterator[None]:
         raise UsageError(f"{path}: could not be written: {problem.strerror or problem}.") from problem
 
 
-def _same(one: Path, other: Path) -> bool:
+def _same(one: Path, other: Place) -> bool:
     try:
         return one.samefile(other)
     except OSError:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import netCDF4
@@ -18,6 +17,7 @@ from xarray.backends import StoreBackendEntrypoint
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.grid import on_grid, shared_axes
+from vibroimpact.analysis.dataset.places import dataset_place
 from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
@@ -25,9 +25,11 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 from vibroimpact.analysis.dataset.storing import as_read
+from vibroimpact.analysis.dataset.zarr_reading import StoreContents, refuse_foreign
 from vibroimpact.analysis.files.lazy_store import LazyStore
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.files.probing import check_sound, refuse_changed
+from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.fmus.errors import DatasetError
 
 SILENT = "without_messages"
@@ -53,18 +55,8 @@ class Part:
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """Open a file that vibroimpact wrote; any fault of the file becomes one DatasetError."""
     with opened_netcdf(path) as file:
-        _refuse_foreign(path, file.ncattrs(), file.variables)
+        refuse_foreign(path, file.ncattrs(), file.variables)
         yield file
-
-
-def _refuse_foreign(
-    path: str | os.PathLike[str], attributes: Collection[object], variables: Collection[object]
-) -> None:
-    if "dataset_schema" not in attributes or not all(name in variables for name in ("run_index", "outcome")):
-        raise DatasetError(
-            f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
-            "Use the dataset.nc of a campaign or the file of a run."
-        )
 
 
 def read_part(path: str | os.PathLike[str]) -> Part:
@@ -99,7 +91,7 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             name: (variable.dimensions, _values(file, name), _attributes(variable))
             for name, variable in file.variables.items()
         }
-        return _fitting(path, _as_flat(file, data))
+        return fitting(path, _as_flat(file, data))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,13 +159,7 @@ def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
     }
 
 
-def dataset_file(path: str | os.PathLike[str]) -> Path:
-    """Return the file that a name stands for: the dataset of a campaign's folder, or the file itself."""
-    # os.path: False for names that no file can have, where Path.is_dir raises
-    return Path(path) / "dataset.nc" if os.path.isdir(path) else Path(path)
-
-
-def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+def open_dataset(path: Place) -> xr.Dataset:
     """Open a dataset on the real dimensions of its sweep.
 
     Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept parameter.
@@ -190,8 +176,9 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Parameters
     ----------
-    path : path
-        A dataset file, or a campaign's folder (then its `dataset.nc`).
+    path : path or address
+        A dataset file or store, the folder of a campaign (then the dataset in it), or the address of either for
+        fsspec, such as `s3://bucket/map.zarr`. Large variables of a store are in chunks of Dask.
 
     Raises
     ------
@@ -205,14 +192,16 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     >>> up.sel(angular_frequency=0.9, method="nearest")  # doctest: +SKIP
     >>> ds.vibroimpact.impacts(direction="up", angular_frequency=0.9)  # doctest: +SKIP
     """
-    file = dataset_file(path)
-    flat = _open_flat(file)
+    file = dataset_place(path)
+    if is_store(file):
+        return _checked_schema(file, StoreContents(file).dataset())
+    flat = open_flat(file)
     try:
         with one_error(file):
             opened = (
                 _saved_again(flat)
                 if "run_id" in flat.variables
-                else on_grid(_fitting(file, flat), lazily=True)
+                else on_grid(fitting(file, flat), lazily=True)
             )
     except DatasetError:
         flat.close()
@@ -242,22 +231,26 @@ def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
     return renamed
 
 
-def _open_flat(file: Path) -> xr.Dataset:
+def open_flat(file: Place) -> xr.Dataset:
     """Open a file lazily in its one-dimensional form."""
     with one_error(file):
         flat = _open_checked(file)
     try:
-        _refuse_foreign(file, flat.attrs, flat.variables)
-        schema = str(flat.attrs["dataset_schema"])[:60]
-        if schema != SCHEMA_VERSION:
-            raise DatasetError(
-                f"{file}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
-                "Open it with the version of vibroimpact that wrote it."
-            )
+        refuse_foreign(file, flat.attrs, flat.variables)
+        return _checked_schema(file, flat)
     except DatasetError:
         flat.close()
         raise
-    return flat
+
+
+def _checked_schema(place: Place, dataset: xr.Dataset) -> xr.Dataset:
+    schema = str(dataset.attrs["dataset_schema"])[:60]
+    if schema != SCHEMA_VERSION:
+        raise DatasetError(
+            f"{os.fspath(place)}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
+            "Open it with the version of vibroimpact that wrote it."
+        )
+    return dataset
 
 
 def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -316,8 +309,8 @@ def opened_in_memory(flat: xr.Dataset) -> xr.Dataset:
     return on_grid(as_read(flat), lazily=False)
 
 
-def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
-    """Return a dataset once its types, dimensions and counts fit the schema; all other code relies on them."""
+def fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
+    """Return a one-dimensional dataset whose types, dimensions and counts fit the schema; else raise DatasetError."""
     problems = structure_problems(flat) or count_problems(flat)
     if problems:
         more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""

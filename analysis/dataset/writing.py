@@ -366,10 +366,10 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
     OSError
         If the file cannot be written (no space, no permission), with the reason of the operating system.
     """
-    write_atomically(path, *sealed(_image(marked(dataset), compression)))
+    write_atomically(path, *sealed(image_of(marked(dataset), compression)))
 
 
-def _image(dataset: xr.Dataset, compression: int) -> memoryview:
+def image_of(dataset: xr.Dataset, compression: int = 0) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
     # values that come from another file need the lock, too
     variables = [replace(one, variable=loaded_variable(one.variable)) for one in stored_variables(dataset)]

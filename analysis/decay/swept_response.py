@@ -6,8 +6,8 @@ import os
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import Outcome, swept_names
+from vibroimpact.analysis.dataset.store_runs import read_runs
 from vibroimpact.analysis.decay.resonance import Curve
 from vibroimpact.analysis.decay.samples import Floats
 from vibroimpact.fmus.errors import DatasetError
@@ -42,7 +42,7 @@ def swept_response(
     DatasetError
         Nothing is swept, no extrema are recorded, or too few runs remain.
     """
-    flat = read_flat(path)
+    flat = read_runs(path)
     swept = swept_names(flat)
     name = next((name for name in ("angular_frequency", "frequency") if name in swept), None)
     if name is None or "displacement_max" not in flat:

@@ -125,6 +125,9 @@ def _refuse_options(data: Any, family: Family, kind: str, view: View) -> None:
 
 def _refuse_run(dataset: Any, family: Family, kind: str, run: int | None) -> None:
     """Refuse a run that does not exist, and a missing choice where one of several runs must be named."""
+    drawing = family.drawings[kind]
+    if run is None and "window" not in drawing.takes:
+        return  # all runs, which a large map does not read
     there = np.unique(dataset["run_index"].values)
     there = there[there >= 0]
     if there.size <= _MOST_LISTED:
@@ -138,7 +141,6 @@ def _refuse_run(dataset: Any, family: Family, kind: str, run: int | None) -> Non
             f"figure: run: expected one run of those there are ({listed}), got none of run_index {run}."
         )
     # a window of time needs a single run
-    drawing = family.drawings[kind]
     if "window" in drawing.takes and run is None and there.size > 1:
         if not drawing.fits(dataset):
             fits = ", ".join(family.fitting(dataset))

@@ -77,10 +77,10 @@ def whole_or_absent(path: str | os.PathLike[str]) -> Iterator[Path]:
             # The error of a write has no file name, and a person knows the target, not the temporary name.
             problem.filename, problem.filename2 = os.fspath(target), None
         raise
-    _sync_folder(target.parent)
+    sync_folder(target.parent)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Flush the new name of a file to the disk; a system that cannot open folders does so itself."""
     if not hasattr(os, "O_DIRECTORY"):
         return

@@ -11,6 +11,8 @@ import netCDF4
 
 from vibroimpact.analysis.files.open_files import reading
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
+from vibroimpact.analysis.files.store_attributes import attributes_read
+from vibroimpact.analysis.files.stores import is_store, opened_group
 from vibroimpact.fmus.errors import DatasetError
 
 DAMAGE = (
@@ -68,8 +70,10 @@ def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError
 
 
 def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the global attributes of a NetCDF file; empty if it cannot be read."""
+    """Return the global attributes of a NetCDF file or a store; empty if it cannot be read."""
     try:
+        if is_store(path):
+            return attributes_read(dict(opened_group(path, "r").attrs))
         with opened_netcdf(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
     except DatasetError:

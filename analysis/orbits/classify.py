@@ -12,17 +12,17 @@ from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import dataset_file, open_dataset, read_flat
+from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
 from vibroimpact.analysis.dataset.accessor import run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.analysis.operations.classify import Classify
 from vibroimpact.analysis.orbits.impact_classes import (
     has_named_contacts,
@@ -130,12 +130,12 @@ class ClassesOfDataset(Study[RunClass]):
 
     runs: xr.Dataset
     """Dataset from `open_dataset`."""
-    file: Path | None = None
+    file: Place | None = None
 
     @classmethod
-    def reads(cls, options: Classify) -> Sequence[Path]:
+    def reads(cls, options: Classify) -> Sequence[Place]:
         """Return the file of the dataset."""
-        return [dataset_file(options.file)]
+        return [dataset_place(options.file)]
 
     @classmethod
     def marks(cls, options: Classify) -> Mapping[str, Any]:
@@ -150,7 +150,7 @@ class ClassesOfDataset(Study[RunClass]):
     @classmethod
     def prepare(cls, options: Classify, stack: ExitStack) -> Self:
         """Open the dataset."""
-        file = dataset_file(options.file)
+        file = dataset_place(options.file)
         return cls(stack.enter_context(open_dataset(file)), file)
 
     def rows(self) -> Generator[RunClass, None, None]:
@@ -195,7 +195,7 @@ class ClassesOfDataset(Study[RunClass]):
     def made(self) -> xr.Dataset:
         """Return the runs of the file with their classes, one-dimensional."""
         assert self.file is not None
-        return with_classes(read_flat(self.file), self.classes, self.runs.attrs["units_system"])
+        return with_classes(read_runs(self.file), self.classes, self.runs.attrs["units_system"])
 
     def print_results(self) -> None:
         """Print the number of runs of each class."""
@@ -252,7 +252,7 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
     """Return a one-dimensional dataset with the classes of its runs, as it is written to a file.
 
-    The dataset comes from `read_flat`; the classes are in the order of its runs.
+    The dataset comes from `read_runs`; the classes are in the order of its runs.
     """
     columns = _columns(classes).items()
     return flat.assign({name: ("run", values, attributes_of(name, units)) for name, values in columns})

@@ -11,8 +11,8 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import CONVENTIONS, RAGGED
+from vibroimpact.analysis.dataset.store_runs import read_runs
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.open_files import netcdf_lock
@@ -305,7 +305,7 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
             )
         return open_recording(path)
     try:
-        flat = read_flat(path)
+        flat = read_runs(path)
     except DatasetError as problem:
         hint = " `vibroimpact import` makes a recording of the file of an instrument."
         raise DatasetError(f"{problem}{hint if os.path.isfile(path) else ''}") from problem

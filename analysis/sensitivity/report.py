@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import dataset_file, open_dataset
+from vibroimpact.analysis.dataset import dataset_place, open_dataset
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import DRAW
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.analysis.operations.sensitivity import LEVEL, RESAMPLES, Sensitivity
 from vibroimpact.analysis.sensitivity.design import design_of
 from vibroimpact.analysis.sensitivity.indices import FEWEST_BLOCKS, SobolEstimation
@@ -64,9 +64,9 @@ class SensitivityOfCampaign(Study[int]):
     source: str = ""
 
     @classmethod
-    def reads(cls, options: Sensitivity) -> Sequence[Path]:
+    def reads(cls, options: Sensitivity) -> Sequence[Place]:
         """Return the file of the dataset."""
-        return [dataset_file(options.file)]
+        return [dataset_place(options.file)]
 
     @classmethod
     def marks(cls, options: Sensitivity) -> Mapping[str, Any]:
@@ -76,7 +76,7 @@ class SensitivityOfCampaign(Study[int]):
     @classmethod
     def prepare(cls, options: Sensitivity, stack: ExitStack) -> Self:
         """Open the dataset."""
-        campaign = stack.enter_context(open_dataset(dataset_file(options.file)))
+        campaign = stack.enter_context(open_dataset(dataset_place(options.file)))
         settings = options.of or (), options.level, options.resamples, options.seed
         return cls(campaign, *settings, str(options.file))
 

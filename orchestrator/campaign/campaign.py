@@ -4,14 +4,14 @@ A campaign may end by Ctrl-C, kill -9, a full disk or a lost machine. The comple
 goes on from them. The rows are then bit-identical to the rows of an uninterrupted campaign.
 
 The folder holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and
-`dataset.nc` at the end.
+`dataset.nc` at the end. In the other format it holds a store that grows, `dataset.zarr`, and `seals/` of its shards.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -19,25 +19,28 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
-from vibroimpact.fmus.messages import CALL, WITH_OUTPUT, Message, message
+from vibroimpact.fmus.messages import CALL, Message, message
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, get_ready
+from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
     Kept,
-    is_of,
     kept_path,
     other_differences,
-    read_finished,
     read_kept,
     scene_of_manifest,
+    without_held,
+)
+from vibroimpact.orchestrator.campaign.formats import (
+    DatasetFormat,
+    chosen_shard_points,
+    destination_of,
+    earlier_store,
 )
 from vibroimpact.orchestrator.campaign.here import FEW_SECONDS, computed_here, may_begin_here, opened_here
 from vibroimpact.orchestrator.campaign.manifest import (
-    DamagedManifestError,
-    Manifest,
     add_build,
     carried_manifest,
     differences,
@@ -48,18 +51,17 @@ from vibroimpact.orchestrator.campaign.manifest import (
     refuse_other_scene,
     runner_differences,
     scene_hash,
-    write_content,
     write_manifest,
 )
-from vibroimpact.orchestrator.campaign.manifest_copies import manifest_again
+from vibroimpact.orchestrator.campaign.manifest_copies import manifest_of_folder
 from vibroimpact.orchestrator.campaign.other_build import compare_with_stored
 from vibroimpact.orchestrator.campaign.parts import (
     NO_RUNS,
     StoredPart,
-    compact,
     list_parts,
     own_files,
     remove_parts,
+    remove_parts_within,
     remove_temporary_files,
     unfit_parts,
 )
@@ -103,8 +105,9 @@ def run_campaign(
     scheduler: str | Client | None = None,
     runner: str = DEFAULT_RUNNER,
     progress: Progress | None = None,
+    format: DatasetFormat | None = None,
 ) -> CampaignReport:
-    """Compute all points of a scene's sweep into `folder/dataset.nc`, or go on where an earlier try ended.
+    """Compute all points of a scene's sweep into one dataset in a folder, or go on where an earlier try ended.
 
     Parameters
     ----------
@@ -120,6 +123,9 @@ def run_campaign(
         The class that runs a point, as `module:name`.
     progress : Progress, optional
         Receives the progress of the campaign.
+    format : {"netcdf", "zarr"}, optional
+        Format of the dataset: the file `dataset.nc`, or the store `dataset.zarr`. By default that of the campaign in
+        the folder; for a new one `formats.default_format`.
 
     Raises
     ------
@@ -136,7 +142,7 @@ def run_campaign(
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
         try:
             here = workers is None and scheduler is None
-            campaign = _Campaign(scene, home, runner, progress or Progress(), here=here)
+            campaign = _Campaign(scene, home, runner, progress or Progress(), format, here=here)
             return campaign.finished_before() or campaign.run(opened)
         except OSError as error:
             # This process or a worker raised it: the folder for temporary files may be full, too.
@@ -155,21 +161,32 @@ class _Campaign:
     """One campaign in its folder, which this process holds."""
 
     def __init__(
-        self, scene: Scene, home: Path, runner: str, progress: Progress, *, here: bool = False
+        self,
+        scene: Scene,
+        home: Path,
+        runner: str,
+        progress: Progress,
+        format: DatasetFormat | None,
+        *,
+        here: bool = False,
     ) -> None:
         self._scene = scene
         self._home = home
         self._progress = progress
         self._parts_folder = home / "parts"
         self._manifest_path = home / "campaign.json"
-        self._manifest = self._checked_manifest()
+        self._manifest = manifest_of_folder(home, scene, progress.note)
         # A worker may run in another folder; files named by the scene lie next to the scene.
         source = str(Path(scene.source).absolute())
+        self._shard_points = chosen_shard_points(home, scene, self._manifest, format)
         self._report = CampaignReport(home / "dataset.nc", run_count(scene.sweep))
         self._go_on_with_this_sweep()
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
+        self._destination = destination_of(home, scene, self._shard_points, hashed, progress.note)
+        self._report.dataset = self._destination.path
         self._kept_path = kept_path(self._parts_folder, hashed)
         self._rounds: Rounds | None = None
+        self._computed_files: list[Path] = []
         self._form: DatasetForm | None = None
         self._begins_here = here and may_begin_here(scene, runner, self._report.runs)
         self._work = Work(
@@ -179,6 +196,7 @@ class _Campaign:
             hashed,
             execution=self._execution(),
             kept=str(self._kept_path),
+            store=self._destination.store,
         )
 
     def _execution(self) -> str:
@@ -186,38 +204,6 @@ class _Campaign:
         earlier_way = "" if self._manifest is None else self._manifest.identity.execution
         either = self._scene.execution.how == "auto" and may_go_by_lanes(self._scene)
         return earlier_way if either and earlier_way in ("fused", "lanes") else ""
-
-    def _checked_manifest(self) -> Manifest | None:
-        """Return the manifest of the folder, made again from its copies where it is lost; None for a new campaign."""
-        damage: DamagedManifestError | None = None
-        try:
-            manifest = read_manifest(self._manifest_path)
-        except DamagedManifestError as error:
-            manifest, damage = None, error
-        manifest = manifest or self._manifest_again("damaged" if damage else "missing")
-        if manifest is None and damage is not None:
-            raise damage
-        has_parts = self._parts_folder.is_dir() and own_files(self._parts_folder)
-        if manifest is None and ((self._home / "dataset.nc").exists() or has_parts):
-            raise UsageError(
-                message(
-                    f"{self._home}: expected an empty folder or one of a campaign, got data without campaign.json. "
-                    "Choose another folder",
-                    WITH_OUTPUT,
-                    ".",
-                )
-            )
-        return manifest
-
-    def _manifest_again(self, state: str) -> Manifest | None:
-        """Return the manifest made again from its copies in the folder; None without copies."""
-        made = manifest_again(self._home, self._scene)
-        if made is None:
-            return None
-        content, origin = made
-        write_content(self._manifest_path, content)
-        self._progress.note(f"{self._manifest_path} was {state} and is made again from {origin}.")
-        return read_manifest(self._manifest_path)
 
     def _go_on_with_this_sweep(self) -> None:
         """Keep the points of this sweep that an earlier sweep of the same scene has computed."""
@@ -233,7 +219,9 @@ class _Campaign:
         if old is None or others:
             refuse_other_scene(self._manifest_path, others)
         make_folder(self._parts_folder)
-        earlier = EarlierSweep(old, self._manifest, self._home, self._progress.note)
+        hashed, note = self._manifest.scene_hash, self._progress.note
+        store = earlier_store(self._home, old, self._shard_points, hashed, note)
+        earlier = EarlierSweep(old, self._manifest, self._home, note, store)
         try:
             handed_over = earlier.hand_over(self._scene, self._report.runs)
         except OSError as error:
@@ -251,25 +239,16 @@ class _Campaign:
 
     def finished_before(self) -> CampaignReport | None:
         """Return the report of a finished campaign; None when points are left."""
-        target = self._report.dataset
-        if self._manifest is None or not target.exists():
+        done = None if self._manifest is None else self._destination.finished(self._manifest)
+        if done is None:
             return None
-        done = read_finished(target)
-        if not is_of(done.attrs, self._manifest, self._scene):
-            return None
+        rows, attrs = done
         remove_parts(self._parts_folder)
         remove_temporary_files(self._home)
-        self._give_title(done.attrs)
-        rows = len(done.run_index)
-        return replace(self._report, runs=rows, resumed=rows)
-
-    def _give_title(self, attrs: Mapping[str, Any]) -> None:
-        """Give the dataset the present title of the scene; the title has no effect on any number."""
         if self._scene.title and attrs.get("title") != self._scene.title:
-            rows = read_flat(self._report.dataset)
-            attributes = {name: self._attributes()[name] for name in ("title", "scene")}
-            write_dataset(rows.assign_attrs(attributes), self._report.dataset)
-            self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
+            self._destination.retitle({name: self._attributes()[name] for name in ("title", "scene")})
+            self._progress.note(f"{self._destination.path} has the title {self._scene.title!r} now.")
+        return replace(self._report, runs=rows, resumed=rows)
 
     def run(self, workers: OpenedWorkers) -> CampaignReport:
         """Compute the points that are left and compact all parts; unfit parts are computed again."""
@@ -294,17 +273,24 @@ class _Campaign:
         """Compute all runs that no part holds, and return the files with all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
+        self._computed_files.clear()
         self._rounds = Rounds(self._scene) if adaptive_axes(self._scene) else None
         kept = self._read_kept()
         runs = kept.runs if kept is not None else NO_RUNS
+        self._destination.make()
+        held = self._destination.held()
+        remove_parts_within(self._parts_folder, held)
         parts = list_parts(self._parts_folder, self._work.scene_hash, self._progress.note, runs)
-        self._report.resumed = runs.size + sum(part.rows for part in parts)
+        self._destination.expect(parts, kept)
+        parts = sorted([*held, *parts], key=lambda part: part.chunk.first)
+        outside = without_held(kept, held) if kept is not None else None
+        self._report.resumed = sum(part.rows for part in parts) + (outside.runs.size if outside else 0)
         stored = [part.path for part in parts] + ([kept.path] if kept is not None else [])
         stages = stages_of(
             self._scene,
             self._rounds,
             lambda: [*parts, *self._computed()],
-            kept.stretches if kept is not None else (),
+            outside.stretches if outside is not None else (),
         )
         # a sweep is complete by its number of runs; rounds are complete if no stage comes
         stage = next(stages, None) if self._rounds or self._report.resumed < self._report.runs else None
@@ -318,8 +304,10 @@ class _Campaign:
 
     def _computed(self) -> list[StoredPart]:
         """Return the parts that this command has computed so far."""
-        folder, chunks = self._parts_folder, self._report.chunks
-        return [StoredPart(folder / chunk.part_name, chunk, None, chunk.count) for chunk in chunks]
+        return [
+            StoredPart(path, chunk, None, chunk.count)
+            for path, chunk in zip(self._computed_files, self._report.chunks, strict=True)
+        ]
 
     def _read_kept(self) -> Kept | None:
         for path in own_files(self._parts_folder):  # files of earlier sweeps go
@@ -360,6 +348,11 @@ class _Campaign:
             # A worker that was stopped may have been writing.
             remove_temporary_files(self._parts_folder)
 
+    def _write_manifest(self, identity: RunnerIdentity) -> None:
+        write_manifest(
+            self._manifest_path, self._scene, identity, self._report.runs, shard_points=self._shard_points
+        )
+
     def _with_manifest(self, work: Work) -> Work:
         """Return the work with the manifest that each part carries."""
         return replace(work, manifest=carried_manifest(read_content(self._manifest_path), work.scene.source))
@@ -373,7 +366,7 @@ class _Campaign:
             if self._manifest and runner_differences(self._manifest, identity):
                 return stages  # workers compare the other build with stored points
             if self._manifest is None:
-                write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
+                self._write_manifest(identity)
                 self._manifest = read_manifest(self._manifest_path)
             work = self._with_manifest(replace(self._work, identity=identity))
             with self._computing():
@@ -397,7 +390,8 @@ class _Campaign:
             with self._computing():
                 for stage in stages:
                     schedule = self._schedule(work, stage, self._report.workers)
-                    Computation(pool, self._of_stage(work, stage), schedule, self._take).run()
+                    of_stage, sealed = self._of_stage(work, stage), self._destination.sealed
+                    Computation(pool, of_stage, schedule, self._take, sealed).run()
         finally:
             self._report.lost_workers += pool.lost_workers
             pool.cancel_all()
@@ -405,7 +399,14 @@ class _Campaign:
     def _schedule(self, work: Work, stage: Stage, workers: int, size: int = MOST_BYTES) -> ChunkSchedule:
         """Return the schedule of a stage, and start its progress."""
         in_lanes = work.identity is not None and work.identity.execution == "lanes"
-        schedule = ChunkSchedule(stage.branches, stage.held, workers, in_lanes=in_lanes, most_bytes=size)
+        schedule = ChunkSchedule(
+            stage.branches,
+            stage.held,
+            workers,
+            in_lanes=in_lanes,
+            most_bytes=size,
+            shards=self._destination.shards,
+        )
         self._report.runs = stage.runs
         self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
         return schedule
@@ -425,12 +426,12 @@ class _Campaign:
         """Write the manifest of a new campaign; raise UsageError if workers could give an old one other results."""
         assert work.identity is not None
         if self._manifest is None:
-            write_manifest(self._manifest_path, self._scene, work.identity, self._report.runs)
+            self._write_manifest(work.identity)
         elif different := runner_differences(self._manifest, work.identity):
             began = replace(work.identity, fmu_hashes=self._manifest.identity.fmu_hashes)
             if runner_differences(self._manifest, began):
                 refuse_other_runner(self._manifest_path, different)
-            compared, reason = compare_with_stored(pool, work, self._scene, stored)
+            compared, reason = compare_with_stored(pool, work, self._scene, stored, self._destination.rows)
             if reason:
                 refuse_other_runner(self._manifest_path, different, f"{reason}. ")
             add_build(self._manifest_path, work.identity, compared)
@@ -440,20 +441,26 @@ class _Campaign:
             )
         self._manifest = read_manifest(self._manifest_path)
 
-    def _take(self, result: ChunkResult) -> None:
+    def _take(self, result: ChunkResult) -> list[ShardParts]:
         if result.outcomes:  # a chunk of kept runs has no outcomes and no part
             self._report.chunks.append(result.chunk)
+            self._computed_files.append(Path(result.path))
         self._report.outcomes.update(result.outcomes)
         self._progress.advance(sum(result.outcomes.values()))
+        return self._destination.taken(result)
 
     def _compact(self, parts: Sequence[Path]) -> list[tuple[Path, str]]:
         """Write the dataset; return the unfit parts that prevent it, which are removed, each with the reason."""
         began = time.perf_counter()
         try:
             form = self._form or DatasetForm(self._scene)
-            has_messages = compact(parts, self._report.dataset, form, self._attributes())
+            work, attrs = self._with_manifest(self._work), self._attributes()
+            has_messages = self._destination.complete(work, parts, form, attrs)
         except DatasetError as error:
-            unfit = list(unfit_parts(parts, self._scene))
+            files = [path for path in parts if path.suffix == ".nc"]
+            unfit = (
+                error.found if isinstance(error, UnfitShardsError) else list(unfit_parts(files, self._scene))
+            )
             if not unfit:
                 raise CampaignError(f"{self._home}: the parts do not fit together: {error}") from error
             for path, reason in unfit:

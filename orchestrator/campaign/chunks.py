@@ -1,4 +1,4 @@
-"""The work on a chunk: a worker runs its points, writes them as one part, and returns the outcomes.
+"""The work on a chunk: a worker runs its points, writes them as one part or shard, and returns the outcomes.
 
 A chunk is a range of neighbouring runs. All of this module runs on a worker; each process loads the components of the
 scene once and uses them for all its chunks. The results of a point never depend on the cut of the runs into chunks.
@@ -25,6 +25,8 @@ from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
+from vibroimpact.orchestrator.campaign.sealing import GrowingStore, write_shard
+from vibroimpact.orchestrator.campaign.seals import seal_path
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
@@ -63,6 +65,8 @@ class Work:
     """The points of a round of an adaptive sweep; empty: the points of the scene's sweep."""
     manifest: str = ""
     """Manifest in each part, from which `campaign.json` can be made again; empty: none is written."""
+    store: GrowingStore | None = None
+    """Store that grows by shards; None where all parts are joined at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +98,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """The answer of a worker on a chunk whose part is on the disk."""
+    """The answer of a worker on a chunk whose part or shard is on the disk."""
 
     chunk: Chunk
     """The runs of the part: all requested runs, or the first of them."""
@@ -106,6 +110,8 @@ class ChunkResult:
     """Wall time of the runs, s."""
     size: int = 0
     """Size of the results, bytes, where they are columns; else 0."""
+    path: str = ""
+    """File of the part, or the seal of the shard."""
 
 
 class _AtWork(threading.local):
@@ -174,10 +180,10 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     seconds = time.perf_counter() - began
     stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
     done = replace(chunk, stop=stop)
-    outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
+    path, outcomes = write_part(work, done, opened.form, points.taken(len(records)), records, carried)
     opened.failed = Outcome.error.name in outcomes
     size = records.nbytes if isinstance(records, RunColumns) else 0
-    return ChunkResult(done, carried, outcomes, seconds, size)
+    return ChunkResult(done, carried, outcomes, seconds, size, str(path))
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
@@ -193,8 +199,8 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill their process, without running them, and return the outcomes."""
     points = _points_left(work, work.branches or expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in range(len(points))]
-    written = write_part(work, chunk, DatasetForm(work.scene), points, records, chunk.start)
-    return ChunkResult(chunk, chunk.start, written, 0.0)
+    path, written = write_part(work, chunk, DatasetForm(work.scene), points, records, chunk.start)
+    return ChunkResult(chunk, chunk.start, written, 0.0, path=str(path))
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:
@@ -245,16 +251,19 @@ def write_part(
     points: PointColumns,
     records: Sequence[RunRecord] | RunColumns,
     carried: State | None,
-) -> dict[str, int]:
-    """Write the part of a chunk, as a whole or not at all; return the number of runs by outcome."""
-    attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
-    if work.manifest:
-        attrs[MANIFEST] = work.manifest
-    if carried is not None:
-        attrs |= carried_attributes(carried)
+) -> tuple[Path, dict[str, int]]:
+    """Write the rows of a chunk, as a whole or not at all; return the file and the number of runs by outcome.
+
+    The rows are a part. Those of a whole shard of a store are written there, and the file is the seal.
+    """
+    attrs = attributes_of_part(work, carried)
     path = Path(work.parts_folder, chunk.part_name)
     try:
         dataset = form.dataset(points, records, attrs)
+        shard = None if work.store is None else work.store.shard_of(work.scene, chunk.first, chunk.stop)
+        if work.store is not None and shard is not None and len(points) == shard.count:
+            seal = write_shard(work.store, work.scene, shard, dataset, chunk.branch, attrs)
+            return seal_path(work.store.seals, shard.number), dict(seal.outcomes)
         if not has_messages(dataset):
             dataset.attrs[SILENT] = 1
         write_dataset(dataset, path)
@@ -264,4 +273,12 @@ def write_part(
             f"{error.strerror or error}. "
             "Make room or restore access; then the same command or call resumes."
         ) from error
-    return tally(dataset)
+    return path, tally(dataset)
+
+
+def attributes_of_part(work: Work, carried: State | None) -> dict[str, Any]:
+    """Return the attributes of a part of a campaign."""
+    attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
+    if work.manifest:
+        attrs[MANIFEST] = work.manifest
+    return attrs if carried is None else attrs | carried_attributes(carried)

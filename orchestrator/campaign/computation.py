@@ -7,26 +7,41 @@ Before its row gets the outcome of a crash, a point therefore runs in its own pr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.processes.call import ProcessDied, call_alone
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
-from vibroimpact.orchestrator.campaign.pool import WorkerPool
+from vibroimpact.orchestrator.campaign.destination import ShardParts
+from vibroimpact.orchestrator.campaign.grown_store import seal_parts
+from vibroimpact.orchestrator.campaign.pool import Finished, WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.campaign.seals import Seal
 
 CRASH_MESSAGE = "this point kills the process that runs it"
 
 
 class Computation:
-    """One pass over a schedule; `done` gets the result of each chunk whose part is on the disk."""
+    """One pass over a schedule; `done` gets the result of each chunk whose part is on the disk.
+
+    `done` returns the shards that are complete by the chunk; workers write them, and `sealed` gets their seals. A shard
+    whose writer fails stays in its parts.
+    """
 
     def __init__(
-        self, pool: WorkerPool, work: Work, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
+        self,
+        pool: WorkerPool,
+        work: Work,
+        schedule: ChunkSchedule,
+        done: Callable[[ChunkResult], Sequence[ShardParts]],
+        sealed: Callable[[Seal], None],
     ) -> None:
         self._pool = pool
         self._work = work
         self._schedule = schedule
         self._done = done
+        self._sealed = sealed
+        self._writing: set[int] = set()
         self._in_flight: dict[int, Chunk] = {}
         self._suspects: list[Chunk] = []
         self._alone: Chunk | None = None
@@ -35,6 +50,9 @@ class Computation:
         """Compute all chunks that are left; raise VibroimpactError unless each can be computed and written."""
         while self._hand_out():
             ended = self._pool.next_finished()
+            if ended.ticket in self._writing:
+                self._written(ended)
+                continue
             planned = self._in_flight.pop(ended.ticket)
             if ended.worker_lost:
                 self._lost(planned)
@@ -50,14 +68,23 @@ class Computation:
         if not self._in_flight and self._suspects:
             self._alone = self._suspects.pop()
             self._submit(self._alone)
-        return bool(self._in_flight)
+        return bool(self._in_flight or self._writing)
+
+    def _written(self, ended: Finished) -> None:
+        """Take note of a shard that a worker has written; damaged parts and lost workers are met again at the end."""
+        self._writing.remove(ended.ticket)
+        if ended.error is None:
+            self._sealed(ended.result)
+        elif not ended.worker_lost and not isinstance(ended.error, DatasetError):
+            raise ended.error
 
     def _submit(self, chunk: Chunk) -> None:
         self._in_flight[self._pool.submit(run_chunk, self._work, chunk)] = chunk
 
     def _ended(self, planned: Chunk, result: ChunkResult) -> None:
         self._schedule.finished(planned, result)
-        self._done(result)
+        for complete in self._done(result):
+            self._writing.add(self._pool.submit(seal_parts, self._work, complete))
 
     def _lost(self, planned: Chunk) -> None:
         if planned is self._alone:

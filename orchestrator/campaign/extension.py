@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import (
     Outcome,
     Part,
-    merge_datasets,
     read_flat,
     read_part,
     take_runs,
     write_dataset,
 )
 from vibroimpact.analysis.dataset.assembling import assembled
+from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.chunks import MANIFEST, Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
@@ -40,7 +40,16 @@ from vibroimpact.orchestrator.campaign.manifest import (
     scene_hash,
     write_content,
 )
-from vibroimpact.orchestrator.campaign.parts import NO_RUNS, Note, StoredPart, list_parts, own_files
+from vibroimpact.orchestrator.campaign.parts import (
+    NO_RUNS,
+    Note,
+    StoredPart,
+    list_parts,
+    own_files,
+    remove_parts_within,
+)
+from vibroimpact.orchestrator.campaign.sealing import SEALS, STORE
+from vibroimpact.orchestrator.campaign.seals import remove_store
 from vibroimpact.orchestrator.run.dataset import (
     coordinate_names,
     empty_dataset,
@@ -274,6 +283,16 @@ def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
 # ---- going on from kept rows ----
 
 
+class SealedStore(Protocol):
+    """A store with the rows of a campaign."""
+
+    def held(self) -> list[StoredPart]:
+        """Return the runs in the store, in run order."""
+
+    def rows(self, path: Path) -> xr.Dataset:
+        """Return the rows of one of them, one-dimensional."""
+
+
 @dataclass(frozen=True, slots=True)
 class Kept:
     """Rows of a campaign that come from an earlier sweep."""
@@ -305,6 +324,27 @@ def read_kept(path: Path, scene: Scene) -> Kept:
     return Kept(path, runs, stretches)
 
 
+def without_held(kept: Kept, held: Sequence[StoredPart]) -> Kept:
+    """Return the kept rows outside of the runs that are held; `held` is in run order."""
+    inside = np.zeros(kept.runs.size, dtype=np.bool_)
+    for part in held:
+        first, stop = np.searchsorted(kept.runs, (part.chunk.first, part.chunk.stop))
+        inside[first:stop] = True
+    stretches = []
+    for stretch in kept.stretches:
+        reached, stop = stretch.chunk.first, stretch.chunk.stop
+        for part in held:
+            if part.chunk.first < stop and part.chunk.stop > reached:
+                if part.chunk.first > reached:
+                    chunk = replace(stretch.chunk, first=reached, stop=part.chunk.first)
+                    stretches.append(replace(stretch, chunk=chunk, rows=chunk.count))
+                reached = part.chunk.stop
+        if reached < stop:
+            chunk = replace(stretch.chunk, first=reached)
+            stretches.append(replace(stretch, chunk=chunk, rows=chunk.count))
+    return Kept(kept.path, kept.runs[~inside], stretches)
+
+
 def _carried(rows: xr.Dataset, begin: int, stop: int) -> State | None:
     """Return the state that runs from the start of a branch hand on, by the rule of `Runner.rows`."""
     states = final_states(rows, slice(begin, stop))
@@ -324,12 +364,16 @@ def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class EarlierSweep:
-    """A campaign in the folder `home`, started with another sweep; `note` gets messages on its kept points."""
+    """A campaign in the folder `home`, started with another sweep; `note` gets messages on its kept points.
+
+    `store` is the store of that campaign; None where its dataset is a file.
+    """
 
     scene: Scene
     manifest: Manifest
     home: Path
     note: Note
+    store: SealedStore | None = None
 
     @property
     def _folder(self) -> Path:
@@ -341,7 +385,7 @@ class EarlierSweep:
         The folder belongs to the old sweep until the new manifest is written, and nothing is removed before.
         """
         rows, old, hashed = self._rows(), self.manifest, scene_hash(new)
-        manifest = new_manifest(new, old.identity, runs, old.continued_with)
+        manifest = new_manifest(new, old.identity, runs, old.continued_with, shard_points=old.shard_points)
         if rows is not None:
             kept = kept_rows(self.scene, new, rows)
             count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
@@ -357,6 +401,8 @@ class EarlierSweep:
         for path in outdated:
             if path != kept_path(self._folder, hashed):
                 path.unlink(missing_ok=True)
+        if self.store is not None:
+            remove_store(self.home / STORE, self.home / SEALS)
         return True
 
     def _rows(self) -> xr.Dataset | None:
@@ -365,11 +411,20 @@ class EarlierSweep:
         if target.exists() and is_of(read_finished(target).attrs, self.manifest, self.scene):
             return read_flat(target)
         path = kept_path(self._folder, self.manifest.scene_hash)
-        kept = [path] if path.exists() else []
-        runs = read_kept(path, self.scene).runs if kept else NO_RUNS
+        kept = read_kept(path, self.scene) if path.exists() else None
+        held = self.store.held() if self.store is not None else []
+        remove_parts_within(self._folder, held)
+        runs = kept.runs if kept is not None else NO_RUNS
         parts = list_parts(self._folder, self.manifest.scene_hash, self.note, runs)
-        paths = kept + [part.path for part in parts]
-        return merge_datasets(paths) if paths else None
+        files = [part.path for part in parts]
+        pieces = [self.store.rows(part.path) for part in held] if self.store is not None else []
+        pieces += [read_flat(file) for file in files]
+        if kept is not None:
+            whole, left = read_flat(path), without_held(kept, held).runs
+            pieces.append(take_runs(whole, np.flatnonzero(np.isin(whole.run_index.values, left))))
+            files.append(path)
+        names = [str(file) for file in [*(part.path for part in held), *files]]
+        return joined(pieces, names) if pieces else None
 
     def _store(self, rows: xr.Dataset, left: int) -> None:
         """Write all old points to a file of its own, since the new sweep leaves some of them out."""

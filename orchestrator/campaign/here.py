@@ -68,7 +68,7 @@ def computed_here(
     work: Work,
     stage: Stage,
     schedule: ChunkSchedule,
-    done: Callable[[ChunkResult], None],
+    done: Callable[[ChunkResult], object],
     most_left: float | None = None,
 ) -> Stage | None:
     """Compute a stage until it is complete (None), or until too much is left for this process; return the stage then.
@@ -85,12 +85,12 @@ def computed_here(
             with runs_abandoned(partial(_is_past, over)):
                 result = run_chunk(work, chunk)
         except RunsAbandonedError:
-            return _with_parts(stage, results, Path(work.parts_folder))
+            return _with_parts(stage, results)
         schedule.finished(chunk, result)
         results.append(result)
         done(result)
         if schedule.seconds_left > most_left:
-            return _with_parts(stage, results, Path(work.parts_folder))
+            return _with_parts(stage, results)
     return None
 
 
@@ -99,9 +99,7 @@ def _is_past(instant: float) -> bool:
     return time.perf_counter() > instant
 
 
-def _with_parts(stage: Stage, results: Iterable[ChunkResult], folder: Path) -> Stage:
+def _with_parts(stage: Stage, results: Iterable[ChunkResult]) -> Stage:
     """Return a stage that also holds the parts of these results."""
-    parts = [
-        StoredPart(folder / one.chunk.part_name, one.chunk, one.carried, one.chunk.count) for one in results
-    ]
+    parts = [StoredPart(Path(one.path), one.chunk, one.carried, one.chunk.count) for one in results]
     return replace(stage, held=sorted([*stage.held, *parts], key=lambda part: part.chunk.first))

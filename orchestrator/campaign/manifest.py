@@ -27,9 +27,9 @@ from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import SpacedValues
 
-FORMAT = 2
-_FORMATS = (1, FORMAT)
-"""Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`."""
+FORMAT, STORE_FORMAT = 2, 3
+_FORMATS = (1, FORMAT, STORE_FORMAT)
+"""Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`. Format 3 has a store."""
 NO_EFFECT = ("title",)
 """Keys without effect on any result: a campaign goes on when they change."""
 MOST_CARRIED_TEXT = 8192
@@ -69,6 +69,8 @@ class Manifest:
     """Identity of the runner at the start."""
     continued_with: tuple[Mapping[str, Any], ...] = ()
     """Other builds of the components that went on with the campaign, each as written by `add_build`."""
+    shard_points: int = 0
+    """Number of points of a shard of the campaign's store; 0: its dataset is a file."""
 
     def attributes(self, scene: Scene) -> dict[str, Any]:
         """Return the global attributes of the campaign's dataset: the runner at its start, and other builds."""
@@ -138,10 +140,12 @@ def new_manifest(
     identity: RunnerIdentity,
     runs: int,
     continued_with: Sequence[Mapping[str, Any]] = (),
+    *,
+    shard_points: int = 0,
 ) -> Content:
-    """Return the manifest of a new campaign."""
+    """Return the manifest of a new campaign; `shard_points` as in `Manifest`."""
     content: Content = {
-        "format": FORMAT,
+        "format": STORE_FORMAT if shard_points else FORMAT,
         "scene_hash": scene_hash(scene),
         "runs": runs,
         **asdict(identity),
@@ -152,6 +156,8 @@ def new_manifest(
     }
     if continued_with:
         content["continued_with"] = list(continued_with)
+    if shard_points:
+        content["store"] = {"shard_points": shard_points}
     return content
 
 
@@ -173,10 +179,10 @@ def write_manifest(
     scene: Scene,
     identity: RunnerIdentity,
     runs: int,
-    continued_with: Sequence[Mapping[str, Any]] = (),
+    shard_points: int = 0,
 ) -> None:
     """Write the manifest of a new campaign, whole or not at all."""
-    write_content(path, new_manifest(scene, identity, runs, continued_with))
+    write_content(path, new_manifest(scene, identity, runs, shard_points=shard_points))
 
 
 def write_content(path: Path, content: Content) -> None:
@@ -259,6 +265,7 @@ def _checked(content: Content) -> Manifest:
         tuple(
             {**build, "fmu_hashes": dict(build["fmu_hashes"])} for build in content.get("continued_with", ())
         ),
+        int(content["store"]["shard_points"]) if content["format"] == STORE_FORMAT else 0,
     )
 
 

@@ -14,17 +14,25 @@ from typing import Any
 
 from vibroimpact.analysis.dataset import read_part
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
+from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.campaign.chunks import MANIFEST
+from vibroimpact.orchestrator.campaign.formats import has_dataset
 from vibroimpact.orchestrator.campaign.manifest import (
     DAMAGE,
     FORMAT,
     Content,
+    DamagedManifestError,
+    Manifest,
     content_hash,
     flat_scene,
+    read_manifest,
     scene_hash,
     values_of,
+    write_content,
 )
-from vibroimpact.orchestrator.campaign.parts import own_files
+from vibroimpact.orchestrator.campaign.parts import Note, own_files
+from vibroimpact.orchestrator.campaign.sealing import SEALS
+from vibroimpact.orchestrator.campaign.seals import FINISHED, read_sealed, seals_in
 from vibroimpact.orchestrator.run import OTHER_ENGINE
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
@@ -75,13 +83,47 @@ class _Folder:
     older: list[tuple[Path, str]] = field(default_factory=list)
 
 
+def manifest_of_folder(home: Path, scene: Scene, note: Note) -> Manifest | None:
+    """Return the manifest of a folder, made again from its copies where it is lost; None for a new campaign.
+
+    Raises
+    ------
+    UsageError
+        The manifest is damaged or missing, and cannot be made again from the data that are there.
+    """
+    path, damage = home / "campaign.json", None
+    try:
+        manifest = read_manifest(path)
+    except DamagedManifestError as error:
+        manifest, damage = None, error
+    made = manifest_again(home, scene) if manifest is None else None
+    if made is not None:
+        content, origin = made
+        write_content(path, content)
+        note(f"{path} was {'damaged' if damage else 'missing'} and is made again from {origin}.")
+        manifest = read_manifest(path)
+    if manifest is None and damage is not None:
+        raise damage
+    parts = home / "parts"
+    if manifest is None and ((parts.is_dir() and own_files(parts)) or has_dataset(home)):
+        raise UsageError(
+            message(
+                f"{home}: expected an empty folder or one of a campaign, got data without campaign.json. "
+                "Choose another folder",
+                WITH_OUTPUT,
+                ".",
+            )
+        )
+    return manifest
+
+
 def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
     """Return the manifest in the files of a campaign, and the files in words; None where no file has it.
 
     `home` is the folder of the campaign, and `scene` is the scene of the present command. UsageError: the files belong
     to several campaigns, or the manifest needs another scene for its left-out values.
     """
-    there = _read(home / "parts")
+    there = _read(home / "parts", home / SEALS)
     finished = _finished(home / "dataset.nc", scene)
     chosen = _chosen(there, finished, scene_hash(scene))
     if chosen is None:
@@ -91,8 +133,16 @@ def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
     return _completed(chosen, scene), origin
 
 
-def _read(folder: Path) -> _Folder:
+def _read(folder: Path, seals: Path) -> _Folder:
     found = _Folder()
+    for path in [*seals_in(seals), seals / FINISHED]:
+        try:
+            seal = read_sealed(path)
+        except DatasetError:
+            continue  # the resumed campaign names and removes it
+        content = _content_in(seal["attrs"])
+        if content is not None:
+            found.parts.append(_Copy(path, content, seal.get("runs", 0)))
     for path in sorted(own_files(folder)) if folder.is_dir() else ():
         try:
             part = read_part(path)

@@ -6,7 +6,7 @@ points, spread evenly over the files, are computed again: a campaign goes on onl
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,13 +37,17 @@ OF_THE_MACHINE = ("point_seconds",)
 
 
 def compare_with_stored(
-    pool: WorkerPool, work: Work, scene: Scene, stored: Sequence[Path]
+    pool: WorkerPool,
+    work: Work,
+    scene: Scene,
+    stored: Sequence[Path],
+    read: Callable[[Path], xr.Dataset] = read_flat,
 ) -> tuple[int, str]:
     """Compute a few stored points again; return their number, and the reason why they do not prove equal results.
 
-    The reason is empty if all points are equal bit for bit.
+    `read` returns the rows of a file. The reason is empty if all points are equal bit for bit.
     """
-    chosen = list(_chosen(scene, stored))
+    chosen = list(_chosen(scene, stored, read))
     if not chosen:
         return 0, "It has no point that could be computed again to show whether results are the same"
     tickets = {pool.submit(compute_again, work, chunk): row for chunk, row in chosen}
@@ -60,7 +64,9 @@ def compare_with_stored(
     return len(chosen), next(filter(None, (different[ticket] for ticket in tickets)), "")
 
 
-def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Dataset]]:
+def _chosen(
+    scene: Scene, stored: Sequence[Path], read: Callable[[Path], xr.Dataset]
+) -> Iterator[tuple[Chunk, xr.Dataset]]:
     """Yield points that can be computed again, spread evenly over the files, each with its stored row."""
     branches = expand(scene)
     # Independent points and first points of branches begin at the scene's own start state.
@@ -68,7 +74,7 @@ def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Da
     files = _spread(len(stored), MOST_POINTS)
     seconds = 0.0
     for place in files:
-        rows = read_flat(stored[place])
+        rows = read(stored[place])
         run, states = rows.run_index.values, final_states(rows, slice(None))
         carries = np.isin(rows.outcome.values, CARRYING) & np.isfinite(states).all(axis=1)
         # the row of a refined point of an adaptive path does not have its start state

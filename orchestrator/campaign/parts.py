@@ -7,6 +7,7 @@ the SHA-256 of its content. A damaged file is therefore found before it is opene
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -107,6 +108,15 @@ def remove_parts(folder: Path) -> None:
         folder.rmdir()
 
 
+def remove_parts_within(folder: Path, held: Sequence[StoredPart]) -> None:
+    """Remove parts whose runs are in shards of a store: their writer ended before it removed them."""
+    firsts = [part.chunk.first for part in held]
+    for path, chunk in _named_parts(folder) if held else ():
+        place = bisect_right(firsts, chunk.first) - 1
+        if place >= 0 and chunk.stop <= held[place].chunk.stop:
+            path.unlink()
+
+
 def _named_parts(folder: Path) -> list[tuple[Path, Chunk]]:
     found = []
     for path in own_files(folder):
@@ -135,16 +145,19 @@ def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mappi
     It returns whether any row has a message. The file is written as a whole or not at all. DatasetError: a part cannot
     be read or joined with the others; `unfit_parts` finds the part. OSError: the dataset cannot be written.
     """
-    # Attributes of the first part, which do not hold for all runs.
-    own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
 
     def finished(rows: xr.Dataset) -> xr.Dataset:
-        kept = {name: value for name, value in rows.attrs.items() if name not in own}
         described = rows.assign_coords(wrapped(form.constants()))
-        described.attrs = kept | dict(attrs)
+        described.attrs = without_own_attributes(rows.attrs) | dict(attrs)
         return described
 
     return join_files(parts, target, finished)
+
+
+def without_own_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return attributes without those of one part, which do not hold for all runs."""
+    own = (*CARRIED, CARRIED_STATE, MANIFEST, "scene_hash")
+    return {name: value for name, value in attrs.items() if name not in own}
 
 
 def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:

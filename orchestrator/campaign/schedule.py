@@ -10,6 +10,8 @@ the end the chunks get shorter, so that all workers finish together (guided self
 takes longer than a chunk is computed piece by piece: its next chunk exists only when the chunk before has ended.
 Several such branches are under way side by side. Branches in lanes share a chunk, however long they take: a single
 branch would take as long as all of them.
+
+A chunk of a store ends with its shard at the latest. A shard that takes less than `SHARD_SECONDS` is one chunk.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from dataclasses import dataclass
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
+from vibroimpact.orchestrator.campaign.shards import Shard
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene.sweep import Branch, first_runs
 
@@ -58,6 +61,13 @@ that few lanes wait for the longest branch. The second holds when few are left, 
 QUEUED_PER_WORKER = 3
 """Number of chunks handed out for each worker: one runs, and the others follow without a pause."""
 
+SHARD_SECONDS = 60.0
+"""Longest time of a shard, s, that is computed as one chunk: more would be lost with its worker. A longer shard is kept
+in parts until it is complete."""
+
+LAST_SHARD_SECONDS = 5.0
+"""Longest time of one of the last shards, s, computed as one chunk: other workers may wait for it."""
+
 
 @dataclass(slots=True)
 class Gap:
@@ -88,6 +98,7 @@ class ChunkSchedule:
     """Cuts the rest of a campaign into chunks for a number of workers; branches and parts are in run order.
 
     `in_lanes`: whether branches of one chunk run side by side; `most_bytes`: size of the results of a chunk.
+    `shards`: shards of a store, which no chunk crosses.
     """
 
     def __init__(
@@ -98,8 +109,11 @@ class ChunkSchedule:
         *,
         in_lanes: bool = False,
         most_bytes: int = MOST_BYTES,
+        shards: Sequence[Shard] = (),
     ) -> None:
-        self._workers, self._in_lanes, self._most_bytes = workers, in_lanes, most_bytes
+        self._workers, self._in_lanes = workers, in_lanes
+        self._most_bytes = MOST_BYTES if shards else most_bytes
+        self._shards, self._shard_stops = shards, [shard.stop for shard in shards]
         self._first_runs = first_runs(branches)
         self._chained = branches[0].direction != "independent"
         self._unit = len(branches[0].points) if self._chained else 1
@@ -211,6 +225,7 @@ class ChunkSchedule:
         gap = self._units[0]
         seconds = self._fair_seconds()
         points = max(min(self._points_in(seconds, self._pace), gap.most), self._points_beside(gap))
+        points = self._in_shard(gap, points)
         taken = gap.take(max(points // self._unit, 1) * self._unit)
         if gap.first == gap.stop:
             self._units.popleft()
@@ -247,14 +262,27 @@ class ChunkSchedule:
         if gap.stop - gap.first < 1.5 * count:
             # A short rest is taken along, without a chunk of its own.
             count = gap.stop - gap.first
-        taken = gap.take(min(count, gap.most))
+        taken = gap.take(self._in_shard(gap, min(count, gap.most)))
         if gap.first == gap.stop:
             rest.gaps.popleft()
         return self._hand_out(rest.branch, taken, seconds)
 
+    def _in_shard(self, gap: Gap, count: int) -> int:
+        """Return the number of runs of a gap that one chunk takes: a quick shard, or no more than its rest."""
+        if not self._shards:
+            return count
+        shard = self._shards[bisect_right(self._shard_stops, gap.first)]
+        rest = min(gap.stop, shard.stop) - gap.first
+        seconds = rest * self._pace if self._pace else math.inf
+        most = SHARD_SECONDS if self.left > self._workers * shard.count else LAST_SHARD_SECONDS
+        is_quick = seconds <= most and rest * self._size <= self._most_bytes
+        return rest if rest == shard.count and gap.most >= MOST_POINTS and is_quick else min(count, rest)
+
     def _hand_out(self, branch: int, taken: Gap, seconds: float) -> Chunk:
-        self.left -= taken.stop - taken.first
+        count = taken.stop - taken.first
+        self.left -= count
         self._in_flight += 1
+        seconds = max(seconds, count * (self._pace or 0.0)) if self._shards else seconds
         return Chunk(branch, taken.first, taken.stop, taken.start, PATIENCE * seconds, self._most_bytes)
 
     def _points_in(self, seconds: float, pace: float | None) -> int:

@@ -37,7 +37,7 @@ def thread_count(execution: str) -> int:
 
 
 def compute_in_threads(
-    work: Work, schedule: ChunkSchedule, count: int, done: Callable[[ChunkResult], None]
+    work: Work, schedule: ChunkSchedule, count: int, done: Callable[[ChunkResult], object]
 ) -> None:
     """Compute all chunks of a schedule by `count` threads; `done` gets the result of each, in this thread.
 

@@ -10,6 +10,7 @@ from vibroimpact.analysis.dataset.outputs import refuse_folder
 from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
+from vibroimpact.orchestrator.campaign.formats import DatasetFormat
 from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.commands.failures import outcome_lines
 from vibroimpact.orchestrator.operations.campaign import Campaign
@@ -25,12 +26,18 @@ def run_to_folder(options: Campaign) -> None:
     refuse_system_elsewhere(options.scene, options.scheduler)
     loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)
     refuse_folder(options.output)
-    compute(prepared(loaded), options.output, options.workers, options.scheduler)
+    compute(prepared(loaded), options.output, options.workers, options.scheduler, options.format)
 
 
-def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
+def compute(
+    scene: Scene,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    format: DatasetFormat | None = None,
+) -> None:
     """Run a campaign and print a summary."""
-    report = computed(scene, folder, workers=workers, scheduler=scheduler)
+    report = computed(scene, folder, workers=workers, scheduler=scheduler, format=format)
     if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
         say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
         return
@@ -48,12 +55,19 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
 
 
 def computed(
-    scene: Scene, folder: Path, *, workers: int | None = None, scheduler: str | None = None
+    scene: Scene,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    format: DatasetFormat | None = None,
 ) -> CampaignReport:
     """Run a campaign; an interrupted one prints how to resume it and raises typer.Exit."""
     try:
         with shown_progress() as progress:
-            return run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
+            return run_campaign(
+                scene, folder, workers=workers, scheduler=scheduler, progress=progress, format=format
+            )
     except CampaignInterrupted as interrupted:
         say(typed(interrupted.args[0]), err=True)
         raise typer.Exit(130) from None

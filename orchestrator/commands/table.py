@@ -71,6 +71,7 @@ COMMANDS: Mapping[str, str] = {
     "demo": "orchestrator.operations.demo:Demo",
     "plot": "analysis.operations.plot:Plot",
     "describe": "analysis.operations.describe:Describe",
+    "convert": "analysis.operations.convert:Convert",
     "accuracy": "orchestrator.operations.accuracy:Accuracy",
     "effects": "orchestrator.operations.effects:Effects",
     "sensitivity": "analysis.operations.sensitivity:Sensitivity",
@@ -96,7 +97,7 @@ COMMANDS: Mapping[str, str] = {
 }
 PANELS: Mapping[str, tuple[str, ...]] = {
     "Simulate": ("check", "run", "campaign", "demo"),
-    "Look": ("plot", "describe"),
+    "Look": ("plot", "describe", "convert"),
     "Measure and compare": (
         "accuracy",
         "effects",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from vibroimpact.fmus.operations import Door, Operation, Option, Positional, operation
 from vibroimpact.orchestrator.operations.arguments import Changes, Strict
@@ -36,6 +36,13 @@ class Campaign(Operation):
         Option(
             python="scheduler: str | Client | None = None",
             help="Use the workers of this Dask scheduler (tcp://host:8786) instead.",
+        ),
+    ] = None
+    format: Annotated[
+        Literal["netcdf", "zarr"] | None,
+        Option(
+            help="Format of the dataset: one NetCDF file, or a Zarr store that grows without being joined. By default "
+            "netcdf; zarr from 10^7 points on, where it is installed.",
         ),
     ] = None
     strict: Strict = False

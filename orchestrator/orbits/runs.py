@@ -12,10 +12,11 @@ from typing import Any, Protocol, Self, TypeVar
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import dataset_file, open_dataset
+from vibroimpact.analysis.dataset import dataset_place, open_dataset
 from vibroimpact.analysis.dataset.outputs import DATASET_ENDING
 from vibroimpact.analysis.dataset.schema import Outcome, UnitSystem
 from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.analysis.orbits.recorded import Impacts
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
@@ -51,9 +52,9 @@ class RunsStudy(Study[Row]):
     """As `open_dataset` or `run` gives it."""
 
     @classmethod
-    def reads(cls, options: OfRuns) -> Sequence[Path]:
+    def reads(cls, options: OfRuns) -> Sequence[Place]:
         """Return scene or dataset, and the file of a folder."""
-        return [options.file, dataset_file(options.file)]
+        return [options.file, dataset_place(options.file)]
 
     @classmethod
     def prepare(cls, options: OfRuns, stack: ExitStack) -> Self:
@@ -72,12 +73,13 @@ def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
 
     UsageError: the scene's orbits cannot be followed, or changes are given for a dataset.
     """
-    if path.is_dir() or path.suffix.lower() == DATASET_ENDING:
+    place = dataset_place(path)
+    if is_store(place) or path.is_dir() or path.suffix.lower() == DATASET_ENDING:
         if changes:
             raise UsageError(
                 f"{path}: --set: expected a scene, which can be changed, got a dataset. Leave it out."
             )
-        with open_dataset(path) as dataset:
+        with open_dataset(place) as dataset:
             yield dataset
         return
     scene = with_modes(opened_scene(path, changes))

@@ -11,8 +11,7 @@ from support.command_line import in_this_process
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Outcome
-from vibroimpact.orchestrator.campaign import campaign as campaigns
-from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.campaign import destination, run_campaign
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, run_chunk
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
 from vibroimpact.orchestrator.campaign.parts import compact, list_parts
@@ -271,7 +270,7 @@ def test_a_campaign_over_a_beam_that_was_broken_off_resumes_with_the_same_rows(
         raise Stopped
 
     with monkeypatch.context() as patch:
-        patch.setattr(campaigns, "compact", stop)
+        patch.setattr(destination, "compact", stop)
         with pytest.raises(Stopped):
             run_campaign(scene, tmp_path / "broken", scheduler=cluster)
     parts = sorted((tmp_path / "broken" / "parts").glob("*.nc"))

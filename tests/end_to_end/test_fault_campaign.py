@@ -9,14 +9,17 @@ from pathlib import Path
 import pytest
 from soak import faults
 
+from vibroimpact.orchestrator.campaign.formats import DatasetFormat
+
 POINTS = 150
 ROUNDS = ["workers killed and stopped", "damaged parts"]
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("form", faults.FORMATS)
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped here")
 def test_a_disturbed_campaign_of_misbehaving_fmus_loses_and_blames_no_innocent_point(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    form: DatasetFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert faults.disturbed(random.Random(15), POINTS, ROUNDS) is None
+    assert faults.disturbed(random.Random(15), POINTS, ROUNDS, form) is None

@@ -30,9 +30,16 @@ from soak import service_kills
 from soak.flipped_parts import DAMAGES
 from soak.kills import Content, bits_of, difference
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.analysis.dataset.places import dataset_place
+from vibroimpact.analysis.dataset.store_runs import read_runs
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.orchestrator.campaign import formats
+from vibroimpact.orchestrator.campaign.formats import DatasetFormat
+from vibroimpact.orchestrator.campaign.seals import read_seal
 
 CASES = 2
+FORMATS: tuple[DatasetFormat, ...] = ("netcdf", "zarr")
+"""Formats of the dataset, one after the other by the seed of a case."""
 SAMPLE = 0
 """0: `make test` has a campaign of a few hundred points of its own (`tests/end_to_end/test_fault_campaign.py`)."""
 SECONDS = 3600.0
@@ -73,19 +80,25 @@ def check(seed: int) -> str | None:
     chance = random.Random(seed)
     rounds = list(ROUNDS)
     chance.shuffle(rounds)
-    return disturbed(chance, POINTS, rounds) or service_kills.disturbed(
+    form = FORMATS[seed % len(FORMATS)]
+    return disturbed(chance, POINTS, rounds, form) or service_kills.disturbed(
         chance, "independent", POINTS, SERVICE_TRANSIENT
     )
 
 
-def disturbed(chance: random.Random, points: int, rounds: list[str]) -> str | None:
-    """Disturb a campaign in each of the named ways, in order, let it end, and compare."""
+def disturbed(chance: random.Random, points: int, rounds: list[str], form: DatasetFormat) -> str | None:
+    """Disturb a campaign in each of the named ways, in order, let it end, and compare.
+
+    A store has shards of a sixteenth of the points.
+    """
     Path("scene.toml").write_text(
         SCENE.format(
             fmu=fmu_factory.faulty(Path.cwd(), "3.0").name, last=points - 1, points=points, deadline=DEADLINE
         )
     )
     seconds = points / POINTS_PER_SECOND / (len(rounds) + 1)
+    if problem := _begun(form, points // 16, 0.2 * seconds):
+        return f"the beginning: {problem}"
     for name in rounds:
         problem = ROUNDS[name](chance, seconds)
         if problem is not None:
@@ -97,13 +110,13 @@ def disturbed(chance: random.Random, points: int, rounds: list[str]) -> str | No
 class Command:
     """`vibroimpact campaign scene.toml -o campaign` in a session of its own."""
 
-    def __init__(self, *options: str, folder: str = "campaign") -> None:
+    def __init__(self, *options: str, folder: str = "campaign", entry: str = ENTRY) -> None:
         Path("scratch").mkdir(exist_ok=True)
         self._errors = Path(f"{folder}.err")
         arguments = ["campaign", "scene.toml", "-o", folder, *(options or ("--workers", "2"))]
         with self._errors.open("w", encoding="utf-8") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", ENTRY, *arguments],
+                [sys.executable, "-c", entry, *arguments],
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
                 start_new_session=True,
@@ -153,16 +166,25 @@ class Command:
         return (1, f"processes outlived it: {outlived}") if outlived else (code, self.said()[-2000:])
 
 
-def _started(*options: str) -> Command:
+def _begun(form: DatasetFormat, shard_points: int, seconds: float) -> str | None:
+    """Begin the campaign in a format, which all later commands keep, and kill the command."""
+    small = f"import {formats.__name__} as formats; formats.SHARD_POINTS = {shard_points}; {ENTRY}"
+    command = _started("--workers", "2", "--format", form, entry=small)
+    command.runs_for(seconds)
+    return _killed(command)
+
+
+def _started(*options: str, entry: str = ENTRY) -> Command:
     """Start the command and wait until it has computed some points."""
     before = _parts_there()
-    command = Command(*options)
+    command = Command(*options, entry=entry)
     wait_until(lambda: command.process.poll() is not None or _parts_there() - before != set())
     return command
 
 
 def _parts_there() -> set[str]:
-    return {part.name for part in Path("campaign", "parts").glob("branch-*.nc")}
+    there = [*Path("campaign", "parts").glob("branch-*.nc"), *Path("campaign", "seals").glob("shard-*.json")]
+    return {part.name for part in there}
 
 
 # ---- rounds: each returns None or a problem ----
@@ -213,7 +235,7 @@ def _disk(_chance: random.Random, seconds: float) -> str | None:
 
 
 def _parts(chance: random.Random, seconds: float) -> str | None:
-    """Damage parts: each is named. A part that lost only its hash is whole, as the parts of version 0.1 are."""
+    """Damage parts and shards: each is named. A part that lost only its hash is whole, as in version 0.1."""
     parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
     damaged = chance.sample(parts, min(3, len(parts)))
     hurt = []
@@ -221,12 +243,25 @@ def _parts(chance: random.Random, seconds: float) -> str | None:
         sound = part.read_bytes()
         part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, sound))
         if part.read_bytes() not in (sound, sound[:-LINE_LENGTH]):
-            hurt.append(part)
+            hurt.append(f"{part.name} was damaged and is removed")
+    hurt += [f"{shard} of the store was damaged" for shard in _damaged_shards(chance)]
     command = _started()
     command.runs_for(seconds)
     said = command.said()
-    unnamed = [part.name for part in hurt if f"{part.name} was damaged and is removed" not in said]
+    unnamed = [words for words in hurt if words not in said]
     return _killed(command) or (f"not named: {unnamed}: {said[-2000:]}" if unnamed else None)
+
+
+def _damaged_shards(chance: random.Random) -> Iterator[str]:
+    """Flip a bit of an object of some sealed shards, and yield their names."""
+    seals = sorted(Path("campaign", "seals").glob("shard-*.json"))
+    for seal in chance.sample(seals, min(3, len(seals))):
+        objects = read_seal(seal).objects
+        place = Path("campaign", "dataset.zarr", chance.choice(sorted(objects)))
+        content = bytearray(place.read_bytes())
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        place.write_bytes(content)
+        yield seal.stem
 
 
 def _scheduler(chance: random.Random, seconds: float) -> str | None:
@@ -303,7 +338,7 @@ def _compared(points: int) -> str | None:
         return f"the undisturbed campaign ended with {code}: {said}"
     if left := [entry.name for entry in Path("scratch").iterdir()]:
         return f"left behind in the folder for temporary files: {left}"
-    got = read_flat(Path("campaign", "dataset.nc"))
+    got = read_runs(dataset_place("campaign"))
     return _misjudged(got, points) or difference(
         _content(read_flat(Path("undisturbed", "dataset.nc"))), _content(got)
     )

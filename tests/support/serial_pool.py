@@ -12,6 +12,7 @@ import pytest
 
 import vibroimpact.orchestrator.campaign.campaign as campaign
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
+from vibroimpact.orchestrator.campaign.formats import DatasetFormat
 from vibroimpact.orchestrator.campaign.pool import Finished
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
@@ -85,8 +86,11 @@ def campaign_here(
     runner: str = "support.busy_runner:SceneRunner",
     most_chunks: int | None = None,
     notes: Notes | None = None,
+    format: DatasetFormat | None = None,
 ) -> CampaignReport:
     """Run a campaign in this process."""
     with patch.context() as patched:
         workers_here(patched, most_chunks)
-        return run_campaign(parse_scene(text, "test.toml"), folder, workers=1, runner=runner, progress=notes)
+        return run_campaign(
+            parse_scene(text, "test.toml"), folder, workers=1, runner=runner, progress=notes, format=format
+        )

@@ -21,6 +21,7 @@ from vibroimpact.analysis.figures.sweep.diagrams import (
     varied,
     wrong_sweep,
 )
+from vibroimpact.analysis.figures.sweep.map_overview import block_classes, edges_of_blocks
 from vibroimpact.fmus.errors import DatasetError
 
 KIND = "class_kind"
@@ -67,9 +68,7 @@ def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
 
 def _only_stop(dataset: xr.Dataset) -> Any:
     """Return the only stop that a run hits, for each `run_id`, if its body has several; 0 for any other run."""
-    written = scene_of(dataset.attrs).get("stop")
-    recorded = {"impact_run", "impact_contact"} <= set(dataset.variables) and dataset.sizes["impact"]
-    if not isinstance(written, list) or len(written) < 2 or not recorded:
+    if not _only_stop_counts(dataset):
         return np.zeros(0, dtype=int)
     owner, contact = dataset["impact_run"].values, dataset["impact_contact"].values.astype(int)
     lowest = np.full(int(owner.max()) + 1, np.iinfo(int).max)
@@ -77,6 +76,13 @@ def _only_stop(dataset: xr.Dataset) -> Any:
     np.minimum.at(lowest, owner, contact)
     np.maximum.at(highest, owner, contact)
     return np.where(lowest == highest, highest, 0)
+
+
+def _only_stop_counts(dataset: xr.Dataset) -> bool:
+    """Return whether names of classes say the only stop that a run hits: a body with several, and its impacts."""
+    written = scene_of(dataset.attrs).get("stop")
+    recorded = {"impact_run", "impact_contact"} <= set(dataset.variables) and dataset.sizes["impact"] > 0
+    return isinstance(written, list) and len(written) > 1 and recorded
 
 
 def _palette(names: Any) -> dict[str, str]:
@@ -102,7 +108,9 @@ def _legend(figure: Figure, palette: dict[str, str]) -> None:
 
 
 def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
-    names = dataset[KIND].copy(data=_names(dataset))
+    blocks = None if _only_stop_counts(dataset) else block_classes(dataset)
+    shown, starts = (dataset, {}) if blocks is None else blocks
+    names = shown[KIND].copy(data=_names(shown))
     palette = _palette(names.values)
     places = {name: number for number, name in enumerate(palette)}
     directions = np.atleast_1d(dataset["direction"].values).tolist()
@@ -111,13 +119,13 @@ def _draw_map(dataset: xr.Dataset, along: str, across: str) -> Figure:
     for axis, place in zip(axes, range(len(directions)), strict=True):
         one = names.isel(direction=place) if "direction" in names.dims else names
         cells = on_axes(one.squeeze(), along, across)
-        y, x = (cells[axis] for axis in cells.dims)
+        y, x = (dataset[axis] if axis in starts else cells[axis] for axis in cells.dims)
         numbers = np.vectorize(
             lambda name: places.get(name, places.get("other", np.nan)) if name else np.nan
         )(cells.values)
         axis.pcolormesh(
-            edges(x.values),
-            edges(y.values),
+            edges_of_blocks(edges(x.values), starts.get(str(x.name))),
+            edges_of_blocks(edges(y.values), starts.get(str(y.name))),
             numbers.astype(float),
             cmap=ListedColormap(list(palette.values())),
             vmin=-0.5,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.grid import RANGE
+from vibroimpact.analysis.dataset.overview import LARGEST_IMPACT, MEAN_IMPACTS
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
+from vibroimpact.analysis.figures.sweep.map_overview import block_values, edges_of_blocks
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.messages import Argument, message
 
@@ -305,11 +311,13 @@ def crowded(x: Any, y: Any) -> Any:
 def draw_map(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and largest impact velocity as colours over two swept parameters."""
     quantities = []
-    if "displacement_range" in dataset.variables:
-        quantities.append((dataset["displacement_range"], label(dataset["displacement_range"]), "no value"))
+    if RANGE in dataset.variables:
+        ranges = _Mapped.of(dataset, RANGE, lambda: dataset[RANGE])
+        quantities.append(replace(ranges, text=label(dataset[RANGE]), missing="no value"))
     if "impact_velocity" in dataset.variables:
+        speeds = _Mapped.of(dataset, LARGEST_IMPACT, lambda: largest_impact_velocity(dataset))
         name = f"largest {label(dataset['impact_velocity'])}"
-        quantities.append((largest_impact_velocity(dataset), name, "no impact"))
+        quantities.append(replace(speeds, text=name, missing="no impact"))
     if not quantities:
         raise DatasetError(_NEITHER)
     return _draw_maps(dataset, quantities)
@@ -325,17 +333,49 @@ def draw_impacts_per_period(dataset: xr.Dataset) -> Figure:
             "figure: expected the impacts of each period in the dataset, got none recorded. "
             "Set impacts = true in [record] of a forced scene."
         )
-    mean = dataset["impacts_per_period"].mean("period")
-    return _draw_maps(dataset, [(mean.where(mean > 0.0), "impacts per forcing period (-)", "no impact")])
+
+    def whole() -> xr.DataArray:
+        mean = dataset["impacts_per_period"].mean("period")
+        return mean.where(mean > 0.0)
+
+    means = _Mapped.of(dataset, MEAN_IMPACTS, whole)
+    return _draw_maps(dataset, [replace(means, text="impacts per forcing period (-)", missing="no impact")])
 
 
-def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, str]]) -> Figure:
+@dataclass(frozen=True, slots=True)
+class _Mapped:
+    """A quantity over two parameters: of all points, or of blocks of the points of a large map."""
+
+    values: xr.DataArray
+    spread: Any
+    """Values that set the scale of the colours."""
+    starts: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    """First points of blocks along each dimension; empty: each point has a cell."""
+    text: str = ""
+    missing: str = ""
+    """Words for points without a value."""
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset, name: str, whole: Callable[[], xr.DataArray]) -> _Mapped:
+        """Return a quantity from the overview of a large map, else as a whole."""
+        blocks = block_values(dataset, name)
+        if blocks is not None:
+            return cls(blocks.values, blocks.spread, blocks.starts)
+        values = whole()
+        return cls(values, values.values)
+
+    def edges(self, axis: xr.DataArray) -> Any:
+        """Return the edges of the cells along an axis of all points."""
+        return edges_of_blocks(edges(axis.values), self.starts.get(str(axis.name)))
+
+
+def _draw_maps(dataset: xr.Dataset, quantities: list[_Mapped]) -> Figure:
     """Draw values over two swept parameters: a row for each quantity, a column for each direction."""
     if len(varied(dataset)) != 2:
         raise DatasetError(wrong_sweep("two swept parameters", dataset))
     along, across = in_order_of_the_scene(dataset, varied(dataset))
     if dataset["run_id"].dims == (SCATTERED,):
-        quantities = [(_nearest(values, along, across), text, none) for values, text, none in quantities]
+        quantities = [replace(one, values=_nearest(one.values, along, across)) for one in quantities]
     elif "run" in dataset["run_id"].dims:
         raise DatasetError(
             "figure: expected a grid of two parameters, got scattered runs. "
@@ -346,13 +386,15 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     axes = np.asarray(
         figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
     )
-    for row, (values, text, missing) in zip(axes, quantities, strict=True):
+    for row, mapped in zip(axes, quantities, strict=True):
+        values = mapped.values
         for axis, direction in zip(row, directions, strict=True):
             branch = values.sel(direction=direction) if "direction" in values.dims else values
             notes = [f"{direction} sweep"] if len(directions) > 1 else []
             branch = on_axes(branch.squeeze(), along, across)
-            notes += _colours(axis, branch, text, values.values)
-            notes += [] if np.isfinite(branch.values).all() else [f"gray: {missing}"]
+            places = [dataset[name] if name in mapped.starts else branch[name] for name in branch.dims]
+            notes += _colours(axis, branch, mapped, *places)
+            notes += [] if np.isfinite(branch.values).all() else [f"gray: {mapped.missing}"]
             axis.set_title("; ".join(notes), fontsize=8 if len(notes) == 1 else 7)
     return figure
 
@@ -383,19 +425,20 @@ def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["run_id"].copy(data=np.where(np.isfinite(values), values, np.nan))
 
 
-def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[str]:
+def _colours(
+    axis: Axes, values: xr.DataArray, mapped: _Mapped, vertical: xr.DataArray, horizontal: xr.DataArray
+) -> list[str]:
     """Draw one colour map over (vertical, horizontal) with its bar; return the notes about it.
 
-    `of_all` are the values of all branches, which share their colours.
+    All branches share the colours of the quantity; the axes are those of all points.
     """
-    across, along = values.dims
-    norm, same = _norm(of_all), one_value(of_all)
+    text, norm, same = mapped.text, _norm(mapped.spread), one_value(mapped.spread)
     axis.set_facecolor("0.88")
     # a logarithm gives no colour to values below its scale
     lowest = float(norm.vmin or 0.0) if isinstance(norm, LogNorm) else -math.inf
     mesh = axis.pcolormesh(
-        edges(values[along].values),
-        edges(values[across].values),
+        mapped.edges(horizontal),
+        mapped.edges(vertical),
         np.maximum(values.values, lowest),
         cmap="viridis",
         norm=norm,
@@ -403,10 +446,10 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     )
     # Long numbers of small distances would overlap.
     axis.xaxis.set_major_locator(MaxNLocator(4))
-    for name, set_scale in ((along, axis.set_xscale), (across, axis.set_yscale)):
-        if is_logarithmic(values[name].values):
+    for places, set_scale in ((horizontal, axis.set_xscale), (vertical, axis.set_yscale)):
+        if is_logarithmic(places.values):
             set_scale("log")
-    axis.set(xlabel=label(values[along]), ylabel=label(values[across]))
+    axis.set(xlabel=label(horizontal), ylabel=label(vertical))
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)
     bar.set_label(text)

@@ -13,7 +13,7 @@ import xarray as xr
 from support.campaign_scenes import assert_same_rows, frequency_text
 from support.serial_pool import Notes, campaign_here
 
-import vibroimpact.orchestrator.campaign.campaign as campaign
+import vibroimpact.orchestrator.campaign.destination as destination
 import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
@@ -79,7 +79,7 @@ def test_a_flipped_bit_is_found_before_the_part_is_opened_and_its_points_are_com
 def test_a_part_that_is_damaged_after_it_was_written_is_computed_again_by_the_same_command(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    compact, notes, damaged = campaign.compact, Notes(), []
+    compact, notes, damaged = destination.compact, Notes(), []
 
     def damage_first(parts: Sequence[Path], *others: Any) -> xr.Dataset:
         if not damaged:
@@ -87,7 +87,7 @@ def test_a_part_that_is_damaged_after_it_was_written_is_computed_again_by_the_sa
             flip(parts[2], 5000)
         return compact(parts, *others)
 
-    monkeypatch.setattr(campaign, "compact", damage_first)
+    monkeypatch.setattr(destination, "compact", damage_first)
     campaign_here(monkeypatch, TEXT, half, notes=notes)
     assert f"{damaged[0].name} was damaged and is removed" in notes.lines[0]
     assert_same_rows(half / "dataset.nc", expected)
@@ -127,7 +127,7 @@ def test_parts_that_never_fit_end_in_an_error_that_names_them(
     def never(*_: object) -> None:
         raise DatasetError("these do not fit")
 
-    monkeypatch.setattr(campaign, "compact", never)
+    monkeypatch.setattr(destination, "compact", never)
     with pytest.raises(CampaignError, match="the parts do not fit together: these do not fit"):
         campaign_here(monkeypatch, TEXT, half)
     assert parts_of(half)

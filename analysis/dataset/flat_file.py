@@ -1,0 +1,96 @@
+"""A NetCDF file of runs, read some runs at a time."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Self
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable
+from vibroimpact.analysis.dataset.merging import joined, take_runs
+from vibroimpact.analysis.dataset.reading import fitting, open_flat
+from vibroimpact.analysis.dataset.schema import RAGGED
+from vibroimpact.analysis.files.opening import one_error
+from vibroimpact.analysis.files.stores import Place
+from vibroimpact.fmus.errors import DatasetError
+
+_FAR = 1 << 16
+"""Distance of runs in a file from which they are read apart."""
+
+
+class FlatFile:
+    """A file of runs, one-dimensional as it is stored, some runs at a time.
+
+    Parameters
+    ----------
+    path : path
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        All runs, read when they are used.
+
+    Raises
+    ------
+    DatasetError
+        The file is missing, damaged or foreign, or its runs are not in the order of their `run_index`.
+    """
+
+    def __init__(self, path: Place) -> None:
+        self._path, self._sums = path, dict[str, NDArray[np.int64]]()
+        opened = open_flat(path)
+        self.close = opened.close
+        try:
+            with one_error(path):
+                self.dataset = _in_order_of_the_scene(fitting(path, opened))
+                if (np.diff(self.dataset.variables["run_index"].values) <= 0).any():
+                    raise DatasetError(f"{os.fspath(path)}: expected runs in the order of their run_index.")
+        except DatasetError:
+            opened.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def runs(self, places: NDArray[np.integer[Any]]) -> xr.Dataset:
+        """Return the runs at some places, ascending, with their rows, in memory."""
+        pieces = np.split(places, np.flatnonzero(np.diff(places) > _FAR) + 1)
+        with one_error(self._path):
+            found = [take_runs(self._stretch(one[0], one[-1] + 1), one - one[0]) for one in pieces]
+        return joined(found, [os.fspath(self._path)] * len(found))
+
+    def _stretch(self, first: int, stop: int) -> xr.Dataset:
+        """Return neighbouring runs with their rows."""
+        part: dict[str, slice] = {"run": slice(int(first), int(stop))}
+        for dim, count in RAGGED.items():
+            if count in self.dataset.variables:
+                begin = self._rows_before(count, int(first))
+                own = self.dataset.variables[count][part["run"]].values.sum(dtype=np.int64)
+                part[dim] = slice(begin, begin + int(own))
+        some = self.dataset.isel(part)
+        data = {str(name): loaded_variable(one) for name, one in some.variables.items()}
+        return assembled(data, {str(name): data.pop(str(name)) for name in some.coords}, some.attrs)
+
+    def _rows_before(self, count: str, run: int) -> int:
+        """Return the number of rows of all runs before a run; sums at every `_FAR` runs are kept."""
+        if count not in self._sums:
+            counts = self.dataset.variables[count].values
+            sums = [counts[first : first + _FAR].sum(dtype=np.int64) for first in range(0, counts.size, _FAR)]
+            self._sums[count] = np.cumsum([0, *sums])
+        block = run // _FAR
+        rest = self.dataset.variables[count][block * _FAR : run].values.sum(dtype=np.int64)
+        return int(self._sums[count][block] + rest)
+
+
+def _in_order_of_the_scene(flat: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose coordinates have the order of the scene: a file lists variables by the alphabet."""
+    linked = str(flat.variables["outcome"].encoding.get("coordinates", "")).split()
+    data = {str(name): one for name, one in flat.variables.items()}
+    names = dict.fromkeys([*(name for name in linked if name in data), *map(str, flat.coords)])
+    return assembled(data, {name: data.pop(name) for name in names}, flat.attrs)

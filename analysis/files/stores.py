@@ -1,0 +1,244 @@
+"""The only module that imports zarr: stores in folders and at addresses, read within bounds.
+
+A store is not trusted. Each object that is read has a bounded size, and each compressed chunk must expand to the size
+that its array announces. Every fault of a store is one DatasetError that names it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+STORE_ENDING = ".zarr"
+LONGEST_REASON = 200
+Place = str | os.PathLike[str]
+"""A path, or an address such as `s3://bucket/map.zarr`."""
+
+
+def is_address(place: Place) -> bool:
+    """Return whether a place is an address of fsspec, and no path.
+
+    >>> is_address("s3://bucket/map.zarr"), is_address("map.zarr")
+    (True, False)
+    """
+    return "://" in os.fspath(place)
+
+
+def is_store(place: Place) -> bool:
+    """Return whether a place is one of a store: any address, or a folder with the metadata of one."""
+    return is_address(place) or holds_store(place)
+
+
+def holds_store(place: Place) -> bool:
+    """Return whether there are metadata of a store at a place."""
+    if not is_address(place):
+        return os.path.isfile(os.path.join(place, "zarr.json"))
+    zarr_package()
+    with one_store_error(place):
+        system, root = system_of(place)
+        return bool(system.exists(f"{root}/zarr.json"))
+
+
+@cache
+def zarr_package() -> ModuleType:
+    """Return the package zarr; raise UsageError where it is missing."""
+    try:
+        import fsspec  # noqa: F401  # of the same extra
+        import zarr
+    except ImportError as missing:
+        raise UsageError(
+            f"store: expected the package {missing.name} for Zarr stores, got none. Install it: pip install "
+            "'vibroimpact[store]', or in a clone pip install '.[store]'."
+        ) from None
+    return zarr
+
+
+@contextmanager
+def quiet_zarr() -> Iterator[None]:
+    """Hold back the remark that consolidated metadata are zarr's own extension of format 3."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        yield
+
+
+def opened_group(place: Place, mode: str) -> Any:
+    """Return the root group of a store.
+
+    Parameters
+    ----------
+    place : path or address
+    mode : {"r", "r+", "w-"}
+        Read a finished store by its consolidated metadata; write into a store; make a new store.
+
+    Raises
+    ------
+    DatasetError
+        There is no store, it is unfinished, or it cannot be reached.
+    """
+    zarr = zarr_package()
+    from vibroimpact.analysis.files.bounded_stores import BoundedStore
+
+    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), _settings():
+        store = BoundedStore(_store(place, read_only=mode == "r"))
+        if mode == "w-":
+            return zarr.create_group(store, zarr_format=3)
+        if mode == "r":
+            _refuse_unfinished(place)
+        return zarr.open_group(store, mode=mode, zarr_format=3, use_consolidated=mode == "r")
+
+
+def _settings() -> Any:
+    """Return the context in which arrays are made and opened: it has the bounded codecs."""
+    from vibroimpact.analysis.files.bounded_stores import SETTINGS
+
+    return zarr_package().config.set(SETTINGS)
+
+
+def arrays_of(group: Any) -> dict[str, Any]:
+    """Return the arrays of a group, by name."""
+    with _settings():
+        return dict(group.arrays())
+
+
+def _store(place: Place, *, read_only: bool) -> Any:
+    from zarr.storage import FsspecStore, LocalStore
+
+    if is_address(place):
+        return FsspecStore.from_url(os.fspath(place), read_only=read_only)
+    return LocalStore(Path(place).absolute(), read_only=read_only)
+
+
+def _refuse_unfinished(place: Place) -> None:
+    """Raise DatasetError unless a store has the consolidated metadata that are written last."""
+    system, root = system_of(place)
+    head = f"{root}/zarr.json"
+    try:
+        if system.size(head) > MOST_METADATA_BYTES:
+            raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
+        found = system.cat_file(head)
+    except FileNotFoundError:
+        raise DatasetError(f"{os.fspath(place)}: expected a Zarr store, got none there.") from None
+    if finished_nodes(json.loads(found)) is None:
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a finished store, got one without consolidated metadata. "
+            "Its writing has not ended: run the command that writes it again."
+        )
+
+
+def system_of(place: Place) -> tuple[Any, str]:
+    """Return the file system of a place, and its path there."""
+    from fsspec.core import url_to_fs
+
+    system, root = url_to_fs(os.fspath(place) if is_address(place) else os.path.abspath(place))
+    return system, str(root).rstrip("/")
+
+
+def size_of(place: Place) -> tuple[int, int]:
+    """Return the size of a store or a file, bytes, and the number of its objects."""
+    zarr_package()
+    with one_store_error(place):
+        system, root = system_of(place)
+        sizes = system.du(root, total=False)
+        return sum(sizes.values()), len(sizes)
+
+
+def remove_object(place: Place, key: str) -> None:
+    """Remove an object of a store, if it is there: a damaged shard would be read before it is written."""
+    system, root = system_of(place)
+    with suppress(FileNotFoundError):
+        system.rm_file(f"{root}/{key}")
+
+
+def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
+    """Write another shape of an array into its metadata; zarr would list every chunk of the old shape."""
+    system, root = system_of(place)
+    path = f"{root}/{name}/zarr.json"
+    system.pipe_file(path, json.dumps(json.loads(system.cat_file(path)) | {"shape": shape}).encode())
+
+
+def has_object(place: Place, key: str) -> bool:
+    """Return whether a store has an object."""
+    system, root = system_of(place)
+    return bool(system.isfile(f"{root}/{key}"))
+
+
+def objects_below(place: Place, prefix: str) -> list[str]:
+    """Return the keys of the objects of a store below a prefix."""
+    system, root = system_of(place)
+    return [str(path).removeprefix(f"{root}/") for path in system.find(f"{root}/{prefix}")]
+
+
+def new_array(
+    group: Any,
+    name: str,
+    dims: tuple[str, ...],
+    shape: tuple[int, ...],
+    chunk: tuple[int, ...],
+    shard: tuple[int, ...],
+    dtype: Any,
+    attributes: dict[str, Any],
+) -> Any:
+    """Make an array of a group: compressed chunks with a checksum each; values never written are missing."""
+    from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
+
+    kind = np.dtype(dtype).kind
+    is_text = kind in "OUT"
+    packed = ZstdCodec(level=1) if is_text else BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
+    with _settings():
+        return group.create_array(
+            name,
+            shape=shape,
+            dtype="string" if is_text else dtype,
+            chunks=chunk,
+            shards=None if shard == chunk else shard,
+            compressors=(packed, Crc32cCodec()),
+            fill_value="" if is_text else math.nan if kind == "f" else -1,
+            attributes=attributes,
+            dimension_names=dims,
+        )
+
+
+@contextmanager
+def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
+    """Turn every exception from a store into one DatasetError that names it.
+
+    While it `writes`, an OSError stays as it is: a full disk is no damage.
+    """
+    try:
+        yield
+    except (DatasetError, UsageError):
+        raise
+    except ModuleNotFoundError as missing:
+        raise UsageError(
+            f"{os.fspath(place)}: expected the package {missing.name} for this kind of address, got none. "
+            f"Install it: pip install {missing.name}."
+        ) from missing
+    except Exception as problem:
+        if isinstance(problem, NameError | AssertionError) or (writes and isinstance(problem, OSError)):
+            raise
+        words = str(problem).strip().splitlines()[:1]
+        reason = words[0][:LONGEST_REASON] if words else ""
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a Zarr store that can be read and written, got "
+            f"{type(problem).__name__}: {reason}. It is damaged, of another kind, or out of reach."
+        ) from problem
+
+
+def consolidate(place: Place) -> None:
+    """Write the consolidated metadata of a store, which mark it as finished."""
+    zarr = zarr_package()
+    with one_store_error(place, writes=True), quiet_zarr():
+        zarr.consolidate_metadata(_store(place, read_only=False), zarr_format=3)

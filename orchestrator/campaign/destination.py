@@ -1,0 +1,124 @@
+"""The dataset of a campaign: one file that is joined from all parts at the end, or a store that grows by shards."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset import read_flat, write_dataset
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work
+from vibroimpact.orchestrator.campaign.extension import Kept, is_of, read_finished
+from vibroimpact.orchestrator.campaign.manifest import Manifest
+from vibroimpact.orchestrator.campaign.parts import StoredPart, compact
+from vibroimpact.orchestrator.campaign.sealing import GrowingStore
+from vibroimpact.orchestrator.campaign.seals import Seal
+from vibroimpact.orchestrator.campaign.shards import Shard
+from vibroimpact.orchestrator.run.dataset import DatasetForm
+from vibroimpact.orchestrator.run.points import State
+from vibroimpact.orchestrator.scene import Scene
+
+Attributes = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ShardParts:
+    """A shard whose runs are all in parts or kept rows, with the start state of the next run of its branch."""
+
+    shard: Shard
+    branch: int
+    paths: tuple[Path, ...]
+    kept: Path | None
+    carried: State | None
+
+
+class UnfitShardsError(DatasetError):
+    """Shards of a store do not have the objects that their seals name; `found` has the seals, each with the reason."""
+
+    def __init__(self, found: list[tuple[Path, str]]) -> None:
+        super().__init__(f"{found[0][0].name}: {found[0][1]}")
+        self.found = found
+
+
+class Destination(ABC):
+    """The dataset of a campaign; all rows are parts until the end, unless a class says otherwise.
+
+    Attributes
+    ----------
+    path : Path
+    store : GrowingStore or None
+        The store into which workers write shards.
+    shards : sequence of Shard
+        Shards that no chunk crosses, in run order.
+    """
+
+    path: Path
+    store: GrowingStore | None = None
+    shards: Sequence[Shard] = ()
+
+    @abstractmethod
+    def finished(self, manifest: Manifest) -> tuple[int, Attributes] | None:
+        """Return the number of runs and the attributes of the finished dataset of a campaign; None without one."""
+
+    @abstractmethod
+    def retitle(self, attrs: Attributes) -> None:
+        """Change attributes of the finished dataset."""
+
+    @abstractmethod
+    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+        """Write the dataset from the rows in these files; return whether a run has a message.
+
+        DatasetError: a part cannot be used; `parts.unfit_parts` finds it. UnfitShardsError: shards have changed.
+        OSError: the dataset cannot be written.
+        """
+
+    def make(self) -> None:
+        """Prepare the dataset for the first rows."""
+        return
+
+    def held(self) -> list[StoredPart]:
+        """Return the runs that are in the dataset already; a damaged shard is named and given up."""
+        return []
+
+    def rows(self, path: Path) -> xr.Dataset:
+        """Return the rows of a part, or of the shard of a seal."""
+        return read_flat(path)
+
+    def expect(self, parts: Sequence[StoredPart], kept: Kept | None) -> None:
+        """Take note of the parts that are there before the first chunk."""
+        return
+
+    def taken(self, result: ChunkResult) -> list[ShardParts]:
+        """Take note of the rows of a chunk; return the shards that are complete by it, and not yet written."""
+        return []
+
+    def sealed(self, seal: Seal) -> None:
+        """Take note of a shard that is written."""
+        return
+
+
+class JoinedFile(Destination):
+    """The file `dataset.nc`, made of all parts when the last run is computed."""
+
+    def __init__(self, home: Path, scene: Scene) -> None:
+        self.path, self._scene = home / "dataset.nc", scene
+
+    def finished(self, manifest: Manifest) -> tuple[int, Attributes] | None:
+        """Return the number of runs and the attributes of the dataset of a campaign; None without one."""
+        if not self.path.exists():
+            return None
+        done = read_finished(self.path)
+        return (len(done.run_index), done.attrs) if is_of(done.attrs, manifest, self._scene) else None
+
+    def retitle(self, attrs: Attributes) -> None:
+        """Change attributes of the dataset, which is written anew."""
+        write_dataset(read_flat(self.path).assign_attrs(attrs), self.path)
+
+    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+        """Join the rows of all parts to one file; return whether a run has a message."""
+        return compact(paths, self.path, form, attrs)

@@ -1,0 +1,150 @@
+"""The shards of a growing store: written by a worker, from the rows of a chunk or from parts, and sealed.
+
+A shard has one writer. The worker that computes all of its runs as one chunk writes it, or else the process that gets
+its complete parts. All objects of a shard are on the disk before its seal is.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset.assembling import assembled
+from vibroimpact.analysis.dataset.schema import attributes_of
+from vibroimpact.analysis.dataset.zarr_store import StoreWriter
+from vibroimpact.orchestrator.campaign.seals import Seal, object_hash, write_seal
+from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import expand
+
+STORE, SEALS = "dataset.zarr", "seals"
+OPTIONAL = ("loop_residual",)
+"""Variables of a store that no run may have."""
+
+
+@dataclass(frozen=True, slots=True)
+class GrowingStore:
+    """The store of a campaign for its workers: the folder of the campaign, and the size of a shard."""
+
+    home: str
+    shard_points: int
+
+    @property
+    def path(self) -> Path:
+        """Folder of the store."""
+        return Path(self.home, STORE)
+
+    @property
+    def seals(self) -> Path:
+        """Folder of the seals."""
+        return Path(self.home, SEALS)
+
+    def grid(self, scene: Scene) -> SweepGrid | None:
+        """Return the grid of a scene in shards of this store; None where its dataset is written as a whole."""
+        return grid_of(scene, self.shard_points)
+
+    def shard_of(self, scene: Scene, first: int, stop: int) -> Shard | None:
+        """Return the shard with exactly these runs."""
+        grid = self.grid(scene)
+        return None if grid is None else grid.shard_with(first, stop)
+
+
+def write_shard(
+    store: GrowingStore, scene: Scene, shard: Shard, rows: xr.Dataset, branch: int, attrs: Mapping[str, Any]
+) -> Seal:
+    """Write the rows of a shard's runs into a store, then the seal, and return the seal.
+
+    Parameters
+    ----------
+    rows : xarray.Dataset
+        All runs of the shard, one-dimensional, in their order and marked (`checking.marked`).
+    branch : int
+        Branch of the first run.
+    attrs : mapping
+        Attributes of the seal, as those of a part.
+
+    Raises
+    ------
+    DatasetError
+        The rows do not fit the store.
+    OSError
+        The shard cannot be written.
+    """
+    grid = store.grid(scene)
+    assert grid is not None
+    writer = _writer(str(store.path), str(attrs["scene_hash"]))
+    writer.write_shard(shard.block, rows, grid.places(shard))
+    objects = {
+        key: object_hash(store.path / key) for key in _flushed(store.path, writer.objects(shard.block))
+    }
+    values, counts = np.unique(rows.outcome.values, return_counts=True)
+    seal = Seal(
+        shard=shard.number,
+        branch=branch,
+        first=shard.first,
+        stop=shard.stop,
+        attrs={name: np.asarray(value).tolist() for name, value in attrs.items()},
+        outcomes={Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)},
+        has_messages=any(rows.variables["message"].values.tolist()),
+        periods=rows.sizes.get("period", 0),
+        absent=tuple(name for name in OPTIONAL if name not in rows.variables),
+        objects=objects,
+    )
+    write_seal(store.seals, seal)
+    return seal
+
+
+def read_shard(store: GrowingStore, scene: Scene, seal: Seal) -> xr.Dataset:
+    """Return the rows of a sealed shard, one-dimensional, as a part has them.
+
+    Raises
+    ------
+    DatasetError
+        An object of the shard is damaged.
+    """
+    grid = store.grid(scene)
+    assert grid is not None
+    shard, like = grid.shard_around(seal.first), empty_dataset(scene)
+    points = columns_of_points(expand(scene), shard.first, shard.stop)
+    values: dict[str, Any] = {name: points.values[key] for key, name in coordinate_names(scene).items()}
+    values |= {"direction": points.direction, "run_index": points.index.astype(np.int32)}
+    names = {str(name) for name in (*like.variables, *OPTIONAL)} - values.keys() - set(seal.absent)
+    writer = _writer(str(store.path), str(seal.attrs["scene_hash"]))
+    values |= writer.read_shard(shard.block, names, grid.places(shard))
+    variables: dict[str, Any] = {
+        str(name): variable if str(name) not in values else (variable.dims, values[str(name)], variable.attrs)
+        for name, variable in like.variables.items()
+    }
+    for name in OPTIONAL:
+        if name in values:
+            variables[name] = (("run",), values[name], attributes_of(name, scene.units))
+    coords = {str(name): variables.pop(str(name)) for name in like.coords}
+    return assembled(variables, coords, {**like.attrs, **seal.attrs})
+
+
+@lru_cache(maxsize=1)
+def _writer(path: str, scene_hash: str) -> StoreWriter:
+    """Return the writer into a store; the hash tells stores apart that follow one another at one place."""
+    return StoreWriter(path)
+
+
+def _flushed(store: Path, keys: Sequence[str]) -> Sequence[str]:
+    """Flush objects of a store, and the names of new ones, to the disk."""
+    folders = {str((store / key).parent) for key in keys}
+    for path in (*(str(store / key) for key in keys), *sorted(folders)):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    return keys

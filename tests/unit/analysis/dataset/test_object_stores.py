@@ -1,0 +1,108 @@
+"""Stores in an object store: S3 as a server of this machine plays it, also when the bucket is gone or refuses."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+
+import fsspec
+import pytest
+import s3fs
+import xarray as xr
+from moto.server import ThreadedMotoServer
+from support.command_line import in_this_process
+from support.dataset_examples import dataset_of, record
+from zarr.core.sync import _get_loop as zarr_loop
+
+import vibroimpact as vi
+from vibroimpact.analysis.dataset import dataset_place, write_dataset
+from vibroimpact.fmus.errors import DatasetError
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    yield f"http://{host}:{port}"
+    server.stop()
+
+
+@pytest.fixture
+def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
+    for name, value in {
+        "AWS_ENDPOINT_URL": endpoint,
+        "AWS_ACCESS_KEY_ID": "testing",
+        "AWS_SECRET_ACCESS_KEY": "testing",
+        "AWS_DEFAULT_REGION": "us-east-1",
+        "AWS_MAX_ATTEMPTS": "1",
+    }.items():
+        monkeypatch.setenv(name, value)
+    fsspec.get_filesystem_class("s3").clear_instance_cache()
+    system = fsspec.filesystem("s3")
+    system.mkdir("bucket")
+    yield system
+    system = fsspec.filesystem("s3")
+    if system.exists("bucket"):
+        system.rm("bucket", recursive=True)
+    close_all()
+
+
+def close_all() -> None:
+    """Close the connections of all file systems: those of zarr are of its own loop."""
+    kind = fsspec.get_filesystem_class("s3")
+    for system in kind._cache.values():
+        if system._s3 is not None:
+            loop = zarr_loop() if system.asynchronous else system.loop
+            asyncio.run_coroutine_threadsafe(system._s3.close(), loop).result(10)
+    kind.clear_instance_cache()
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    runs = dataset_of([record(1.0), record(2.0)]).drop_dims(["impact", "stick", "sample"])
+    write_dataset(
+        runs.drop_vars([f"{dim}_count" for dim in ("impact", "stick", "sample")]), tmp_path / "a.nc"
+    )
+    return tmp_path / "a.nc"
+
+
+def test_a_store_in_a_bucket_is_the_dataset_of_its_file(
+    bucket: s3fs.S3FileSystem, file: Path, tmp_path: Path
+) -> None:
+    address = "s3://bucket/campaign/dataset.zarr"
+    with vi.convert(file, address) as stored, vi.open_dataset(file) as opened:
+        xr.testing.assert_identical(stored.load(), opened.load())
+    assert dataset_place(Path("s3://bucket/campaign")) == address
+    done = in_this_process("convert", "s3://bucket/campaign", tmp_path / "b.nc")
+    assert done.returncode == 0, done.stderr
+    assert "2 runs in" in done.stdout
+    with vi.open_dataset(tmp_path / "b.nc") as back, vi.open_dataset(file) as opened:
+        xr.testing.assert_identical(back.load(), opened.load())
+    for words in (("describe", address), ("plot", address, "-o", tmp_path / "a.png")):
+        done = in_this_process(*words)
+        assert done.returncode == 0, done.stderr
+
+
+def test_a_bucket_that_is_gone_or_refuses_is_one_line(
+    bucket: s3fs.S3FileSystem, file: Path, monkeypatch: pytest.MonkeyPatch, endpoint: str
+) -> None:
+    for words in (("describe", "s3://gone/a.zarr"), ("convert", file, "s3://gone/a.zarr")):
+        done = in_this_process(*words)
+        assert done.returncode == 2, done.stdout
+        assert done.stderr.startswith("s3://gone/a.zarr: ")
+        assert done.stderr.count("\n") == 1
+    vi.convert(file, "s3://bucket/a.zarr").close()
+    with vi.open_dataset("s3://bucket/a.zarr") as opened:
+        bucket.rm("bucket", recursive=True)
+        with pytest.raises(DatasetError, match=r"s3://bucket/a\.zarr: ") as gone:
+            opened.load()
+        assert "\n" not in str(gone.value)
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:1")
+    close_all()
+    with pytest.raises(DatasetError, match=r"s3://bucket/a\.zarr: ") as problem:
+        vi.open_dataset("s3://bucket/a.zarr")
+    assert "\n" not in str(problem.value)
+    close_all()
+    monkeypatch.setenv("AWS_ENDPOINT_URL", endpoint)
