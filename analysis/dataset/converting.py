@@ -85,8 +85,8 @@ def refuse_conversion(place: Place, output: Place) -> None:
 def convert_dataset(place: Place, output: Place, shown: Shown = _silent) -> int:
     """Write a dataset of runs in the other form; return the number of runs.
 
-    Values and attributes are equal. The memory does not grow with the number of runs, except where the runs of several
-    shards lie between one another: these shards are in memory together. The result is whole or absent.
+    Values and attributes are equal. The memory does not grow with the number of runs. Shards whose runs lie between one
+    another are in memory together. The result is whole or absent.
 
     Parameters
     ----------

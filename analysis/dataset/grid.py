@@ -191,7 +191,6 @@ def _grid(
     scalars: dict[str, xr.Variable] = {}
     places: list[NDArray[np.intp]] = []
     directions = flat.variables["direction"].values
-    names = _direction_names(flat)
     if directions.size and (directions != Direction.independent).any():
         present, place = _distinct(directions)
         labels = [Direction(int(value)).name for value in present]
@@ -199,7 +198,9 @@ def _grid(
         sizes["direction"] = len(labels)
         places.append(place)
     elif directions.size:
-        scalars["direction"] = new_variable((), np.asarray(names[0]), _plain(flat.variables["direction"]))
+        scalars["direction"] = new_variable(
+            (), np.asarray(Direction.independent.name), _plain(flat.variables["direction"])
+        )
     for dimension, names_along in _swept_along(flat).items():
         own, place = axis_of(dimension, {name: flat.variables[name] for name in names_along})
         axes |= own

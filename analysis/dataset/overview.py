@@ -122,7 +122,7 @@ class BlockGrid:
         return found[found < size]
 
     def reduced(self, values: Floats) -> dict[str, Floats]:
-        """Return what the blocks of a shard hold, from values on its cells."""
+        """Return the parts of the overview of a shard, from values on its cells."""
         blocks = self._in_blocks(values, np.nan)
         there = np.isfinite(blocks).sum(axis=-1)
         middle = blocks[..., _middle(self.length)]

@@ -8,9 +8,12 @@ from typing import Annotated
 from vibroimpact.fmus.operations import Option, Positional, Request
 
 AnyFile = Annotated[
-    Path, Positional(help="Dataset, recording or results (.nc), or the folder of a campaign.")
+    Path,
+    Positional(
+        help="Dataset (.nc, .zarr, address), recording or results (.nc), or the folder of a campaign."
+    ),
 ]
-Data = Annotated[Path, Positional(help="Recording, or dataset of runs (.nc).")]
+Data = Annotated[Path, Positional(help="Recording (.nc), or dataset of runs (.nc, .zarr, address).")]
 ChannelName = Annotated[
     str | None, Option("--channel", request=Request(), help="Channel to use; not needed where there is one.")
 ]

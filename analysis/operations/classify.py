@@ -20,7 +20,10 @@ class Classify(Operation):
 
     file: Annotated[
         Path,
-        Positional(python="dataset: xr.Dataset", help="Dataset of runs (.nc), or the folder of a campaign."),
+        Positional(
+            python="dataset: xr.Dataset",
+            help="Dataset of runs (.nc, .zarr, address), or the folder of a campaign.",
+        ),
     ]
     output: DatasetFile = None
     figure: FigureFile = None

@@ -34,7 +34,7 @@ class Sensitivity(Operation):
         Path,
         Positional(
             python="dataset: xr.Dataset | PathLike",
-            help="Dataset of a campaign with drawn keys (.nc), or its folder.",
+            help="Dataset of a campaign with drawn keys (.nc, .zarr, address), or its folder.",
         ),
     ]
     output: DatasetFile = None

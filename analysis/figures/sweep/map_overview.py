@@ -127,7 +127,7 @@ def _shown(
 
 
 def _beyond(values: Floats, step: float) -> Floats:
-    """Return how far values lie beyond the outliers' fence of their neighbours; 0 for values within it."""
+    """Return the distance of values beyond the outliers' fence of their neighbours; 0 for values within it."""
     known = np.where(np.isfinite(values), values, np.nan)
     around = np.sort(_windows(known).reshape(*values.shape, -1), axis=-1)  # without values: last
     count = np.isfinite(around).sum(axis=-1, keepdims=True)
