@@ -207,6 +207,10 @@ def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(
     plain = run(points, impact_limit=MOST)
     found = run(points, impact_limit=MOST, rate=rate)
     assert all(one.tobytes() == other.tobytes() for one, other in zip(found.rows, plain.rows, strict=True))
+    backwards = np.arange(24)[::-1]
+    part = run(taken(points, backwards[:13]), impact_limit=MOST, rate=rate).columns["samples"]
+    whole = found.columns["samples"][:, backwards[:13], : part.shape[2]]
+    assert np.array_equal(part, whole, equal_nan=True)
     for place in np.flatnonzero(found.has_run & (found.columns["outcome"] == 0)):
         begin, end = float(points["begin"][place]), float(points["end"][place])
         count = math.floor((end - begin) * rate * (1.0 + 1e-12)) + 1

@@ -149,6 +149,9 @@ LANES_INLINE mask pass_strobe(vi_lane_group *g, const vi_lanes_plan *plan, vi_la
     store(g->rest_low + at, only(~turns, load(g->rest_low + at)));
     const vector q = turn_periods(g, plan, points, at, contacts, turns, start.q + added, p);
     const state next = {q, p, all(1.0), all(0.0)};
+    if (plan->rate > 0.0) {
+        sample_to_strobe(g, plan, points, at, turns, q, p);
+    }
     if (follows) {
         e->most[UPPER] = choose(turns, q, e->most[UPPER]);
         e->most[LOWER] = choose(turns, -q, e->most[LOWER]);
@@ -384,7 +387,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
     move_clock(g, at, f.jumped + cell.passed, share, arrives);
     if (plan->rate > 0.0) {
-        take_samples(g, plan, points, at);
+        take_samples(g, plan, points, at, moves | ~moves);
     }
     const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {
