@@ -122,9 +122,10 @@ LANES_INLINE void look_into(const vi_lane_group *g, int at, extremes *e, mask wh
         mask turns = matters & bent & (half > 0.0) & (slope < 0.0) & (end_slope >= 0.0);
         e->most[side] = choose(matters, larger(e->most[side], edge), e->most[side]);
         e->doubtful[side] |= matters & ~bent;
-        if (any(turns & e->waiting[side].waits)) {
-            compute_crests(g, at, e, turns & e->waiting[side].waits, of_side(side, all(1.0)), &e->waiting[side]);
-            turns &= (edge + a->slack > e->most[side]);
+        const mask both = turns & e->waiting[side].waits;
+        if (any(both)) {
+            compute_crests(g, at, e, both, of_side(side, all(1.0)), &e->waiting[side]);
+            turns &= ~both | (edge + a->slack > e->most[side]);
         }
         if (any(turns)) {
             const vector guess = first_guess(slope, 2.0 * half, end_slope, 2.0 * end_half, a->length);
