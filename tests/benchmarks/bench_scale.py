@@ -29,8 +29,10 @@ from distributed import Client, LocalCluster
 import vibroimpact.orchestrator.campaign.computation as computation
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.campaign.cluster import QUIET
+from vibroimpact.orchestrator.campaign.destination import ShardParts
 from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.campaign.seals import Seal
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, axis_of_range, expand
@@ -121,9 +123,13 @@ def rate(number: int, point_seconds: float, seconds: float) -> float:
     scene = parse_scene(SCENE, "scale.toml")
     done = chunks = 0
 
-    def take(result: ChunkResult) -> None:
+    def take(result: ChunkResult) -> Sequence[ShardParts]:
         nonlocal done, chunks
         done, chunks = done + result.chunk.count, chunks + 1
+        return ()
+
+    def sealed(seal: Seal) -> None:
+        raise AssertionError(f"a shard without a store: {seal}")
 
     with dask.config.set(QUIET), patch.object(computation, "run_chunk", Sleeper(point_seconds)):
         pool = WorkerPool(lambda: sleeping_workers(number), "this process", Progress())
@@ -131,7 +137,7 @@ def rate(number: int, point_seconds: float, seconds: float) -> float:
             pool.wait_for_workers()
             schedule = ChunkSchedule(branches, [], number)
             began, busy = time.perf_counter(), time.process_time()
-            computation.Computation(pool, Work(scene, "", "", ""), schedule, take).run()
+            computation.Computation(pool, Work(scene, "", "", ""), schedule, take, sealed).run()
             spent = time.perf_counter() - began
             busy = time.process_time() - busy
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
