@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
-from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
+from vibroimpact.fmus.errors import CampaignError, DatasetError
 from vibroimpact.fmus.messages import CALL, Message, message
-from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, get_ready
+from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, common_identity, get_ready
 from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
@@ -341,7 +341,9 @@ class _Campaign:
             with workers() as pool:
                 if not pool.is_local:
                     refuse_blind_workers(pool, self._home)
-                work = replace(self._work, identity=_common_identity(pool, self._work))
+                work = replace(
+                    self._work, identity=common_identity(pool.call_everywhere(get_ready, self._work))
+                )
                 self._agree_with_manifest(pool, work, stored)
                 self._compute_with(pool, self._with_manifest(work), chain([stage], left))
         finally:
@@ -492,16 +494,3 @@ class _Campaign:
             )
         found = manifest.attributes(self._scene) | {"scene_hash": scene_hash(self._scene)}
         return found | ({} if self._rounds is None else {"unresolved_jumps": self._rounds.left})
-
-
-def _common_identity(pool: WorkerPool, work: Work) -> RunnerIdentity:
-    """Prepare every worker, and return the identity of the runner that all workers share."""
-    answers: dict[str, RunnerIdentity] = pool.call_everywhere(get_ready, work)
-    first, *others = answers.values()
-    for other in others:
-        if other != first:
-            raise UsageError(
-                f"workers: expected one kind of runner on all of them, got {first} and {other}. "
-                "Use workers of one kind of machine with one version of vibroimpact."
-            )
-    return first

@@ -23,7 +23,7 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_da
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
 from vibroimpact.orchestrator.campaign.sealing import GrowingStore, write_shard
 from vibroimpact.orchestrator.campaign.seals import seal_path
@@ -161,6 +161,18 @@ def get_ready(work: Work) -> RunnerIdentity:
     with ScratchFolder("rehearsal") as folder:
         write_dataset(empty_dataset(work.scene), Path(folder.name, "rehearsal.nc"))
     return identity
+
+
+def common_identity(answers: Mapping[str, RunnerIdentity]) -> RunnerIdentity:
+    """Return the identity of the runner that all workers share, from the answer of each."""
+    first, *others = answers.values()
+    for other in others:
+        if other != first:
+            raise UsageError(
+                f"workers: expected one kind of runner on all of them, got {first} and {other}. "
+                "Use workers of one kind of machine with one version of vibroimpact."
+            )
+    return first
 
 
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
