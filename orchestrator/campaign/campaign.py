@@ -69,7 +69,7 @@ from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
+from vibroimpact.orchestrator.campaign.shared_folder import folder_of_campaign, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.threads import BYTES_OF_A_THREAD, compute_in_threads, thread_count
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm
@@ -130,13 +130,13 @@ def run_campaign(
     Raises
     ------
     UsageError
-        The folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+        The folder is an address, cannot be written or belongs to another scene, or nothing listens at `scheduler`.
     CampaignError
         The campaign could not finish; the same call resumes it.
     CampaignInterrupted
         Ctrl-C interrupted the campaign.
     """
-    home = Path(folder).absolute()
+    home = folder_of_campaign(folder).absolute()
     make_folder(home)
     with locked_folder(home):
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)

@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.scene.sweep import run_count
 DatasetFormat = Literal["netcdf", "zarr"]
 
 FILE_POINTS = 10**7
-"""Number of points from which on the default is a store: a file is joined by one process, 5 us a point."""
+"""Number of points from which on the default is a store: one process joins a file, .3 us a point."""
 
 SHARD_BYTES = MOST_BYTES
 """Largest size of the results of a shard in memory, bytes: a worker computes the shard as one chunk."""

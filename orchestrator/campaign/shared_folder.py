@@ -1,16 +1,29 @@
-"""The check that all workers see the folder of a campaign, by a file in it, not by the folder's name."""
+"""The folder of a campaign: a path that all workers see, checked by a file in it, not by the folder's name."""
 
 from __future__ import annotations
 
+import os
 import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vibroimpact.analysis.dataset.places import given_place
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
+
+
+def folder_of_campaign(folder: str | os.PathLike[str]) -> Path:
+    """Return the folder of a campaign; UsageError for the address of an object store, which cannot hold one."""
+    place = given_place(folder)
+    if isinstance(place, str):
+        raise UsageError(
+            f"{place}: expected a folder of this machine for a campaign, got an address. Give a folder; "
+            f"`vibroimpact convert FOLDER {place}` copies its dataset to the address."
+        )
+    return place
 
 
 def answer_question(folder: str, name: str) -> str:
