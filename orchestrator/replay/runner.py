@@ -22,7 +22,7 @@ from vibroimpact.orchestrator.replay.replayer import (
 )
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.run.parameters import most_elements, padded_state
-from vibroimpact.orchestrator.run.point import ENGINE, built_for
+from vibroimpact.orchestrator.run.point import built_for, engine_of
 from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -35,10 +35,9 @@ class ReplayRunner(Runner):
     either.
     """
 
-    engine = ENGINE
-
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.execution = "fused" if execution == "auto" else execution
+        self.engine = engine_of(scene, self.execution)
         self.instruction_set = platform.machine()
         self.scene = scene
         count = max(1, len(replay_table(scene).recordings))

@@ -50,6 +50,7 @@ from vibroimpact.orchestrator.run.window import (
     recorded_window,
 )
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.laws import LAWS
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
@@ -57,10 +58,19 @@ if TYPE_CHECKING:
 ENGINE = 7
 """Version of the C engine that follows the package's bodies; other versions give other results in a campaign."""
 
+ENGINE_OF_ONE_MASS = 6
+"""Version of the engine with the last change of a bit of one mass between rigid stops, outside lanes."""
+
 SAMPLES_OF_A_BLOCK = 16_384
 """Largest number of samples of one call, after which Python stores them and hears signals."""
 
 _DURATION = IMPACT_COLUMNS.index("impact_duration")
+
+
+def engine_of(scene: Scene, execution: str) -> int:
+    """Return the version of the engine with the last change of a bit of such runs: campaigns since then go on."""
+    is_one_mass = not scene.body.IS_STRUCTURE and all(LAWS[stop.law].is_rigid for stop in scene.stops)
+    return ENGINE_OF_ONE_MASS if is_one_mass and execution != "lanes" else ENGINE
 
 
 class PointRunner(Runner):
@@ -89,11 +99,10 @@ class PointRunner(Runner):
         The driver of the body.
     """
 
-    engine = ENGINE
-
     def __init__(self, scene: Scene, *, execution: str = "auto", wrap: WrapOf | None = None) -> None:
         chosen = "lanes" if goes_by_lanes(scene) else "fused"
         self.execution = chosen if execution == "auto" else execution
+        self.engine = engine_of(scene, self.execution)
         self.instruction_set = platform.machine()
         self.scene, self._wrap = scene, wrap
         self._plan = TimeSeriesPlan(scene)

@@ -20,7 +20,7 @@ from support.tolerance import SEQUENCE
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import constant_names, read_flat, take_runs, write_dataset
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.point import ENGINE
+from vibroimpact.orchestrator.run.point import ENGINE_OF_ONE_MASS
 
 FILES = Path(__file__).with_name("version_0_1.zip")
 
@@ -74,7 +74,9 @@ def components_of(campaign: Path) -> dict[str, Any]:
 def half_of_this_engine(old: Path, **more: Any) -> Path:
     """Return the half-done campaign with a manifest of the current engine, and `more` changes."""
     half = old / "half"
-    (half / "campaign.json").write_text(json.dumps(components_of(half) | {"engine": ENGINE} | more))
+    (half / "campaign.json").write_text(
+        json.dumps(components_of(half) | {"engine": ENGINE_OF_ONE_MASS} | more)
+    )
     return half
 
 
@@ -92,7 +94,7 @@ def refused_with_its_parts_kept(half: Path, old: Path, cluster: str) -> str:
 
 
 def test_a_half_done_campaign_of_the_engine_before_is_refused_in_one_line(old: Path, cluster: str) -> None:
-    assert f"engine was 1, is {ENGINE}" in refused_with_its_parts_kept(old / "half", old, cluster)
+    assert f"engine was 1, is {ENGINE_OF_ONE_MASS}" in refused_with_its_parts_kept(old / "half", old, cluster)
 
 
 def test_a_half_done_campaign_of_other_components_is_refused_in_one_line(old: Path, cluster: str) -> None:

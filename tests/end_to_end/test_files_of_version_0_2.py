@@ -17,7 +17,7 @@ from support.served import Served
 
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.analysis.recording import open_recording
-from vibroimpact.orchestrator.run.point import ENGINE
+from vibroimpact.orchestrator.run.point import ENGINE_OF_ONE_MASS
 
 FILES = Path(__file__).with_name("version_0_2.zip")
 with zipfile.ZipFile(FILES) as archive:
@@ -70,7 +70,7 @@ def test_a_finished_campaign_has_nothing_left_to_do(old: Path, cluster: str) -> 
 
 def test_a_half_done_campaign_goes_on_from_its_parts(old: Path, cluster: str) -> None:
     half = old / "half"
-    assert json.loads((half / "campaign.json").read_text())["engine"] == ENGINE
+    assert json.loads((half / "campaign.json").read_text())["engine"] == ENGINE_OF_ONE_MASS
     [part] = (half / "parts").iterdir()
     kept = read_flat(part).impact_time.values
     done = vibroimpact("campaign", old / "half.toml", "-o", half, "--scheduler", cluster)
