@@ -41,6 +41,7 @@ class Campaign(Operation):
     format: Annotated[
         Literal["netcdf", "zarr"] | None,
         Option(
+            python="format: Literal['netcdf', 'zarr'] | None = None",
             help="Format of the dataset: one NetCDF file, or a Zarr store that grows without being joined. By default "
             "netcdf; zarr from 10^7 points on, where it is installed.",
         ),

@@ -33,6 +33,7 @@ HEAVY = (
     "pint",
     "scipy",
     "uvicorn",
+    "zarr",
 )
 WHEN_USED = ("pint", "scipy")
 """Packages that are imported only inside the functions that compute with them."""
@@ -94,6 +95,7 @@ OTHERS: Rows = {
     "ssp export two_oscillators.toml -o two.ssp": ("fmpy", 0),
     "ssp import two.ssp -o imported.toml": ("fmpy", 0),
     "classify swept.nc": ("dask", 0),
+    "convert swept.nc swept.zarr": ("zarr", 0),
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
     # the names of connections are labels

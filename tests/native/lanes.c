@@ -66,7 +66,7 @@ static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *se
         s->contact_stiffness[at] = s->contact_damping[at] = 0.0;
         if ((plan->yielding >> k) & 1) {
             s->contact_stiffness[at] = uniform(seed, 0.1, 1.0);
-            for (int decades = choice(seed, 9); decades > 0; --decades) {
+            for (int decades = (int)choice(seed, 9); decades > 0; --decades) {
                 s->contact_stiffness[at] *= 10.0;
             }
             s->contact_damping[at] = choice(seed, 4) * uniform(seed, 0.0, 1.0) * sqrt(s->contact_stiffness[at]);

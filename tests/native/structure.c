@@ -1,6 +1,7 @@
 /* Random bodies of up to 64 modes with up to eight stops of every law, including extreme ones. They stay finite, are
  * never beyond a rigid stop, never go back in time, and always end their steps. Stops only push. */
 #include "body/modal/modal_scan.h"
+#include "body/modal/power_tables.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/structure.h"
 
@@ -28,7 +29,8 @@ static vi_contact contacts[VI_PORTS];
 static vi_record record;
 static vi_pressed_cache pressed;
 static vi_scan scan;
-static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan};
+static vi_power_tables power;
+static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power};
 
 static void make_modes(uint64_t *seed, double root)
 {

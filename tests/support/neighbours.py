@@ -32,6 +32,8 @@ LADDERS: Mapping[str, tuple[float | int | str, ...]] = {
 }
 #: Work that steps do not count, in evaluations of each mode: for the start of a flight, and for each stop beside it.
 FLIGHT, STOP = 8.0, 2.0
+#: Periods before a measurement, by the number of modes: small bodies make tables after some thirty contacts.
+SETTLING = {1: 20, 8: 20}
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def work(shape: Shape) -> Cost:
         flights = len(structure.impacts) + structure.time * shape.rate
         return structure.work + (FLIGHT + STOP * shape.stops) * shape.modes * flights
 
-    return measured(shape, evaluations, settling=6, periods=3)
+    return measured(shape, evaluations, settling=SETTLING.get(shape.modes, 6), periods=3)
 
 
 def shapes() -> tuple[Shape, ...]:
