@@ -6,7 +6,8 @@ refused. A run with impossible values (a speed of approach below 0) is marked; a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Collection, Iterator
 from typing import Any, get_args
 
 import numpy as np
@@ -28,7 +29,17 @@ from vibroimpact.analysis.dataset.schema import (
     constant_names,
     swept_names,
 )
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import DatasetError
+
+
+def refuse_foreign(place: Place, attributes: Collection[object], variables: Collection[object]) -> None:
+    """Raise DatasetError unless a file or store has the marks of a dataset of this package."""
+    if "dataset_schema" not in attributes or not all(name in variables for name in ("run_index", "outcome")):
+        raise DatasetError(
+            f"{os.fspath(place)}: expected a dataset written by vibroimpact, got other contents. "
+            "Use the dataset of a campaign or the file of a run."
+        )
 
 
 def check(dataset: xr.Dataset) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from xarray.backends import StoreBackendEntrypoint
 
 from vibroimpact.analysis.dataset.assembling import assembled
-from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
+from vibroimpact.analysis.dataset.checking import count_problems, refuse_foreign, structure_problems
 from vibroimpact.analysis.dataset.grid import on_grid, shared_axes
 from vibroimpact.analysis.dataset.places import dataset_place
 from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
@@ -25,7 +25,6 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 from vibroimpact.analysis.dataset.storing import as_read
-from vibroimpact.analysis.dataset.zarr_reading import StoreContents, refuse_foreign
 from vibroimpact.analysis.files.lazy_store import LazyStore
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.files.probing import check_sound, refuse_changed
@@ -194,6 +193,9 @@ def open_dataset(path: Place) -> xr.Dataset:
     """
     file = dataset_place(path)
     if is_store(file):
+        # imported only for a store
+        from vibroimpact.analysis.dataset.zarr_reading import StoreContents
+
         return _checked_schema(file, StoreContents(file).dataset())
     flat = open_flat(file)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
@@ -16,7 +16,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
-from vibroimpact.analysis.dataset.checking import structure_problems
+from vibroimpact.analysis.dataset.checking import refuse_foreign, structure_problems
 from vibroimpact.analysis.dataset.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.zarr_store import LABELS, SHARD_ORDER, grid_of
@@ -317,15 +317,6 @@ class StoreContents:
             return xr.Variable(dims, cached, attrs)
         variable = xr.Variable(dims, lazily, attrs)
         return variable.chunk(dict(zip(dims, chunks, strict=True)), name=f"{name}-{self.token}")
-
-
-def refuse_foreign(place: Place, attributes: Collection[object], variables: Collection[object]) -> None:
-    """Raise DatasetError unless a file or store has the marks of a dataset of this package."""
-    if "dataset_schema" not in attributes or not all(name in variables for name in ("run_index", "outcome")):
-        raise DatasetError(
-            f"{os.fspath(place)}: expected a dataset written by vibroimpact, got other contents. "
-            "Use the dataset of a campaign or the file of a run."
-        )
 
 
 def _first(part: Any) -> int:

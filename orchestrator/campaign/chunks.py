@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,6 @@ from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
-from vibroimpact.orchestrator.campaign.sealing import GrowingStore, write_shard
 from vibroimpact.orchestrator.campaign.seals import seal_path
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
@@ -35,6 +34,9 @@ from vibroimpact.orchestrator.running.kept import OpenedScene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Paths, expand
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
@@ -274,6 +276,9 @@ def write_part(
         dataset = form.dataset(points, records, attrs)
         shard = None if work.store is None else work.store.shard_of(work.scene, chunk.first, chunk.stop)
         if work.store is not None and shard is not None and len(points) == shard.count:
+            # imported only for a store
+            from vibroimpact.orchestrator.campaign.sealing import write_shard
+
             seal = write_shard(work.store, work.scene, shard, dataset, chunk.branch, attrs)
             return seal_path(work.store.seals, shard.number), dict(seal.outcomes)
         if not has_messages(dataset):

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -16,12 +16,14 @@ from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, read_finished
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import StoredPart, compact
-from vibroimpact.orchestrator.campaign.sealing import GrowingStore
-from vibroimpact.orchestrator.campaign.seals import Seal
-from vibroimpact.orchestrator.campaign.shards import Shard
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
+    from vibroimpact.orchestrator.campaign.seals import Seal
+    from vibroimpact.orchestrator.campaign.shards import Shard
 
 Attributes = Mapping[str, Any]
 

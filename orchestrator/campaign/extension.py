@@ -48,8 +48,7 @@ from vibroimpact.orchestrator.campaign.parts import (
     own_files,
     remove_parts_within,
 )
-from vibroimpact.orchestrator.campaign.sealing import SEALS, STORE
-from vibroimpact.orchestrator.campaign.seals import remove_store
+from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, remove_store
 from vibroimpact.orchestrator.run.dataset import (
     coordinate_names,
     empty_dataset,

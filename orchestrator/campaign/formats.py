@@ -14,8 +14,7 @@ from vibroimpact.orchestrator.campaign.destination import Destination, JoinedFil
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
-from vibroimpact.orchestrator.campaign.sealing import SEALS, STORE, GrowingStore
-from vibroimpact.orchestrator.campaign.seals import finished_store, has_rows
+from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, finished_store, has_rows
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
@@ -105,7 +104,9 @@ def destination_of(home: Path, scene: Scene, shard_points: int, scene_hash: str,
     """Return the dataset of a campaign; `note` gets a line for each damaged shard."""
     if not shard_points:
         return JoinedFile(home, scene)
+    # imported only for a store
     from vibroimpact.orchestrator.campaign.grown_store import GrownStore
+    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
     from vibroimpact.orchestrator.campaign.whole_store import WholeStore
 
     store = GrowingStore(str(home), shard_points)

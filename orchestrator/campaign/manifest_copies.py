@@ -31,8 +31,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import Note, own_files
-from vibroimpact.orchestrator.campaign.sealing import SEALS
-from vibroimpact.orchestrator.campaign.seals import FINISHED, read_sealed, seals_in
+from vibroimpact.orchestrator.campaign.seals import FINISHED, SEALS, read_sealed, seals_in
 from vibroimpact.orchestrator.run import OTHER_ENGINE
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 

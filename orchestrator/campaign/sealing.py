@@ -20,14 +20,13 @@ from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter
-from vibroimpact.orchestrator.campaign.seals import Seal, object_hash, write_seal
+from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, Seal, object_hash, write_seal
 from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid, grid_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
-STORE, SEALS = "dataset.zarr", "seals"
 OPTIONAL = ("loop_residual",)
 """Variables of a store that no run may have."""
 

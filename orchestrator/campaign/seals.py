@@ -21,6 +21,8 @@ from vibroimpact.analysis.files.stores import opened_group
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import CALL, message
 
+STORE, SEALS = "dataset.zarr", "seals"
+"""Names of the store of a campaign, and of the folder of its seals."""
 FINISHED = "finished.json"
 """Name of the seal of a finished store."""
 _NAME = re.compile(r"shard-\d{6,}\.json")
