@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any, Self
 
 import numpy as np
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable
 from vibroimpact.analysis.dataset.merging import joined, take_runs
-from vibroimpact.analysis.dataset.reading import fitting, open_flat
+from vibroimpact.analysis.dataset.reading import fitting, open_flat, read_flat
 from vibroimpact.analysis.dataset.schema import RAGGED
 from vibroimpact.analysis.files.opening import one_error
 from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import DatasetError
 
+LARGE_BYTES = 128 << 20
+"""Size of a file, bytes, above which its runs are read in stretches: each takes about this size in memory."""
 _FAR = 1 << 16
 """Distance of runs in a file from which they are read apart."""
 
@@ -58,6 +61,13 @@ class FlatFile:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def stretches(self) -> Iterator[NDArray[np.int64]]:
+        """Yield the places of neighbouring runs that take about `LARGE_BYTES` in the file, from the first run on."""
+        runs = self.dataset.sizes["run"]
+        most = max(runs * LARGE_BYTES // max(os.path.getsize(self._path), 1), 1)
+        for first in range(0, runs, most):
+            yield np.arange(first, min(first + most, runs))
+
     def runs(self, places: NDArray[np.integer[Any]]) -> xr.Dataset:
         """Return the runs at some places, ascending, with their rows, in memory."""
         pieces = np.split(places, np.flatnonzero(np.diff(places) > _FAR) + 1)
@@ -75,6 +85,8 @@ class FlatFile:
                 part[dim] = slice(begin, begin + int(own))
         some = self.dataset.isel(part)
         data = {str(name): loaded_variable(one) for name, one in some.variables.items()}
+        for variable in data.values():
+            variable.attrs.pop("_FillValue", None)  # an attribute of the file, not of its runs
         return assembled(data, {str(name): data.pop(str(name)) for name in some.coords}, some.attrs)
 
     def _rows_before(self, count: str, run: int) -> int:
@@ -86,6 +98,24 @@ class FlatFile:
         block = run // _FAR
         rest = self.dataset.variables[count][block * _FAR : run].values.sum(dtype=np.int64)
         return int(self._sums[count][block] + rest)
+
+
+def is_large(path: str | os.PathLike[str]) -> bool:
+    """Return whether the runs of a file are read in stretches, if they are in the order of their index."""
+    return os.path.getsize(path) > LARGE_BYTES
+
+
+def blocks_of(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
+    """Yield the runs of a file in memory, in stretches if the file is large.
+
+    The runs of a large file are in the order of their index. DatasetError: see `FlatFile`.
+    """
+    if not is_large(path):
+        yield read_flat(path)
+        return
+    with FlatFile(path) as file:
+        for places in file.stretches():
+            yield file.runs(places)
 
 
 def _in_order_of_the_scene(flat: xr.Dataset) -> xr.Dataset:

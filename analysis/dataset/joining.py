@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from math import prod
@@ -19,8 +19,10 @@ from typing import Any, Protocol
 import netCDF4
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.checking import marked
+from vibroimpact.analysis.dataset.flat_file import FlatFile, is_large
 from vibroimpact.analysis.dataset.merging import joined, refuse_unlike, take_runs
 from vibroimpact.analysis.dataset.reading import read_flat, read_head
 from vibroimpact.analysis.dataset.storing import stored_variables
@@ -42,7 +44,7 @@ def join_files(
     """Write the runs of dataset files into one file, ordered by `run_index`; return whether any run has a message.
 
     Values, attributes and form are those of `merge_datasets` and `write_dataset`. Files whose runs lie between the
-    runs of others are in memory together; other files are in memory one at a time.
+    runs of others are in memory together; other files are in memory one at a time, large ones in stretches.
 
     Parameters
     ----------
@@ -62,8 +64,8 @@ def join_files(
     """
     if not paths:
         raise DatasetError("merge: expected at least one file, got none.")
-    form, files, sizes = _survey(paths)
-    with whole_or_absent(target) as temporary:
+    with ExitStack() as opened, whole_or_absent(target) as temporary:
+        form, files, sizes = _survey(paths, opened)
         with appended_file(temporary, marked(finished(form)), sizes) as file:
             for block in blocks_in_order(files, form, os.fspath(paths[0])):
                 file.append(marked(block))
@@ -89,17 +91,46 @@ class _File:
         return take_runs(rows, np.argsort(index)) if (np.diff(index) < 0).any() else rows
 
 
-def _survey(paths: Sequence[str | os.PathLike[str]]) -> tuple[xr.Dataset, list[_File], dict[str, int]]:
-    """Return the common form of files, the files with runs, and the sizes of the dimensions of all together."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stretch:
+    """A `Piece` of a large file; `places` are those of its runs in the file."""
+
+    path: str
+    first: int
+    last: int
+    file: FlatFile
+    places: NDArray[np.int64]
+
+    def rows(self) -> xr.Dataset:
+        """Return the runs."""
+        return self.file.runs(self.places)
+
+
+def _stretches(file: FlatFile, path: str) -> Iterator[_Stretch]:
+    """Yield the stretches of a large file."""
+    index = file.dataset.variables["run_index"].values
+    for places in file.stretches():
+        yield _Stretch(path, int(index[places[0]]), int(index[places[-1]]), file, places)
+
+
+def _survey(
+    paths: Sequence[str | os.PathLike[str]], opened: ExitStack
+) -> tuple[xr.Dataset, list[Piece], dict[str, int]]:
+    """Return the common form of files, their runs, and the sizes of the dimensions of all files together.
+
+    Large files stay open until `opened` ends.
+    """
     form: xr.Dataset | None = None
-    files, sizes, first_name = [], dict[str, int](), os.fspath(paths[0])
+    files, sizes, first_name = list[Piece](), dict[str, int](), os.fspath(paths[0])
     for path in [os.fspath(path) for path in paths]:
         head = read_head(path)
         form = head.form if form is None else form
         if not _are_alike(form, head.form):
             form = joined([form, head.form], [first_name, path])
         sizes = {name: sizes.get(name, 0) + head.sizes.get(name, 0) for name in sizes | head.sizes}
-        if head.sizes["run"]:
+        if head.ascends and is_large(path):
+            files += _stretches(opened.enter_context(FlatFile(path)), path)
+        elif head.sizes["run"]:
             files.append(_File(path, head.first, head.last))
     assert form is not None
     return form, sorted(files, key=lambda file: file.first), sizes

@@ -105,12 +105,15 @@ class Head:
         Size of the dimension `run`, and of each ragged dimension.
     first, last : int
         Lowest and highest run index; -1 in a file without runs.
+    ascends : bool
+        Whether the runs are in the order of their index.
     """
 
     form: xr.Dataset
     sizes: dict[str, int]
     first: int
     last: int
+    ascends: bool
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
@@ -130,6 +133,7 @@ def read_head(path: str | os.PathLike[str]) -> Head:
             {name: file.dimensions[name].size for name in along if name in file.dimensions},
             int(index.min(initial=index[0])) if index.size else -1,
             int(index.max(initial=-1)),
+            not (np.diff(index) <= 0).any(),
         )
 
 

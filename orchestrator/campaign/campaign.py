@@ -24,8 +24,8 @@ from vibroimpact.fmus.errors import CampaignError, DatasetError
 from vibroimpact.fmus.messages import CALL, Message, message
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, common_identity, get_ready
 from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
+from vibroimpact.orchestrator.campaign.earlier_sweep import EarlierSweep
 from vibroimpact.orchestrator.campaign.extension import (
-    EarlierSweep,
     Kept,
     kept_path,
     other_differences,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,10 @@ class Destination(ABC):
     def rows(self, path: Path) -> xr.Dataset:
         """Return the rows of a part, or of the shard of a seal."""
         return read_flat(path)
+
+    def blocks(self, path: Path) -> Iterator[xr.Dataset]:
+        """Yield the same rows in blocks that fit in memory."""
+        yield self.rows(path)
 
     def expect(self, parts: Sequence[StoredPart], kept: Kept | None) -> None:
         """Take note of the parts that are there before the first chunk."""

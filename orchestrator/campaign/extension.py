@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,38 +22,26 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import (
     Outcome,
     Part,
-    read_flat,
     read_part,
-    take_runs,
-    write_dataset,
 )
-from vibroimpact.analysis.dataset.assembling import assembled
-from vibroimpact.analysis.dataset.merging import joined
+from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable
+from vibroimpact.analysis.dataset.flat_file import FlatFile
+from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import MANIFEST, Chunk
+from vibroimpact.orchestrator.campaign.chunks import Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
-    carried_manifest,
     differences,
     flat_scene,
-    new_manifest,
     scene_hash,
-    write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import (
-    NO_RUNS,
-    Note,
     StoredPart,
-    list_parts,
-    own_files,
-    remove_parts_within,
 )
-from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, remove_store
 from vibroimpact.orchestrator.run.dataset import (
     coordinate_names,
     empty_dataset,
     stored_samples,
-    with_constants_of,
 )
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.runner import CARRYING
@@ -71,6 +59,10 @@ Runs = NDArray[np.int64]
 
 SHORTEST_STRETCH = 64
 """Number of neighbouring kept runs that end a chunk, without branches; the worker itself skips shorter stretches."""
+
+
+_OF_STATES = ("run_index", "outcome", "final_state", "final_displacement", "final_velocity")
+"""Variables that tell the state which a run hands on."""
 
 
 def kept_path(folder: Path, scene_hash: str) -> Path:
@@ -220,23 +212,22 @@ def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
 # ---- rows of equal runs ----
 
 
-def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
-    """Return the old rows that the new campaign keeps, with indices and coordinates of the new campaign.
+def kept_runs(old: Scene, new: Scene, known: Runs) -> tuple[Runs, Runs]:
+    """Return the runs that the new campaign keeps, ascending, and the equal run of the old campaign for each.
 
-    `rows` are in run order and one-dimensional; rows may be missing.
+    `known` are the computed runs of the old campaign, ascending.
     """
     sources = same_runs(old, new)
-    known = rows.run_index.values.astype(np.int64)
     place = np.searchsorted(known, sources).clip(max=known.size - 1)
     there = (sources >= 0) & (known[place] == sources)
     if any(axis.continuation for axis in new.sweep):
         branches = there.reshape(-1, _Layout(new.sweep).shape[-1])
         there = np.logical_and.accumulate(branches, axis=1).reshape(-1)
     runs = np.flatnonzero(there)
-    return _on_new_coordinates(take_runs(rows, place[runs]), old, new, runs)
+    return runs, sources[runs]
 
 
-def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> xr.Dataset:
+def on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> xr.Dataset:
     """Return rows with the names, the attributes and the coordinates of the new scene's runs."""
     like = empty_dataset(new)
     values: dict[str, NDArray[Any]] = {"run_index": runs.astype(np.int32), **_coordinates(new, runs)}
@@ -249,7 +240,8 @@ def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) ->
         if str(name) in values:
             variables[str(name)] = (variable.dims, values[str(name)], variable.attrs)
     if "loop_residual" in rows.variables:
-        variables["loop_residual"] = rows.variables["loop_residual"]
+        residual = rows.variables["loop_residual"].values
+        variables["loop_residual"] = (("run",), residual, attributes_of("loop_residual", new.units))
     coords = {str(name): variables.pop(str(name)) for name in like.coords}
     return without_empty_periods(assembled(variables, coords, like.attrs))
 
@@ -282,16 +274,6 @@ def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
 # ---- going on from kept rows ----
 
 
-class SealedStore(Protocol):
-    """A store with the rows of a campaign."""
-
-    def held(self) -> list[StoredPart]:
-        """Return the runs in the store, in run order."""
-
-    def rows(self, path: Path) -> xr.Dataset:
-        """Return the rows of one of them, one-dimensional."""
-
-
 @dataclass(frozen=True, slots=True)
 class Kept:
     """Rows of a campaign that come from an earlier sweep."""
@@ -305,7 +287,10 @@ class Kept:
 
 def read_kept(path: Path, scene: Scene) -> Kept:
     """Return the kept rows of a file; raise DatasetError if it is damaged."""
-    rows = read_flat(path)
+    with FlatFile(path) as file:
+        stored = {str(name): variable for name, variable in file.dataset.variables.items()}
+        data = {name: loaded_variable(stored[name]) for name in _OF_STATES if name in stored}
+    rows = assembled(data, {}, {})
     runs = rows.run_index.values.astype(np.int64)
     layout = _Layout(scene.sweep)
     chained = layout.carried is not None
@@ -359,79 +344,6 @@ def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
         states: NDArray[np.float64] = rows.final_state.values[part]
         return states
     return np.stack([rows.final_displacement.values[part], rows.final_velocity.values[part]], axis=1)
-
-
-@dataclass(frozen=True, slots=True)
-class EarlierSweep:
-    """A campaign in the folder `home`, started with another sweep; `note` gets messages on its kept points.
-
-    `store` is the store of that campaign; None where its dataset is a file.
-    """
-
-    scene: Scene
-    manifest: Manifest
-    home: Path
-    note: Note
-    store: SealedStore | None = None
-
-    @property
-    def _folder(self) -> Path:
-        return self.home / "parts"
-
-    def hand_over(self, new: Scene, runs: int) -> bool:
-        """Hand the folder over to a new sweep; return False where the new sweep keeps no row of the old one.
-
-        The folder belongs to the old sweep until the new manifest is written, and nothing is removed before.
-        """
-        rows, old, hashed = self._rows(), self.manifest, scene_hash(new)
-        manifest = new_manifest(new, old.identity, runs, old.continued_with, shard_points=old.shard_points)
-        if rows is not None:
-            kept = kept_rows(self.scene, new, rows)
-            count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
-            if not count:
-                return False
-            if left:
-                self._store(rows, left)
-            carried = {"scene_hash": hashed, MANIFEST: carried_manifest(manifest, new.source)}
-            write_dataset(kept.assign_attrs(carried), kept_path(self._folder, hashed))
-            self.note(f"{count} of {runs} points are kept from the earlier sweep.")
-        outdated = own_files(self._folder)
-        write_content(self.home / "campaign.json", manifest)
-        for path in outdated:
-            if path != kept_path(self._folder, hashed):
-                path.unlink(missing_ok=True)
-        if self.store is not None:
-            remove_store(self.home / STORE, self.home / SEALS)
-        return True
-
-    def _rows(self) -> xr.Dataset | None:
-        """Return the computed rows, one-dimensional; None without rows."""
-        target = self.home / "dataset.nc"
-        if target.exists() and is_of(read_finished(target).attrs, self.manifest, self.scene):
-            return read_flat(target)
-        path = kept_path(self._folder, self.manifest.scene_hash)
-        kept = read_kept(path, self.scene) if path.exists() else None
-        held = self.store.held() if self.store is not None else []
-        remove_parts_within(self._folder, held)
-        runs = kept.runs if kept is not None else NO_RUNS
-        parts = list_parts(self._folder, self.manifest.scene_hash, self.note, runs)
-        files = [part.path for part in parts]
-        pieces = [self.store.rows(part.path) for part in held] if self.store is not None else []
-        pieces += [read_flat(file) for file in files]
-        if kept is not None:
-            whole, left = read_flat(path), without_held(kept, held).runs
-            pieces.append(take_runs(whole, np.flatnonzero(np.isin(whole.run_index.values, left))))
-            files.append(path)
-        names = [str(file) for file in [*(part.path for part in held), *files]]
-        return joined(pieces, names) if pieces else None
-
-    def _store(self, rows: xr.Dataset, left: int) -> None:
-        """Write all old points to a file of its own, since the new sweep leaves some of them out."""
-        path = self.home / f"earlier-{self.manifest.scene_hash[:8]}.nc"
-        attributed = rows.assign_attrs(self.manifest.attributes(self.scene))
-        attributed.attrs.pop(MANIFEST, None)
-        write_dataset(with_constants_of(attributed, self.scene), path)
-        self.note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
 
 
 def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:

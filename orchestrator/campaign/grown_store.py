@@ -9,14 +9,14 @@ from __future__ import annotations
 import shutil
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import read_flat, take_runs
+from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.analysis.dataset.assembling import new_variable
+from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.schema import RULES, attributes_of
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter, create_store
@@ -70,19 +70,15 @@ def seal_parts(work: Work, complete: ShardParts) -> Seal:
     assert work.store is not None
     shard, pieces = complete.shard, [read_flat(path) for path in complete.paths]
     if complete.kept is not None:
-        kept = _kept_rows(complete.kept)
-        first, stop = np.searchsorted(kept.run_index.values, (shard.first, shard.stop))
-        pieces += [take_runs(kept, np.arange(first, stop))] if stop > first else []
+        with FlatFile(complete.kept) as kept:
+            index = kept.dataset.variables["run_index"].values
+            first, stop = np.searchsorted(index, (shard.first, shard.stop))
+            pieces += [kept.runs(np.arange(first, stop))] if stop > first else []
     rows = joined(pieces, [f"shard {shard.number}"] * len(pieces))
     if not np.array_equal(rows.run_index.values, np.arange(shard.first, shard.stop)):
         raise DatasetError(f"shard {shard.number}: expected each of its runs in one part, got others.")
     attrs = attributes_of_part(work, complete.carried)
     return write_shard(work.store, work.scene, shard, rows, complete.branch, attrs)
-
-
-@lru_cache(maxsize=1)
-def _kept_rows(path: Path) -> xr.Dataset:
-    return read_flat(path)
 
 
 class GrownStore(Destination):

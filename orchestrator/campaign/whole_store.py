@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import xarray as xr
 
 from vibroimpact.analysis.dataset.converting import convert_dataset
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.store_runs import StoreRuns, read_runs
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, attributes_of_part
 from vibroimpact.orchestrator.campaign.destination import Attributes, Destination
@@ -54,6 +54,14 @@ class WholeStore(Destination):
     def rows(self, path: Path) -> xr.Dataset:
         """Return the rows of a part, or of the store."""
         return read_runs(path) if path == self.path else super().rows(path)
+
+    def blocks(self, path: Path) -> Iterator[xr.Dataset]:
+        """Yield the rows of a part, or those of each shard of the store."""
+        if path != self.path:
+            yield from super().blocks(path)
+            return
+        for shard in StoreRuns(path).shards:
+            yield shard.rows()
 
     def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the rows of all parts as one store; return whether a run has a message."""

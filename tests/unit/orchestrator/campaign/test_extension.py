@@ -14,6 +14,7 @@ import xarray as xr
 from support.campaign_scenes import TIMING, assert_same_rows
 from support.serial_pool import Notes, campaign_here
 
+import vibroimpact.analysis.dataset.flat_file as flat_file
 import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
@@ -132,6 +133,26 @@ def test_a_half_done_campaign_is_extended_as_if_it_were_new(
     campaign_here(monkeypatch, new, tmp_path / "new")
     assert report.resumed > 0
     assert_as_if_new(tmp_path / "campaign" / "dataset.nc", tmp_path / "new" / "dataset.nc")
+
+
+@pytest.mark.parametrize("name", ["an axis taken away", "axes the other way round", "more branches"])
+def test_rows_that_are_read_in_stretches_are_the_same(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new, kept = GROWN[name]
+    campaign_here(monkeypatch, old, tmp_path / "campaign")
+    shutil.copytree(tmp_path / "campaign", tmp_path / "at once")
+    with monkeypatch.context() as patch:
+        patch.setattr(flat_file, "LARGE_BYTES", 20_000)
+        assert len(list(flat_file.blocks_of(tmp_path / "campaign" / "dataset.nc"))) > 1
+        assert campaign_here(patch, new, tmp_path / "campaign").resumed == kept
+    campaign_here(monkeypatch, new, tmp_path / "at once")
+    assert_as_if_new(tmp_path / "campaign" / "dataset.nc", tmp_path / "at once" / "dataset.nc")
+    for one in (tmp_path / "campaign").glob("earlier-*.nc"):
+        xr.testing.assert_identical(read_flat(one), read_flat(tmp_path / "at once" / one.name))
+    assert sorted(path.name for path in (tmp_path / "campaign").iterdir()) == sorted(
+        path.name for path in (tmp_path / "at once").iterdir()
+    )
 
 
 def test_points_that_the_new_sweep_does_not_have_are_not_thrown_away(

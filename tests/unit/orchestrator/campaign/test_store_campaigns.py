@@ -44,27 +44,46 @@ KINDS = {
 
 @pytest.fixture(autouse=True)
 def _small_shards(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(formats, "SHARD_POINTS", 8)
-    monkeypatch.setattr(schedule, "FIRST_POINTS", 3)
+    make_shards_small(monkeypatch)
 
 
-@pytest.fixture
-def expected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    campaign_here(monkeypatch, MAP, tmp_path / "expected")
-    return tmp_path / "expected"
+def make_shards_small(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(formats, "SHARD_POINTS", 8)
+    patch.setattr(schedule, "FIRST_POINTS", 3)
 
 
-@pytest.fixture
-def half(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder of a campaign with a sealed shard, a second one in parts, and a part of the third."""
-    with monkeypatch.context() as patch:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with campaigns of the map: `expected` as a file, `half` and `finished` as a store."""
+    home = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        make_shards_small(patch)
+        campaign_here(patch, MAP, home / "expected")
+        campaign_here(patch, MAP, home / "finished", format="zarr")
         for name, value in {"MOST_POINTS": 3, "SHARD_SECONDS": 0.0, "LAST_SHARD_SECONDS": 0.0}.items():
             patch.setattr(schedule, name, value)
         with pytest.raises(CampaignInterrupted, match="19 of 20 points are complete"):
-            campaign_here(patch, MAP, tmp_path / "half", most_chunks=8, format="zarr")
-    assert len(seals_of(tmp_path / "half")) == 1
-    assert len(list((tmp_path / "half" / "parts").glob("branch-*.nc"))) == 4
-    return tmp_path / "half"
+            campaign_here(patch, MAP, home / "half", most_chunks=8, format="zarr")
+    assert len(seals_of(home / "half")) == 1
+    assert len(list((home / "half" / "parts").glob("branch-*.nc"))) == 4
+    return home
+
+
+@pytest.fixture
+def expected(made: Path) -> Path:
+    return made / "expected"
+
+
+@pytest.fixture
+def half(made: Path, tmp_path: Path) -> Path:
+    """Return the folder of a campaign with a sealed shard, a second one in parts, and a part of the third."""
+    return shutil.copytree(made / "half", tmp_path / "half")
+
+
+@pytest.fixture
+def finished(made: Path, tmp_path: Path) -> Path:
+    """Return the folder of a campaign whose store is finished."""
+    return shutil.copytree(made / "finished", tmp_path / "finished")
 
 
 def seals_of(folder: Path) -> list[Path]:
@@ -135,30 +154,43 @@ SHARD_DAMAGES = [
 def test_a_damaged_shard_is_named_by_its_seal_and_computed_again(
     name: str,
     damage: Callable[[Path], None],
-    half: Path,
+    finished: Path,
     expected: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for finished in (False, True):
-        notes = Notes()
-        damage(half / name)
-        report = campaign_here(monkeypatch, MAP, half, notes=notes)
-        assert notes.lines[0].startswith("shard-000000 of the store was damaged; its points come again: ")
-        assert not finished or (report.resumed, report.runs) == (12, 20)
-        assert_same_datasets(half, expected)
+    notes = Notes()
+    damage(finished / name)
+    report = campaign_here(monkeypatch, MAP, finished, notes=notes)
+    assert notes.lines[0].startswith("shard-000000 of the store was damaged; its points come again: ")
+    assert (report.resumed, report.runs) == (12, 20)
+    assert_same_datasets(finished, expected)
 
 
-@pytest.mark.parametrize("name", ["zarr.json", "outcome/zarr.json", "amplitude/c/0"])
-def test_damaged_metadata_are_written_again_and_no_point_is_computed(
-    name: str, tmp_path: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_damaged_shard_of_an_unfinished_store_is_computed_again(
+    half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "store"
-    campaign_here(monkeypatch, MAP, folder, format="zarr")
-    for damage in (flip, cut, Path.unlink):
-        damage(folder / "dataset.zarr" / name)
-        report = campaign_here(monkeypatch, MAP, folder)
-        assert (report.resumed, report.chunks) == (20, [])
-        assert_same_datasets(folder, expected)
+    notes = Notes()
+    flip(half / SHARD_DAMAGES[0][0])
+    report = campaign_here(monkeypatch, MAP, half, notes=notes)
+    assert notes.lines[0].startswith("shard-000000 of the store was damaged; its points come again: ")
+    assert report.resumed == 11
+    assert_same_datasets(half, expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"), [("zarr.json", flip), ("outcome/zarr.json", Path.unlink), ("amplitude/c/0", cut)]
+)
+def test_damaged_metadata_are_written_again_and_no_point_is_computed(
+    name: str,
+    damage: Callable[[Path], None],
+    finished: Path,
+    expected: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    damage(finished / "dataset.zarr" / name)
+    report = campaign_here(monkeypatch, MAP, finished)
+    assert (report.resumed, report.chunks) == (20, [])
+    assert_same_datasets(finished, expected)
 
 
 def test_a_shard_that_changes_after_its_seal_is_computed_again_by_the_same_command(
@@ -235,8 +267,19 @@ GROWN = {
 }
 
 
-@pytest.mark.parametrize("change", GROWN)
-@pytest.mark.parametrize("most_chunks", [1, None], ids=["half done", "finished"])
+ALSO_HALF_DONE = ("finer", "a longer path")
+
+
+@pytest.mark.parametrize(
+    ("change", "most_chunks"),
+    [
+        *((change, None) for change in GROWN),
+        *(
+            pytest.param(change, 1, marks=() if change in ALSO_HALF_DONE else pytest.mark.long)
+            for change in GROWN
+        ),
+    ],
+)
 def test_an_extended_store_equals_a_new_one(
     change: str, most_chunks: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -253,14 +296,15 @@ def test_an_extended_store_equals_a_new_one(
     assert_same_datasets(folder, tmp_path / "new")
 
 
-def test_the_format_of_a_campaign_stays(half: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_format_of_a_campaign_stays(
+    half: Path, expected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(UsageError, match="started, zarr, got netcdf"):
         campaign_here(monkeypatch, MAP, half, format="netcdf")
     with pytest.raises(UsageError, match='expected "netcdf" or "zarr", got \'nc\''):
         run_campaign(scene_of(MAP), tmp_path / "new", format="nc")  # type: ignore[arg-type]  # of a careless caller
-    campaign_here(monkeypatch, MAP, tmp_path / "file")
     with pytest.raises(UsageError, match="started, netcdf, got zarr"):
-        campaign_here(monkeypatch, MAP, tmp_path / "file", format="zarr")
+        campaign_here(monkeypatch, MAP, expected, format="zarr")
 
 
 def test_the_store_of_another_scene_is_refused_in_one_line(
