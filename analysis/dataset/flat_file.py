@@ -18,8 +18,10 @@ from vibroimpact.analysis.files.opening import one_error
 from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import DatasetError
 
-LARGE_BYTES = 128 << 20
-"""Size of a file, bytes, above which its runs are read in stretches: each takes about this size in memory."""
+LARGE_BYTES = 48 << 20
+"""Size of a file, bytes, above which its runs are read in stretches; reading a smaller file at once is faster."""
+STRETCH_BYTES = 16 << 20
+"""Size of a stretch of runs in its file, bytes; joining takes some four times as much memory."""
 _FAR = 1 << 16
 """Distance of runs in a file from which they are read apart."""
 
@@ -62,9 +64,9 @@ class FlatFile:
         self.close()
 
     def stretches(self) -> Iterator[NDArray[np.int64]]:
-        """Yield the places of neighbouring runs that take about `LARGE_BYTES` in the file, from the first run on."""
+        """Yield the places of neighbouring runs that take about `STRETCH_BYTES` in the file, from the first run on."""
         runs = self.dataset.sizes["run"]
-        most = max(runs * LARGE_BYTES // max(os.path.getsize(self._path), 1), 1)
+        most = max(runs * STRETCH_BYTES // max(os.path.getsize(self._path), 1), 1)
         for first in range(0, runs, most):
             yield np.arange(first, min(first + most, runs))
 
@@ -72,7 +74,12 @@ class FlatFile:
         """Return the runs at some places, ascending, with their rows, in memory."""
         pieces = np.split(places, np.flatnonzero(np.diff(places) > _FAR) + 1)
         with one_error(self._path):
-            found = [take_runs(self._stretch(one[0], one[-1] + 1), one - one[0]) for one in pieces]
+            found = [
+                take_runs(self._stretch(one[0], one[-1] + 1), one - one[0])
+                if one.size
+                else self._stretch(0, 0)
+                for one in pieces
+            ]
         return joined(found, [os.fspath(self._path)] * len(found))
 
     def _stretch(self, first: int, stop: int) -> xr.Dataset:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.flat_file import FlatFile, is_large
 from vibroimpact.analysis.dataset.merging import joined, refuse_unlike, take_runs
-from vibroimpact.analysis.dataset.reading import read_flat, read_head
+from vibroimpact.analysis.dataset.reading import FileOfRuns, read_flat
 from vibroimpact.analysis.dataset.storing import stored_variables
 from vibroimpact.analysis.dataset.writing import define_variable, store_texts
 from vibroimpact.analysis.files.atomic import whole_or_absent
@@ -32,6 +32,8 @@ from vibroimpact.analysis.files.fingerprints import seal
 from vibroimpact.analysis.files.open_files import netcdf_lock
 from vibroimpact.fmus.errors import DatasetError
 
+_MOST_OPEN = 128
+"""Largest number of files that stay open from the look at their form to the reading of their runs."""
 _HEAD_BYTES = 1 << 16
 """Space reserved for names and attributes, bytes; more of them grow the file later."""
 
@@ -44,7 +46,7 @@ def join_files(
     """Write the runs of dataset files into one file, ordered by `run_index`; return whether any run has a message.
 
     Values, attributes and form are those of `merge_datasets` and `write_dataset`. Files whose runs lie between the
-    runs of others are in memory together; other files are in memory one at a time, large ones in stretches.
+    runs of others are in memory together. Other files are in memory one at a time; large ones in stretches.
 
     Parameters
     ----------
@@ -83,10 +85,12 @@ class _File:
     path: str
     first: int
     last: int
+    opened: FileOfRuns | None
+    """The file itself; None where too many others are open."""
 
     def rows(self) -> xr.Dataset:
         """Return the runs of the file in the order of their index."""
-        rows = read_flat(self.path)
+        rows = read_flat(self.path) if self.opened is None else self.opened.rows()
         index = rows.variables["run_index"].values
         return take_runs(rows, np.argsort(index)) if (np.diff(index) < 0).any() else rows
 
@@ -123,15 +127,21 @@ def _survey(
     form: xr.Dataset | None = None
     files, sizes, first_name = list[Piece](), dict[str, int](), os.fspath(paths[0])
     for path in [os.fspath(path) for path in paths]:
-        head = read_head(path)
+        file = FileOfRuns(path)
+        opened.callback(file.close)
+        head = file.head(form)
         form = head.form if form is None else form
-        if not _are_alike(form, head.form):
+        if head.form is not form and not _are_alike(form, head.form):
             form = joined([form, head.form], [first_name, path])
         sizes = {name: sizes.get(name, 0) + head.sizes.get(name, 0) for name in sizes | head.sizes}
+        kept = None
         if head.ascends and is_large(path):
             files += _stretches(opened.enter_context(FlatFile(path)), path)
         elif head.sizes["run"]:
-            files.append(_File(path, head.first, head.last))
+            kept = file if len(files) < _MOST_OPEN else None
+            files.append(_File(path, head.first, head.last, kept))
+        if kept is None:
+            file.close()
     assert form is not None
     return form, sorted(files, key=lambda file: file.first), sizes
 

@@ -26,7 +26,8 @@ from vibroimpact.analysis.dataset.schema import (
 )
 from vibroimpact.analysis.dataset.storing import as_read
 from vibroimpact.analysis.files.lazy_store import LazyStore
-from vibroimpact.analysis.files.opening import one_error, opened_netcdf
+from vibroimpact.analysis.files.open_files import OpenFile, give_back, netcdf_lock
+from vibroimpact.analysis.files.opening import one_error, opened_netcdf, taken
 from vibroimpact.analysis.files.probing import check_sound, refuse_changed
 from vibroimpact.analysis.files.stores import Place, is_store
 from vibroimpact.fmus.errors import DatasetError
@@ -86,11 +87,15 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
         If the file is missing, damaged or foreign.
     """
     with _opened(path) as file:
-        data = {
-            name: (variable.dimensions, _values(file, name), _attributes(variable))
-            for name, variable in file.variables.items()
-        }
-        return fitting(path, _as_flat(file, data))
+        return _flat(path, file)
+
+
+def _flat(path: str | os.PathLike[str], file: netCDF4.Dataset) -> xr.Dataset:
+    data = {
+        name: (variable.dimensions, _values(file, name), _attributes(variable))
+        for name, variable in file.variables.items()
+    }
+    return fitting(path, _as_flat(file, data))
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,25 +121,76 @@ class Head:
     ascends: bool
 
 
-def read_head(path: str | os.PathLike[str]) -> Head:
-    """Read the form of a file; DatasetError as in `read_flat`."""
-    with _opened(path) as file:
-        along = ("run", *RAGGED)
-        data: dict[str, Any] = {}
-        for name, variable in file.variables.items():
-            is_shared = variable.dimensions[:1] not in {(dimension,) for dimension in along}
-            none = np.empty(
-                (0, *variable.shape[1:]), dtype=object if variable.dtype is str else variable.dtype
+class FileOfRuns:
+    """A file of runs that is checked and opened once, and read twice: first its form, then its runs.
+
+    DatasetError: see `read_flat`.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self._file: OpenFile | None = None
+        with one_error(path):
+            self._file = taken(path)
+        try:
+            with self._used() as file:
+                refuse_foreign(path, file.ncattrs(), file.variables)
+        except DatasetError:
+            self.close()
+            raise
+
+    @contextmanager
+    def _used(self) -> Iterator[netCDF4.Dataset]:
+        assert self._file is not None
+        with one_error(self.path), netcdf_lock():
+            self._file.root.set_auto_maskandscale(False)
+            yield self._file.root
+
+    def close(self) -> None:
+        """Close the file; nothing happens if it is closed."""
+        file, self._file = self._file, None
+        if file is not None:
+            with netcdf_lock():
+                give_back(file)
+
+    def rows(self) -> xr.Dataset:
+        """Return all runs in memory, and close the file."""
+        with self._used() as file:
+            rows = _flat(self.path, file)
+        self.close()
+        return rows
+
+    def head(self, like: xr.Dataset | None = None) -> Head:
+        """Return the form of the file; `like` is a form that it may have."""
+        with self._used() as file:
+            index = file.variables["run_index"][:]
+            return Head(
+                like if like is not None and _has_form(file, like) else _form(file),
+                {name: file.dimensions[name].size for name in _ALONG if name in file.dimensions},
+                int(index.min(initial=index[0])) if index.size else -1,
+                int(index.max(initial=-1)),
+                not (np.diff(index) <= 0).any(),
             )
-            data[name] = (variable.dimensions, variable[...] if is_shared else none, _attributes(variable))
-        index = file.variables["run_index"][:]
-        return Head(
-            _as_flat(file, data),
-            {name: file.dimensions[name].size for name in along if name in file.dimensions},
-            int(index.min(initial=index[0])) if index.size else -1,
-            int(index.max(initial=-1)),
-            not (np.diff(index) <= 0).any(),
-        )
+
+
+_ALONG = ("run", *RAGGED)
+
+
+def _form(file: netCDF4.Dataset) -> xr.Dataset:
+    """Return a file without its runs and rows."""
+    data: dict[str, Any] = {}
+    for name, variable in file.variables.items():
+        kind = object if variable.dtype is str else variable.dtype
+        is_shared = variable.dimensions[:1] not in {(dimension,) for dimension in _ALONG}
+        values = variable[...] if is_shared else np.empty((0, *variable.shape[1:]), dtype=kind)
+        data[name] = (variable.dimensions, values, _attributes(variable))
+    return _as_flat(file, data)
+
+
+def _has_form(file: netCDF4.Dataset, form: xr.Dataset) -> bool:
+    """Return whether a file has the variables of a form, with equal dimensions besides runs and rows."""
+    own = {name: (one.dimensions, one.shape[1:]) for name, one in file.variables.items()}
+    return own == {name: (one.dims, one.shape[1:]) for name, one in form.variables.items()}
 
 
 def _as_flat(file: netCDF4.Dataset, data: dict[str, Any]) -> xr.Dataset:

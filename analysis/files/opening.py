@@ -9,7 +9,7 @@ from typing import Any
 
 import netCDF4
 
-from vibroimpact.analysis.files.open_files import reading
+from vibroimpact.analysis.files.open_files import OpenFile, give_back, netcdf_lock, reading, take
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
 from vibroimpact.analysis.files.store_attributes import attributes_read
 from vibroimpact.analysis.files.stores import is_store, opened_group
@@ -54,6 +54,22 @@ def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
         with reading(os.path.abspath(path)) as file:
             refuse_changed(path, state)
             yield file
+
+
+def taken(path: str) -> OpenFile:
+    """Return a file that is known to be sound, open until `open_files.give_back`.
+
+    UnsoundFileError or OSError: the file cannot be used.
+    """
+    state = check_sound(path)
+    with netcdf_lock():
+        file = take(os.path.abspath(path))
+        try:
+            refuse_changed(path, state)
+        except BaseException:
+            give_back(file)
+            raise
+        return file
 
 
 def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError:

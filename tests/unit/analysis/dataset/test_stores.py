@@ -69,11 +69,14 @@ def assert_there_and_back(file: Path, place: str | Path, back: Path) -> None:
             assert {n: v.dtype for n, v in found.variables.items()} == {
                 n: v.dtype for n, v in expected.variables.items()
             }
-    for found in (read_runs(place), read_flat(back)):
-        xr.testing.assert_identical(read_flat(file), found)
-        assert_same_attributes(read_flat(file), found)
-        order = [[n for n in one.coords if n not in LABELS.values()] for one in (found, read_flat(file))]
-        assert order[0] == order[1]
+    assert_same_runs(read_flat(back), read_flat(file))
+
+
+def assert_same_runs(found: xr.Dataset, expected: xr.Dataset) -> None:
+    xr.testing.assert_identical(expected, found)
+    assert_same_attributes(expected, found)
+    order = [[n for n in one.coords if n not in LABELS.values()] for one in (found, expected)]
+    assert order[0] == order[1]
 
 
 def by_runs(opened: xr.Dataset) -> xr.Dataset:
@@ -84,9 +87,9 @@ def by_runs(opened: xr.Dataset) -> xr.Dataset:
 
 @pytest.fixture
 def small_shards(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cut stores into chunks of 2 and shards of about 4 points."""
+    """Cut stores into chunks of 2 and shards of about 6 points."""
     monkeypatch.setattr(store_grid, "CHUNK_POINTS", 2)
-    monkeypatch.setattr(store_grid, "SHARD_POINTS", 4)
+    monkeypatch.setattr(store_grid, "SHARD_POINTS", 6)
 
 
 def grid_of_runs() -> xr.Dataset:
@@ -113,8 +116,8 @@ DATASETS: dict[str, Callable[[], xr.Dataset]] = {
     "grid": grid_of_runs,
     "shared dimension": along_one_dimension,
     "scattered": lambda: dataset_of(
-        [record(float(k), impacts=k) for k in range(30)],
-        coordinates={"mass": np.arange(30.0), "restitution": np.arange(30.0) ** 2},
+        [record(float(k), impacts=k) for k in range(10)],
+        coordinates={"mass": np.arange(10.0), "restitution": np.arange(10.0) ** 2},
     ),
     "one run": lambda: with_constants(
         dataset_of([record(1.0, impacts=3)], coordinates={}), {"mass": 2.0}, unit_of={"mass": "kg"}
@@ -138,7 +141,7 @@ def test_a_store_without_small_shards_is_the_same_dataset_too(tmp_path: Path) ->
     assert_there_and_back(tmp_path / "a.nc", tmp_path / "a.zarr", tmp_path / "b.nc")
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(st.data())
 def test_any_sweep_is_the_same_in_any_cut(data: st.DataObject) -> None:
     check_any_sweep(data)
@@ -324,6 +327,10 @@ def test_runs_with_a_variable_that_the_store_lacks_are_refused(made: Path) -> No
     runs["loop_residual"] = runs["final_phase"]
     with pytest.raises(DatasetError, match=r"variables of the store, got loop_residual too"):
         writer.write_shard(block, runs)
+
+
+def test_the_runs_of_a_store_are_those_of_its_file(made: Path) -> None:
+    assert_same_runs(read_runs(made), read_flat(made.parent / "a.nc"))
 
 
 # ---- what strangers may write ----
@@ -569,7 +576,14 @@ def test_a_shard_that_is_lost_is_one_error(made: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["describe", "classify", "plot -o a.png", "plot -o a.png --run 3", "estimate impacts --run 3"]
+    "words",
+    [
+        "describe",
+        "classify",
+        "plot -o a.png --run 3",
+        pytest.param("plot -o a.png", marks=pytest.mark.long),
+        pytest.param("estimate impacts --run 3", marks=pytest.mark.long),
+    ],
 )
 def test_commands_say_of_a_store_what_they_say_of_its_file(
     made: Path, monkeypatch: pytest.MonkeyPatch, words: str

@@ -20,39 +20,7 @@ from vibroimpact.analysis.figures.sweep.map_overview import block_classes, block
 
 SIDE, LENGTH = 40, 4
 """Points of a map along each dimension, and of a block."""
-Maker = Callable[[NDArray[np.float64]], xr.Dataset]
-
-
-@pytest.fixture
-def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Maker:
-    """Opens a map of ranges as the store of a large map."""
-    monkeypatch.setattr(store_grid, "CHUNK_POINTS", 2 * SIDE)
-    monkeypatch.setattr(store_grid, "SHARD_POINTS", 13 * SIDE)
-    monkeypatch.setattr(overview, "SHARD_POINTS", 13 * SIDE)
-    monkeypatch.setattr(overview, "MOST_BLOCKS", SIDE // LENGTH)
-
-    def make(ranges: NDArray[np.float64]) -> xr.Dataset:
-        y, x = np.divmod(np.arange(SIDE**2), SIDE)
-        dataset = (
-            dataset_of(
-                [record(0.0, impacts=1) for _ in range(SIDE**2)],
-                coordinates={"mass": y.astype(float), "restitution": x.astype(float)},
-                measured={
-                    "class_kind": np.full(SIDE**2, OrbitClass.periodic),
-                    "class_impacts": np.ones(SIDE**2, dtype=np.int32),
-                    "class_periods": np.where(ranges.ravel() > 5.0, 3, 1),
-                    CLASS_COLUMNS[-1]: np.full(SIDE**2, "", dtype=object),
-                },
-            )
-            .drop_dims("sample")
-            .drop_vars("sample_count")
-        )
-        dataset["displacement_max"][:] = ranges.reshape(-1, 1)
-        dataset["displacement_min"][:] = np.where(np.isnan(ranges), np.nan, 0.0).reshape(-1, 1)
-        write_dataset(dataset, tmp_path / "a.nc")
-        return vi.convert(tmp_path / "a.nc", tmp_path / "a.zarr")
-
-    return make
+Opener = Callable[[str], xr.Dataset]
 
 
 def smooth() -> NDArray[np.float64]:
@@ -60,10 +28,66 @@ def smooth() -> NDArray[np.float64]:
     return np.asarray(1.0 + 0.5 * x + 0.3 * y * y)
 
 
-def test_isolated_extremes_and_gaps_stay_in_the_overview(opened: Maker) -> None:
+def with_extremes() -> NDArray[np.float64]:
     ranges = smooth()
     ranges[7, 11], ranges[21, 30], ranges[33, 2] = 9.0, 0.1, np.nan
-    with opened(ranges) as dataset:
+    return ranges
+
+
+MAPS = {
+    "smooth": smooth(),
+    "extremes": with_extremes(),
+    "noise": np.random.default_rng(0).uniform(1.0, 2.0, (SIDE, SIDE)),
+}
+
+
+def map_of(ranges: NDArray[np.float64]) -> xr.Dataset:
+    y, x = np.divmod(np.arange(SIDE**2), SIDE)
+    dataset = (
+        dataset_of(
+            [record(0.0, impacts=1) for _ in range(SIDE**2)],
+            coordinates={"mass": y.astype(float), "restitution": x.astype(float)},
+            measured={
+                "class_kind": np.full(SIDE**2, OrbitClass.periodic),
+                "class_impacts": np.ones(SIDE**2, dtype=np.int32),
+                "class_periods": np.where(ranges.ravel() > 5.0, 3, 1),
+                CLASS_COLUMNS[-1]: np.full(SIDE**2, "", dtype=object),
+            },
+        )
+        .drop_dims("sample")
+        .drop_vars("sample_count")
+    )
+    dataset["displacement_max"][:] = ranges.reshape(-1, 1)
+    dataset["displacement_min"][:] = np.where(np.isnan(ranges), np.nan, 0.0).reshape(-1, 1)
+    return dataset
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the stores, each of which is made once."""
+    return tmp_path_factory.mktemp("maps")
+
+
+@pytest.fixture
+def opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Opener:
+    """Open a map of ranges by its name, as the store of a large map."""
+    monkeypatch.setattr(store_grid, "CHUNK_POINTS", 2 * SIDE)
+    monkeypatch.setattr(store_grid, "SHARD_POINTS", 13 * SIDE)
+    monkeypatch.setattr(overview, "SHARD_POINTS", 13 * SIDE)
+    monkeypatch.setattr(overview, "MOST_BLOCKS", SIDE // LENGTH)
+
+    def make(name: str) -> xr.Dataset:
+        if not (folder / f"{name}.zarr").exists():
+            write_dataset(map_of(MAPS[name]), folder / f"{name}.nc")
+            vi.convert(folder / f"{name}.nc", folder / f"{name}.zarr").close()
+        return vi.open_dataset(folder / f"{name}.zarr")
+
+    return make
+
+
+def test_isolated_extremes_and_gaps_stay_in_the_overview(opened: Opener) -> None:
+    ranges = MAPS["extremes"]
+    with opened("extremes") as dataset:
         found = block_values(dataset, "displacement_range")
         assert found is not None
         assert found.values.shape == (len(found.starts["mass"]), len(found.starts["restitution"]))
@@ -83,8 +107,8 @@ def test_isolated_extremes_and_gaps_stay_in_the_overview(opened: Maker) -> None:
         assert np.nanmin(found.spread) == 0.1
 
 
-def test_a_smooth_map_has_the_values_of_its_points(opened: Maker) -> None:
-    with opened(smooth()) as dataset:
+def test_a_smooth_map_has_the_values_of_its_points(opened: Opener) -> None:
+    with opened("smooth") as dataset:
         found = block_values(dataset, "displacement_range")
         assert found is not None
         inside = {dim: np.minimum(first + LENGTH // 2, SIDE - 1) for dim, first in found.starts.items()}
@@ -95,18 +119,15 @@ def test_a_smooth_map_has_the_values_of_its_points(opened: Maker) -> None:
             assert vi.draw(dataset, kind) is not None
 
 
-def test_noise_is_drawn_by_points_and_not_by_extremes(opened: Maker) -> None:
-    ranges = np.random.default_rng(0).uniform(1.0, 2.0, (SIDE, SIDE))
-    with opened(ranges) as dataset:
+def test_noise_is_drawn_by_points_and_not_by_extremes(opened: Opener) -> None:
+    with opened("noise") as dataset:
         found = block_values(dataset, "displacement_range")
         assert found is not None
         assert abs(found.values.values.mean() - 1.5) < 0.1
 
 
-def test_the_rarest_class_of_a_block_stays(opened: Maker) -> None:
-    ranges = smooth()
-    ranges[7, 11] = 9.0
-    with opened(ranges) as dataset:
+def test_the_rarest_class_of_a_block_stays(opened: Opener) -> None:
+    with opened("extremes") as dataset:
         found = block_classes(dataset)
         assert found is not None
         classes, _ = found
@@ -114,8 +135,8 @@ def test_the_rarest_class_of_a_block_stays(opened: Maker) -> None:
         assert set(np.unique(classes["class_periods"])) == {1, 3}
 
 
-def test_a_selection_or_changed_values_have_no_overview(opened: Maker) -> None:
-    with opened(smooth()) as dataset:
+def test_a_selection_or_changed_values_have_no_overview(opened: Opener) -> None:
+    with opened("smooth") as dataset:
         assert block_values(dataset.isel(mass=slice(0, 30)), "displacement_range") is None
         assert block_values(dataset.isel(mass=slice(0, 30)), "largest_impact_velocity") is None
         assert (

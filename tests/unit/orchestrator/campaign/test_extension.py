@@ -144,6 +144,7 @@ def test_rows_that_are_read_in_stretches_are_the_same(
     shutil.copytree(tmp_path / "campaign", tmp_path / "at once")
     with monkeypatch.context() as patch:
         patch.setattr(flat_file, "LARGE_BYTES", 20_000)
+        patch.setattr(flat_file, "STRETCH_BYTES", 20_000)
         assert len(list(flat_file.blocks_of(tmp_path / "campaign" / "dataset.nc"))) > 1
         assert campaign_here(patch, new, tmp_path / "campaign").resumed == kept
     campaign_here(monkeypatch, new, tmp_path / "at once")
