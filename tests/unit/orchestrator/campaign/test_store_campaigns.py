@@ -40,6 +40,7 @@ KINDS = {
     "adaptive": ADAPTIVE,
     "one point": BODY.replace("[sweep]\n", ""),
 }
+LONG_KINDS = ("descending", "branches")
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +92,7 @@ def seals_of(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.long if kind == "descending" else ()) for kind in KINDS]
+    "kind", [pytest.param(kind, marks=pytest.mark.long if kind in LONG_KINDS else ()) for kind in KINDS]
 )
 def test_a_store_equals_the_file_of_the_same_campaign(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -111,7 +112,9 @@ def test_a_store_equals_the_file_of_the_same_campaign(
     assert (again.resumed, again.chunks) == (report.runs, [])
 
 
-@pytest.mark.parametrize("runner", [DEFAULT_RUNNER, "support.busy_runner:SceneRunner"])
+@pytest.mark.parametrize(
+    "runner", [DEFAULT_RUNNER, pytest.param("support.busy_runner:SceneRunner", marks=pytest.mark.long)]
+)
 def test_a_shard_that_runs_in_pieces_has_the_same_rows(
     runner: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,7 +149,7 @@ def cut(path: Path) -> None:
 
 SHARD_DAMAGES = [
     ("dataset.zarr/outcome/c/0/0", flip),
-    ("dataset.zarr/final_phase/c/0/0", cut),
+    pytest.param("dataset.zarr/final_phase/c/0/0", cut, marks=pytest.mark.long),
     ("dataset.zarr/impact_time/c/0/0", Path.unlink),
     ("seals/shard-000000.json", flip),
 ]
@@ -168,11 +171,12 @@ def test_a_damaged_shard_is_named_by_its_seal_and_computed_again(
     assert_same_datasets(finished, expected)
 
 
+@pytest.mark.long
 def test_a_damaged_shard_of_an_unfinished_store_is_computed_again(
     half: Path, expected: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes = Notes()
-    flip(half / SHARD_DAMAGES[0][0])
+    flip(half / "dataset.zarr/outcome/c/0/0")
     report = campaign_here(monkeypatch, MAP, half, notes=notes)
     assert notes.lines[0].startswith("shard-000000 of the store was damaged; its points come again: ")
     assert report.resumed == 11
@@ -269,13 +273,13 @@ GROWN = {
 }
 
 
-LONG = {("an axis more", None), *((change, 1) for change in GROWN if change != "a longer path")}
+SHORT = {("finer", None), ("a sweep of a run", None), ("a longer path", 1)}
 
 
 @pytest.mark.parametrize(
     ("change", "most_chunks"),
     [
-        pytest.param(change, most, marks=pytest.mark.long if (change, most) in LONG else ())
+        pytest.param(change, most, marks=() if (change, most) in SHORT else pytest.mark.long)
         for change in GROWN
         for most in (1, None)
     ],
