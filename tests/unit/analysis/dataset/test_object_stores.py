@@ -19,6 +19,9 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import dataset_place, write_dataset
 from vibroimpact.fmus.errors import DatasetError
 
+pytestmark = pytest.mark.long
+"""The server alone takes seconds; stores in memory have the same path through fsspec."""
+
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
@@ -84,7 +87,6 @@ def test_a_store_in_a_bucket_is_the_dataset_of_its_file(
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.long
 def test_a_bucket_that_is_gone_or_refuses_is_one_line(
     bucket: s3fs.S3FileSystem, file: Path, monkeypatch: pytest.MonkeyPatch, endpoint: str
 ) -> None:

@@ -119,6 +119,7 @@ def test_a_smooth_map_has_the_values_of_its_points(opened: Opener) -> None:
             assert vi.draw(dataset, kind) is not None
 
 
+@pytest.mark.long
 def test_noise_is_drawn_by_points_and_not_by_extremes(opened: Opener) -> None:
     with opened("noise") as dataset:
         found = block_values(dataset, "displacement_range")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.campaign_scenes import scene_of
@@ -45,6 +45,7 @@ def on_block(grid: SweepGrid, shard: Shard, values: NDArray[Any]) -> NDArray[Any
     return placed.reshape([cells.stop - cells.start for cells in shard.block])
 
 
+@settings(max_examples=40)
 @given(sweeps(), st.sampled_from([1, 2, 3, 5, 8, 20, 100, 2**20]))
 def test_each_run_lies_in_one_cell_with_its_values(scene: Scene, size: int) -> None:
     grid = grid_of(scene, size)
@@ -69,6 +70,7 @@ def test_each_run_lies_in_one_cell_with_its_values(scene: Scene, size: int) -> N
     assert sorted(shard.number for shard in grid.shards) == list(range(grid.cells.shards))
 
 
+@settings(max_examples=40)
 @given(sweeps(), st.sampled_from([1, 2, 3, 5, 8, 20, 100]))
 def test_a_shard_is_made_of_whole_chunks_and_has_its_objects_alone(scene: Scene, size: int) -> None:
     grid = grid_of(scene, size)

@@ -273,7 +273,7 @@ GROWN = {
 }
 
 
-SHORT = {("finer", None), ("a sweep of a run", None), ("a longer path", 1)}
+SHORT = {("finer", None), ("a longer path", 1)}
 
 
 @pytest.mark.parametrize(
