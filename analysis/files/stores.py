@@ -117,7 +117,8 @@ def _store(place: Place, *, read_only: bool) -> Any:
     from zarr.storage import FsspecStore, LocalStore
 
     if is_address(place):
-        return FsspecStore.from_url(os.fspath(place), read_only=read_only)
+        options = {"use_listings_cache": False}
+        return FsspecStore.from_url(os.fspath(place), storage_options=options, read_only=read_only)
     return LocalStore(Path(place).absolute(), read_only=read_only)
 
 
@@ -142,7 +143,11 @@ def system_of(place: Place) -> tuple[Any, str]:
     """Return the file system of a place, and its path there."""
     from fsspec.core import url_to_fs
 
-    system, root = url_to_fs(os.fspath(place) if is_address(place) else os.path.abspath(place))
+    if is_address(place):
+        # other processes write here, too: a remembered listing would hide their objects
+        system, root = url_to_fs(os.fspath(place), use_listings_cache=False)
+    else:
+        system, root = url_to_fs(os.path.abspath(place))
     return system, str(root).rstrip("/")
 
 
@@ -175,10 +180,11 @@ def has_object(place: Place, key: str) -> bool:
     return bool(system.isfile(f"{root}/{key}"))
 
 
-def objects_below(place: Place, prefix: str) -> list[str]:
-    """Return the keys of the objects of a store below a prefix."""
+def objects_below(place: Place, prefix: str = "") -> list[str]:
+    """Return the keys of the objects of a store below a prefix; by default of all."""
     system, root = system_of(place)
-    return [str(path).removeprefix(f"{root}/") for path in system.find(f"{root}/{prefix}")]
+    found = system.find(f"{root}/{prefix}" if prefix else root)
+    return [str(path).removeprefix(f"{root}/") for path in found]
 
 
 def new_array(

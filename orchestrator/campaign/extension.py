@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +30,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.merging import joined
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.chunks import MANIFEST, Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
@@ -74,7 +76,7 @@ SHORTEST_STRETCH = 64
 """Number of neighbouring kept runs that end a chunk, without branches; the worker itself skips shorter stretches."""
 
 
-def kept_path(folder: Path, scene_hash: str) -> Path:
+def kept_path(folder: AnyPath, scene_hash: str) -> AnyPath:
     """Return the path of the kept rows of an extended campaign; only extended campaigns have the file."""
     return folder / f"kept-{scene_hash[:16]}.nc"
 
@@ -289,7 +291,7 @@ class SealedStore(Protocol):
     def held(self) -> list[StoredPart]:
         """Return the runs in the store, in run order."""
 
-    def rows(self, path: Path) -> xr.Dataset:
+    def rows(self, path: AnyPath) -> xr.Dataset:
         """Return the rows of one of them, one-dimensional."""
 
 
@@ -297,14 +299,14 @@ class SealedStore(Protocol):
 class Kept:
     """Rows of a campaign that come from an earlier sweep."""
 
-    path: Path
+    path: AnyPath
     runs: Runs
     """Numbers of the kept runs, ascending, shape (run,)."""
     stretches: list[StoredPart]
     """Neighbouring runs that chunks leave out, with the start state of the run after them."""
 
 
-def read_kept(path: Path, scene: Scene) -> Kept:
+def read_kept(path: AnyPath, scene: Scene) -> Kept:
     """Return the kept rows of a file; raise DatasetError if it is damaged."""
     rows = read_flat(path)
     runs = rows.run_index.values.astype(np.int64)
@@ -449,7 +451,7 @@ def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:
     return None if differences(known, flat_scene(scene)) else scene
 
 
-def read_finished(path: Path) -> Part:
+def read_finished(path: AnyPath) -> Part:
     """Return attributes and run numbers of a campaign's dataset; raise DatasetError if it is damaged."""
     try:
         return read_part(path)

@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
     write_manifest,
 )
-from vibroimpact.orchestrator.campaign.shared_folder import answer_question, refuse_blind_workers
+from vibroimpact.orchestrator.campaign.home import answer_question, refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 
 TEXT = frequency_text(11, "up")
