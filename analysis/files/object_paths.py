@@ -10,7 +10,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -229,11 +229,18 @@ def opened_bytes(path: AnyPath) -> Iterator[BinaryIO]:
 
 @contextmanager
 def local_copy(path: str | os.PathLike[str]) -> Iterator[str | os.PathLike[str]]:
-    """Yield a path that libraries of this machine can open: the path itself, or a copy of an object."""
+    """Yield a path that libraries of this machine can open: the path itself, or a copy of an object that is there."""
     if not isinstance(path, ObjectPath):
         yield path
         return
     with ScratchFolder("object") as folder:
         copy = Path(folder.name, path.name)
-        copy.write_bytes(path.read_bytes())
+        with suppress(FileNotFoundError):
+            copy.write_bytes(path.read_bytes())
         yield copy
+
+
+def raise_outage(path: AnyPath, error: Exception) -> None:
+    """Raise the error of an object store that is out of reach: it says nothing about the object, which may be sound."""
+    if isinstance(path, ObjectPath) and isinstance(error, OSError) and error.errno != errno.ENOENT:
+        raise error

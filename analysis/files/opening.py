@@ -50,7 +50,7 @@ def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     DatasetError
         The file is missing or damaged, even if the damage shows only during reading.
     """
-    with one_error(path), local_copy(path) as local:
+    with local_copy(path) as local, one_error(path):
         state = check_sound(local)
         with reading(os.path.abspath(local)) as file:
             refuse_changed(local, state)

@@ -6,6 +6,7 @@ that its array announces. Every fault of a store is one DatasetError that names 
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -221,7 +222,7 @@ def new_array(
 def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
     """Turn every exception from a store into one DatasetError that names it.
 
-    While it `writes`, an OSError stays as it is: a full disk is no damage.
+    While it `writes`, an OSError stays as it is: a full disk is no damage. A lost connection becomes an OSError, too.
     """
     try:
         yield
@@ -237,6 +238,8 @@ def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
             raise
         words = str(problem).strip().splitlines()[:1]
         reason = words[0][:LONGEST_REASON] if words else ""
+        if writes and is_address(place) and not isinstance(problem, ValueError | LookupError | TypeError):
+            raise OSError(errno.EIO, f"{type(problem).__name__}: {reason}", os.fspath(place)) from problem
         raise DatasetError(
             f"{os.fspath(place)}: expected a Zarr store that can be read and written, got "
             f"{type(problem).__name__}: {reason}. It is damaged, of another kind, or out of reach."

@@ -3,8 +3,9 @@
 A campaign may end by Ctrl-C, kill -9, a full disk or a lost machine. The complete parts stay, and the same command
 goes on from them. The rows are then bit-identical to the rows of an uninterrupted campaign.
 
-The folder holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and
-`dataset.nc` at the end. In the other format it holds a store that grows, `dataset.zarr`, and `seals/` of its shards.
+The home holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and `dataset.nc`
+at the end. In the other format it holds a store that grows, `dataset.zarr`, and `seals/` of its shards. Home is a
+folder, or for such a store an address: an object store has no rename, so a seal is an object written last.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.analysis.files.object_paths import AnyPath, ObjectPath, located
 from vibroimpact.fmus.errors import CampaignError, DatasetError
 from vibroimpact.fmus.messages import CALL, Message, message
@@ -41,7 +41,7 @@ from vibroimpact.orchestrator.campaign.formats import (
     earlier_store,
 )
 from vibroimpact.orchestrator.campaign.here import FEW_SECONDS, computed_here, may_begin_here, opened_here
-from vibroimpact.orchestrator.campaign.home import held_home, refuse_blind_workers
+from vibroimpact.orchestrator.campaign.home import held_home, make_folder_in_home, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.manifest import (
     add_build,
     carried_manifest,
@@ -126,8 +126,7 @@ def run_campaign(
     progress : Progress, optional
         Receives the progress of the campaign.
     format : {"netcdf", "zarr"}, optional
-        Format of the dataset: the file `dataset.nc`, or the store `dataset.zarr`. By default that of the campaign in
-        the folder; for a new one `formats.default_format`.
+        Format of the dataset: the file `dataset.nc`, or the store `dataset.zarr`. By default as the campaign began.
 
     Raises
     ------
@@ -156,12 +155,6 @@ def run_campaign(
                     " resumes.",
                 )
             ) from error
-
-
-def _make_inner(folder: AnyPath) -> None:
-    """Make a folder of a campaign; at an address there is nothing to make."""
-    if isinstance(folder, Path):
-        make_folder(folder)
 
 
 class _Campaign:
@@ -227,7 +220,7 @@ class _Campaign:
         others = different if old is None else other_differences(old, self._scene)
         if old is None or others or isinstance(self._home, ObjectPath):
             refuse_other_scene(self._manifest_path, others or different)
-        _make_inner(self._parts_folder)
+        make_folder_in_home(self._parts_folder)
         hashed, note = self._manifest.scene_hash, self._progress.note
         store = earlier_store(self._home, old, self._shard_points, hashed, note)
         earlier = EarlierSweep(old, self._manifest, self._home, note, store)
@@ -261,7 +254,7 @@ class _Campaign:
 
     def run(self, workers: OpenedWorkers) -> CampaignReport:
         """Compute the points that are left and compact all parts; unfit parts are computed again."""
-        _make_inner(self._parts_folder)
+        make_folder_in_home(self._parts_folder)
         remove_temporary_files(self._home)
         unfit: list[tuple[AnyPath, str]] = []
         try:

@@ -43,6 +43,12 @@ def held_home(
         yield home, lambda: None
 
 
+def make_folder_in_home(folder: AnyPath) -> None:
+    """Make a folder of a campaign; at an address there is nothing to make."""
+    if not isinstance(folder, ObjectPath):
+        make_folder(folder)
+
+
 def answer_question(folder: str, name: str) -> str:
     """Read a question file in a folder, on a worker; write an answer file next to it and return its name.
 

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes
+from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, raise_outage
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
@@ -215,6 +215,7 @@ def read_manifest(path: AnyPath) -> Manifest | None:
     except FileNotFoundError:
         return None
     except (OSError, *DAMAGE) as error:
+        raise_outage(path, error)
         reason = error.strerror if isinstance(error, OSError) else error
         raise DamagedManifestError(
             f"{path}: expected the manifest of a campaign, got a damaged file ({reason}). "

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, opened_bytes
+from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, opened_bytes, raise_outage
 from vibroimpact.analysis.files.store_attributes import attributes_read
 from vibroimpact.analysis.files.stores import objects_below, opened_group
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -112,6 +112,7 @@ def read_sealed(path: AnyPath) -> dict[str, Any]:
             raise ValueError("not the content whose SHA-256 it has")
         return content
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise_outage(path, error)
         reason = error.strerror if isinstance(error, OSError) else error
         raise DatasetError(f"{path}: expected the seal of a shard, got {reason}.") from error
 
@@ -143,6 +144,7 @@ def refuse_changed_objects(store: AnyPath, objects: Mapping[str, str]) -> None:
         try:
             found = object_hash(store / key)
         except OSError as error:
+            raise_outage(store, error)
             raise DatasetError(f"{store / key}: {error.strerror or error}.") from error
         if found != expected:
             raise DatasetError(f"{store / key}: its content is not the one whose SHA-256 its seal has.")
@@ -152,7 +154,8 @@ def _scene_of(store: AnyPath) -> str | None:
     """Return the hash of the scene of a store; None without metadata that name one."""
     try:
         found = json.loads((store / "zarr.json").read_bytes())["attributes"].get("scene_hash")
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise_outage(store, error)
         return None
     return None if found is None else str(found)
 
