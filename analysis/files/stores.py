@@ -18,8 +18,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
@@ -199,6 +197,7 @@ def new_array(
     attributes: dict[str, Any],
 ) -> Any:
     """Make an array of a group: compressed chunks with a checksum each; values never written are missing."""
+    import numpy as np  # files are written by processes that need no arrays
     from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
 
     kind = np.dtype(dtype).kind

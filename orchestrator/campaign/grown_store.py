@@ -118,8 +118,14 @@ class GrownStore(Destination):
         with ScratchFolder("store") as folder:
             made_again = Path(folder.name, STORE)
             self._create(made_again)
+            there = set(objects_below(self.path))
             for key in sorted(objects_below(made_again)):
-                _write_unless_same(self.path / key, (made_again / key).read_bytes())
+                place, content = self.path / key, (made_again / key).read_bytes()
+                if key in there and place.read_bytes() == content:
+                    continue
+                if isinstance(place, Path):
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                place.write_bytes(content)
 
     def _create(self, place: Path) -> None:
         """Make the arrays of the store, without runs, at another place."""
@@ -260,17 +266,6 @@ class GrownStore(Destination):
         writer.finish(attrs, sizes={"period": max(seal.periods for seal in seals)}, absent=absent)
         runs = sum(seal.stop - seal.first for seal in seals)
         seal_store(self.path, self._seals, runs, of_seal, {key for seal in seals for key in seal.objects})
-
-
-def _write_unless_same(path: AnyPath, content: bytes) -> None:
-    """Write a file or an object, unless it has this content."""
-    try:
-        if path.read_bytes() == content:
-            return
-    except FileNotFoundError:
-        if isinstance(path, Path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
 
 
 def _number(seal: AnyPath) -> int:

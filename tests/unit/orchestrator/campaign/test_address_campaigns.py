@@ -131,7 +131,7 @@ def test_a_damaged_object_is_noticed_and_its_points_come_again(
     assert_same_datasets(half, tmp_path / "file")
 
 
-REFUSED = {
+REFUSED: dict[str, tuple[str, formats.DatasetFormat | None, str]] = {
     "another scene": (
         MAP.replace("0.6", "0.7"),
         None,
