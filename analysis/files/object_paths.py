@@ -191,12 +191,15 @@ def located(place: str | os.PathLike[str]) -> AnyPath:
         return Path(text)
     zarr_package()
     try:
+        if "::" in text:
+            raise ValueError("a chain of addresses, whose copies hide objects of others")
         system, root = system_of(text)
     except (ImportError, ValueError) as error:
         raise UsageError(
             f"{text}: expected an address of fsspec, such as s3://bucket/map, got {_words(error)}."
         ) from error
-    return Path(root) if "file" in system.protocol else ObjectPath(text.rstrip("/"))
+    kinds = (system.protocol,) if isinstance(system.protocol, str) else system.protocol
+    return Path(root) if "file" in kinds else ObjectPath(text.rstrip("/"))
 
 
 def bounded_bytes(path: AnyPath, most: int) -> bytes:

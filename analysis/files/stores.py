@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import errno
 import json
+import logging
 import math
 import os
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -23,6 +25,7 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 
 STORE_ENDING = ".zarr"
 LONGEST_REASON = 200
+_TASK_OF_ZARR = re.compile(r"never retrieved(?s:.)* defined at [^\n]*[/\\]zarr[/\\]")
 Place = str | os.PathLike[str]
 """A path, or an address such as `s3://bucket/map.zarr`."""
 
@@ -62,7 +65,16 @@ def zarr_package() -> ModuleType:
             f"store: expected the package {missing.name} for Zarr stores, got none. Install it: pip install "
             "'vibroimpact[store]', or in a clone pip install '.[store]'."
         ) from None
+    logging.getLogger("asyncio").addFilter(_is_of_others)
     return zarr
+
+
+def _is_of_others(record: logging.LogRecord) -> bool:
+    """Return whether a line of asyncio is about other tasks than zarr's.
+
+    Of several requests that fail, zarr raises the first error; asyncio would print the others with their traces.
+    """
+    return _TASK_OF_ZARR.search(record.getMessage()) is None
 
 
 @contextmanager
@@ -90,13 +102,18 @@ def opened_group(place: Place, mode: str) -> Any:
     zarr = zarr_package()
     from vibroimpact.analysis.files.bounded_stores import BoundedStore
 
-    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), _settings():
+    with one_store_error(place, writes=is_written(place, mode)), quiet_zarr(), _settings():
         store = BoundedStore(_store(place, read_only=mode == "r"))
         if mode == "w-":
             return zarr.create_group(store, zarr_format=3)
         if mode == "r":
             _refuse_unfinished(place)
         return zarr.open_group(store, mode=mode, zarr_format=3, use_consolidated=mode == "r")
+
+
+def is_written(place: Place, mode: str) -> bool:
+    """Return whether an OSError at a store is none of its damage: it is new, or at an address that is written to."""
+    return mode == "w-" or (mode == "r+" and is_address(place))
 
 
 def _settings() -> Any:

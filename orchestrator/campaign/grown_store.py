@@ -119,7 +119,8 @@ class GrownStore(Destination):
             made_again = Path(folder.name, STORE)
             self._create(made_again)
             there = set(objects_below(self.path))
-            for key in sorted(objects_below(made_again)):
+            # the root names the scene: a store that is cut off without it would be taken for one of another program
+            for key in sorted(objects_below(made_again), key=lambda key: (key != "zarr.json", key)):
                 place, content = self.path / key, (made_again / key).read_bytes()
                 if key in there and place.read_bytes() == content:
                     continue

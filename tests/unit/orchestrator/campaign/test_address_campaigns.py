@@ -155,9 +155,10 @@ def test_campaigns_that_do_not_go_to_an_address_are_one_line(
     assert objects() == before
 
 
-def test_an_address_of_no_kind_is_one_line() -> None:
-    with pytest.raises(UsageError, match="nothing://map: expected an address of fsspec"):
-        run_campaign(parse_scene(MAP, "test.toml"), "nothing://map")
+@pytest.mark.parametrize("address", ["nothing://map", "simplecache::memory://map"])
+def test_an_address_of_no_kind_is_one_line(address: str) -> None:
+    with pytest.raises(UsageError, match=f"{address}: expected an address of fsspec"):
+        run_campaign(parse_scene(MAP, "test.toml"), address)
 
 
 def test_workers_that_do_not_see_the_memory_of_this_process_are_refused() -> None:
