@@ -17,14 +17,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.analysis.files.stores import LONGEST_REASON, is_address, system_of, zarr_package
+from vibroimpact.analysis.files.stores import is_address, outage, reason_of, system_of, zarr_package
 from vibroimpact.fmus.errors import UsageError
-
-_ERRNO_BY_KIND = {
-    FileNotFoundError: errno.ENOENT,
-    FileExistsError: errno.EEXIST,
-    PermissionError: errno.EACCES,
-}
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -152,23 +146,12 @@ class ObjectPath(os.PathLike[str]):
         """Yield the file system and the path there; each of its faults becomes an OSError with the address."""
         try:
             yield system_of(self)
-        except OSError as error:
-            number = error.errno or next(
-                (code for kind, code in _ERRNO_BY_KIND.items() if isinstance(error, kind)), errno.EIO
-            )
-            raise OSError(number, _words(error), self.address) from error
         except Exception as error:
-            # a package of its own for each kind of address, with exceptions of its own
-            raise OSError(errno.EIO, f"{type(error).__name__}: {_words(error)}", self.address) from error
+            raise outage(self, error) from error
 
 
 AnyPath = Path | ObjectPath
 """A file or a folder of a campaign, wherever the campaign lies."""
-
-
-def _words(error: Exception) -> str:
-    lines = (getattr(error, "strerror", None) or str(error)).strip().splitlines()
-    return lines[0][:LONGEST_REASON] if lines else type(error).__name__
 
 
 def located(place: str | os.PathLike[str]) -> AnyPath:
@@ -196,7 +179,7 @@ def located(place: str | os.PathLike[str]) -> AnyPath:
         system, root = system_of(text)
     except (ImportError, ValueError) as error:
         raise UsageError(
-            f"{text}: expected an address of fsspec, such as s3://bucket/map, got {_words(error)}."
+            f"{text}: expected an address of fsspec, such as s3://bucket/map, got {reason_of(error)}."
         ) from error
     kinds = (system.protocol,) if isinstance(system.protocol, str) else system.protocol
     return Path(root) if "file" in kinds else ObjectPath(text.rstrip("/"))

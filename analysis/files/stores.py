@@ -26,6 +26,11 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 STORE_ENDING = ".zarr"
 LONGEST_REASON = 200
 _TASK_OF_ZARR = re.compile(r"never retrieved(?s:.)* defined at [^\n]*[/\\]zarr[/\\]")
+_NUMBERS = {
+    FileNotFoundError: errno.ENOENT,
+    FileExistsError: errno.EEXIST,
+    PermissionError: errno.EACCES,
+}
 Place = str | os.PathLike[str]
 """A path, or an address such as `s3://bucket/map.zarr`."""
 
@@ -191,16 +196,26 @@ def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
 
 
 def has_object(place: Place, key: str) -> bool:
-    """Return whether a store has an object."""
+    """Return whether a store has an object; OSError where it cannot be reached."""
     system, root = system_of(place)
-    return bool(system.isfile(f"{root}/{key}"))
+    with one_store_error(place, writes=True):
+        try:
+            return bool(system.info(f"{root}/{key}")["type"] == "file")
+        except FileNotFoundError:
+            return False
 
 
 def objects_below(place: Place, prefix: str = "") -> list[str]:
-    """Return the keys of the objects of a store below a prefix; by default of all."""
+    """Return the keys of the objects of a store below a prefix, by default of all; OSError out of reach."""
     system, root = system_of(place)
-    found = system.find(f"{root}/{prefix}" if prefix else root)
-    return [str(path).removeprefix(f"{root}/") for path in found]
+    # other file systems leave out what they cannot list, unless they are asked to raise
+    options = {} if system.async_impl else {"on_error": "raise"}
+    with one_store_error(place, writes=True):
+        try:
+            found = system.find(f"{root}/{prefix}" if prefix else root, **options)
+        except FileNotFoundError:
+            return []
+        return [str(path).removeprefix(f"{root}/") for path in found]
 
 
 def new_array(
@@ -250,16 +265,34 @@ def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
             f"Install it: pip install {missing.name}."
         ) from missing
     except Exception as problem:
-        if isinstance(problem, NameError | AssertionError) or (writes and isinstance(problem, OSError)):
+        if isinstance(problem, NameError | AssertionError):
             raise
-        words = str(problem).strip().splitlines()[:1]
-        reason = words[0][:LONGEST_REASON] if words else ""
         if writes and is_address(place) and not isinstance(problem, ValueError | LookupError | TypeError):
-            raise OSError(errno.EIO, f"{type(problem).__name__}: {reason}", os.fspath(place)) from problem
+            raise outage(place, problem) from problem
+        if writes and isinstance(problem, OSError):
+            raise
         raise DatasetError(
             f"{os.fspath(place)}: expected a Zarr store that can be read and written, got "
-            f"{type(problem).__name__}: {reason}. It is damaged, of another kind, or out of reach."
+            f"{type(problem).__name__}: {reason_of(problem)}. It is damaged, of another kind, or out of reach."
         ) from problem
+
+
+def reason_of(problem: Exception) -> str:
+    """Return the first line of an exception, cut to a bounded length."""
+    words = (getattr(problem, "strerror", None) or str(problem)).strip().splitlines()[:1]
+    return words[0][:LONGEST_REASON] if words else ""
+
+
+def outage(place: Place, problem: Exception) -> OSError:
+    """Return any error of an object store as an OSError with a number, one line, and the address.
+
+    Each package for a kind of address has exceptions of its own, and few of them have a number.
+    """
+    reason = reason_of(problem) or type(problem).__name__
+    if not isinstance(problem, OSError):
+        return OSError(errno.EIO, f"{type(problem).__name__}: {reason}", os.fspath(place))
+    numbers = (number for kind, number in _NUMBERS.items() if isinstance(problem, kind))
+    return OSError(problem.errno or next(numbers, errno.EIO), reason, os.fspath(place))
 
 
 def consolidate(place: Place) -> None:
