@@ -177,7 +177,7 @@ def located(place: str | os.PathLike[str]) -> AnyPath:
         if "::" in text:
             raise ValueError("a chain of addresses, whose copies hide objects of others")
         system, root = system_of(text)
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, OSError) as error:
         raise UsageError(
             f"{text}: expected an address of fsspec, such as s3://bucket/map, got {reason_of(error)}."
         ) from error

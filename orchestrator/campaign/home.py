@@ -6,6 +6,7 @@ A file or an object in it, and no name, proves that a worker sees the same home.
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +22,9 @@ from vibroimpact.fmus.messages import WITH_OUTPUT, message
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
+_NO_NAME = re.compile(r"[a-z][a-z0-9+]+:")
+"""What is left of an address without a name: it is no folder."""
+
 
 @contextmanager
 def held_home(
@@ -33,7 +37,12 @@ def held_home(
     UsageError
         Another campaign holds the home, or it cannot be written.
     """
-    home = located(given_place(folder)).absolute()
+    home = located(given_place(folder))
+    if _NO_NAME.fullmatch(str(home)):
+        raise UsageError(
+            f"{home}//: expected a name after the kind of address, such as s3://bucket/map, got none."
+        )
+    home = home.absolute()
     if isinstance(home, ObjectPath):
         with locked_address(home, note) as refuse_lost:
             yield home, refuse_lost

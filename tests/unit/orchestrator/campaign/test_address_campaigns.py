@@ -161,6 +161,12 @@ def test_an_address_of_no_kind_is_one_line(address: str) -> None:
         run_campaign(parse_scene(MAP, "test.toml"), address)
 
 
+@pytest.mark.parametrize("address", ["s3://", Path("memory://")])
+def test_an_address_without_a_name_is_no_folder(address: str | Path) -> None:
+    with pytest.raises(UsageError, match="expected a name after the kind of address"):
+        run_campaign(parse_scene(MAP, "test.toml"), address)
+
+
 def test_workers_that_do_not_see_the_memory_of_this_process_are_refused() -> None:
     with pytest.raises(
         UsageError, match=f"{HOME}: expected .* every worker reads and writes, got 1 that do not"
