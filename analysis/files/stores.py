@@ -280,7 +280,7 @@ def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
 def reason_of(problem: Exception) -> str:
     """Return the first line of an exception, cut to a bounded length."""
     words = (getattr(problem, "strerror", None) or str(problem)).strip().splitlines()[:1]
-    return words[0][:LONGEST_REASON] if words else ""
+    return words[0][:LONGEST_REASON].rstrip(".") if words else ""
 
 
 def outage(place: Place, problem: Exception) -> OSError:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
 _NO_NAME = re.compile(r"[a-z][a-z0-9+]+:")
-"""What is left of an address without a name: it is no folder."""
+"""Form of an address without a name, as a path has it; no folder of a campaign."""
 
 
 @contextmanager

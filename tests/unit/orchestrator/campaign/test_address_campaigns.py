@@ -190,7 +190,7 @@ def test_the_lock_of_a_dead_campaign_is_taken_over_after_its_lease(monkeypatch: 
     home, notes = located(HOME), Notes()
     (home / ".lock").write_bytes(b'{"owner": "dead"}')
     assert campaign_here(monkeypatch, MAP, HOME, notes=notes).runs == 20
-    assert "a lock is there" in notes.lines[0]
+    assert "the lock of a campaign without a beat" in notes.lines[0]
     assert not (home / ".lock").exists()
 
 
