@@ -83,12 +83,11 @@ class _Holder:
 
     def _wait_for_holder(self, note: Callable[[str], object]) -> None:
         """Return when the lock has no holder any more; raise UsageError at a beat of its holder."""
-        seen = self._read()
-        until = time.monotonic() + LEASE_SECONDS
-        note(
-            f"{self._lock}: a lock is there. If its campaign has died, this one begins in {LEASE_SECONDS:.0f} s."
-        )
-        while seen is not None and time.monotonic() < until:
+        seen, began, is_noted = self._read(), time.monotonic(), False
+        while seen is not None and (waited := time.monotonic() - began) < LEASE_SECONDS:
+            if waited > 2 * BEAT_SECONDS and not is_noted:
+                left, is_noted = LEASE_SECONDS - waited, True
+                note(f"{self._lock}: the lock of a campaign without a beat. This one begins in {left:.0f} s.")
             time.sleep(BEAT_SECONDS / 4)
             found = self._read()
             if found is not None and found != seen:
