@@ -35,6 +35,7 @@ from vibroimpact.analysis.files.stores import (
     arrays_of,
     consolidate,
     has_object,
+    is_written,
     new_array,
     objects_below,
     one_store_error,
@@ -128,7 +129,7 @@ class StoreWriter:
     def __init__(self, place: Place) -> None:
         self._place = place
         self._group = opened_group(place, "r+")
-        with one_store_error(place):
+        with one_store_error(place, writes=is_written(place, "r+")):
             self._arrays = arrays_of(self._group)
             self._overview = arrays_of(self._group[OVERVIEW]) if OVERVIEW in self._group else {}
             self.grid = grid_of(self._arrays["run_id"])

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from vibroimpact.analysis.files.object_paths import ObjectPath
+
 
 def refuse_special(path: str | os.PathLike[str]) -> None:
     """Raise OSError if a path leads to something other than a file, which renaming a file there would replace.
@@ -28,7 +30,7 @@ def refuse_special(path: str | os.PathLike[str]) -> None:
 
 
 def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview) -> None:
-    """Write the whole content of a file, or leave the older file in place.
+    """Write the whole content of a file or an object, or leave the older one in place.
 
     The content goes to a temporary name in the same folder (hidden, ending in `.tmp`), is flushed to the disk, and is
     renamed. The folder is flushed to the disk afterwards. On any failure the temporary file is removed.
@@ -45,6 +47,9 @@ def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview)
         If the file cannot be written (no space, no permission, no folder, no place for a file), with the system's
         reason.
     """
+    if isinstance(path, ObjectPath):
+        path.write_bytes(b"".join(content))
+        return
     with whole_or_absent(path) as temporary, open(temporary, "xb") as file:
         for piece in content:
             file.write(piece)

@@ -9,6 +9,7 @@ from typing import Any
 
 import netCDF4
 
+from vibroimpact.analysis.files.object_paths import local_copy
 from vibroimpact.analysis.files.open_files import OpenFile, give_back, netcdf_lock, reading, take
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
 from vibroimpact.analysis.files.store_attributes import attributes_read
@@ -49,10 +50,10 @@ def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     DatasetError
         The file is missing or damaged, even if the damage shows only during reading.
     """
-    with one_error(path):
-        state = check_sound(path)
-        with reading(os.path.abspath(path)) as file:
-            refuse_changed(path, state)
+    with local_copy(path) as local, one_error(path):
+        state = check_sound(local)
+        with reading(os.path.abspath(local)) as file:
+            refuse_changed(local, state)
             yield file
 
 

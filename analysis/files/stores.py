@@ -6,9 +6,12 @@ that its array announces. Every fault of a store is one DatasetError that names 
 
 from __future__ import annotations
 
+import errno
 import json
+import logging
 import math
 import os
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,13 +20,17 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 STORE_ENDING = ".zarr"
 LONGEST_REASON = 200
+_TASK_OF_ZARR = re.compile(r"never retrieved(?s:.)* defined at [^\n]*[/\\]zarr[/\\]")
+_NUMBERS = {
+    FileNotFoundError: errno.ENOENT,
+    FileExistsError: errno.EEXIST,
+    PermissionError: errno.EACCES,
+}
 Place = str | os.PathLike[str]
 """A path, or an address such as `s3://bucket/map.zarr`."""
 
@@ -63,7 +70,16 @@ def zarr_package() -> ModuleType:
             f"store: expected the package {missing.name} for Zarr stores, got none. Install it: pip install "
             "'vibroimpact[store]', or in a clone pip install '.[store]'."
         ) from None
+    logging.getLogger("asyncio").addFilter(_is_of_others)
     return zarr
+
+
+def _is_of_others(record: logging.LogRecord) -> bool:
+    """Return whether a line of asyncio is about other tasks than zarr's.
+
+    Of several requests that fail, zarr raises the first error; asyncio would print the others with their traces.
+    """
+    return _TASK_OF_ZARR.search(record.getMessage()) is None
 
 
 @contextmanager
@@ -91,13 +107,18 @@ def opened_group(place: Place, mode: str) -> Any:
     zarr = zarr_package()
     from vibroimpact.analysis.files.bounded_stores import BoundedStore
 
-    with one_store_error(place, writes=mode == "w-"), quiet_zarr(), _settings():
+    with one_store_error(place, writes=is_written(place, mode)), quiet_zarr(), _settings():
         store = BoundedStore(_store(place, read_only=mode == "r"))
         if mode == "w-":
             return zarr.create_group(store, zarr_format=3)
         if mode == "r":
             _refuse_unfinished(place)
         return zarr.open_group(store, mode=mode, zarr_format=3, use_consolidated=mode == "r")
+
+
+def is_written(place: Place, mode: str) -> bool:
+    """Return whether an OSError at a store is none of its damage: it is new, or at an address that is written to."""
+    return mode == "w-" or (mode == "r+" and is_address(place))
 
 
 def _settings() -> Any:
@@ -117,7 +138,8 @@ def _store(place: Place, *, read_only: bool) -> Any:
     from zarr.storage import FsspecStore, LocalStore
 
     if is_address(place):
-        return FsspecStore.from_url(os.fspath(place), read_only=read_only)
+        options = {"use_listings_cache": False}
+        return FsspecStore.from_url(os.fspath(place), storage_options=options, read_only=read_only)
     return LocalStore(Path(place).absolute(), read_only=read_only)
 
 
@@ -142,7 +164,11 @@ def system_of(place: Place) -> tuple[Any, str]:
     """Return the file system of a place, and its path there."""
     from fsspec.core import url_to_fs
 
-    system, root = url_to_fs(os.fspath(place) if is_address(place) else os.path.abspath(place))
+    if is_address(place):
+        # other processes write here, too: a remembered listing would hide their objects
+        system, root = url_to_fs(os.fspath(place), use_listings_cache=False)
+    else:
+        system, root = url_to_fs(os.path.abspath(place))
     return system, str(root).rstrip("/")
 
 
@@ -170,15 +196,26 @@ def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
 
 
 def has_object(place: Place, key: str) -> bool:
-    """Return whether a store has an object."""
+    """Return whether a store has an object; OSError where it cannot be reached."""
     system, root = system_of(place)
-    return bool(system.isfile(f"{root}/{key}"))
+    with one_store_error(place, writes=True):
+        try:
+            return bool(system.info(f"{root}/{key}")["type"] == "file")
+        except FileNotFoundError:
+            return False
 
 
-def objects_below(place: Place, prefix: str) -> list[str]:
-    """Return the keys of the objects of a store below a prefix."""
+def objects_below(place: Place, prefix: str = "") -> list[str]:
+    """Return the keys of the objects of a store below a prefix, by default of all; OSError out of reach."""
     system, root = system_of(place)
-    return [str(path).removeprefix(f"{root}/") for path in system.find(f"{root}/{prefix}")]
+    # other file systems leave out what they cannot list, unless they are asked to raise
+    options = {} if system.async_impl else {"on_error": "raise"}
+    with one_store_error(place, writes=True):
+        try:
+            found = system.find(f"{root}/{prefix}" if prefix else root, **options)
+        except FileNotFoundError:
+            return []
+        return [str(path).removeprefix(f"{root}/") for path in found]
 
 
 def new_array(
@@ -192,6 +229,7 @@ def new_array(
     attributes: dict[str, Any],
 ) -> Any:
     """Make an array of a group: compressed chunks with a checksum each; values never written are missing."""
+    import numpy as np  # files are written by processes that need no arrays
     from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
 
     kind = np.dtype(dtype).kind
@@ -215,7 +253,7 @@ def new_array(
 def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
     """Turn every exception from a store into one DatasetError that names it.
 
-    While it `writes`, an OSError stays as it is: a full disk is no damage.
+    While it `writes`, an OSError stays as it is: a full disk is no damage. A lost connection becomes an OSError, too.
     """
     try:
         yield
@@ -227,14 +265,34 @@ def one_store_error(place: Place, *, writes: bool = False) -> Iterator[None]:
             f"Install it: pip install {missing.name}."
         ) from missing
     except Exception as problem:
-        if isinstance(problem, NameError | AssertionError) or (writes and isinstance(problem, OSError)):
+        if isinstance(problem, NameError | AssertionError):
             raise
-        words = str(problem).strip().splitlines()[:1]
-        reason = words[0][:LONGEST_REASON] if words else ""
+        if writes and is_address(place) and not isinstance(problem, ValueError | LookupError | TypeError):
+            raise outage(place, problem) from problem
+        if writes and isinstance(problem, OSError):
+            raise
         raise DatasetError(
             f"{os.fspath(place)}: expected a Zarr store that can be read and written, got "
-            f"{type(problem).__name__}: {reason}. It is damaged, of another kind, or out of reach."
+            f"{type(problem).__name__}: {reason_of(problem)}. It is damaged, of another kind, or out of reach."
         ) from problem
+
+
+def reason_of(problem: Exception) -> str:
+    """Return the first line of an exception, cut to a bounded length."""
+    words = (getattr(problem, "strerror", None) or str(problem)).strip().splitlines()[:1]
+    return words[0][:LONGEST_REASON].rstrip(".") if words else ""
+
+
+def outage(place: Place, problem: Exception) -> OSError:
+    """Return any error of an object store as an OSError with a number, one line, and the address.
+
+    Each package for a kind of address has exceptions of its own, and few of them have a number.
+    """
+    reason = reason_of(problem) or type(problem).__name__
+    if not isinstance(problem, OSError):
+        return OSError(errno.EIO, f"{type(problem).__name__}: {reason}", os.fspath(place))
+    numbers = (number for kind, number in _NUMBERS.items() if isinstance(problem, kind))
+    return OSError(problem.errno or next(numbers, errno.EIO), reason, os.fspath(place))
 
 
 def consolidate(place: Place) -> None:

@@ -3,8 +3,9 @@
 A campaign may end by Ctrl-C, kill -9, a full disk or a lost machine. The complete parts stay, and the same command
 goes on from them. The rows are then bit-identical to the rows of an uninterrupted campaign.
 
-The folder holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and
-`dataset.nc` at the end. In the other format it holds a store that grows, `dataset.zarr`, and `seals/` of its shards.
+The home holds `campaign.json` (scene and components at the start), `parts/` while the campaign runs, and `dataset.nc`
+at the end. In the other format it holds a store that grows, `dataset.zarr`, and `seals/` of its shards. Home is a
+folder, or for such a store an address: an object store has no rename, so a seal is an object written last.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
+from vibroimpact.analysis.files.object_paths import AnyPath, ObjectPath, located
 from vibroimpact.fmus.errors import CampaignError, DatasetError
 from vibroimpact.fmus.messages import CALL, Message, message
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, common_identity, get_ready
@@ -40,6 +41,7 @@ from vibroimpact.orchestrator.campaign.formats import (
     earlier_store,
 )
 from vibroimpact.orchestrator.campaign.here import FEW_SECONDS, computed_here, may_begin_here, opened_here
+from vibroimpact.orchestrator.campaign.home import held_home, make_folder_in_home, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.manifest import (
     add_build,
     carried_manifest,
@@ -69,7 +71,6 @@ from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.shared_folder import folder_of_campaign, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.threads import BYTES_OF_A_THREAD, compute_in_threads, thread_count
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm
@@ -112,8 +113,9 @@ def run_campaign(
     Parameters
     ----------
     scene : Scene
-    folder : path
-        Folder of this campaign alone; made when absent.
+    folder : path or address
+        Folder of this campaign alone; made when absent. A sweep that is a grid may go to an address of
+        fsspec, such as `s3://bucket/map`; its dataset is then a store.
     workers : int, optional
         Worker processes on this machine. By default the campaign begins in this process. If more than 2 s of work are
         left, one worker for each processor goes on. Points in lanes stay here, in threads, on up to four processors.
@@ -124,25 +126,23 @@ def run_campaign(
     progress : Progress, optional
         Receives the progress of the campaign.
     format : {"netcdf", "zarr"}, optional
-        Format of the dataset: the file `dataset.nc`, or the store `dataset.zarr`. By default that of the campaign in
-        the folder; for a new one `formats.default_format`.
+        Format of the dataset: the file `dataset.nc`, or the store `dataset.zarr`. By default as the campaign began.
 
     Raises
     ------
     UsageError
-        The folder is an address, cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+        The folder cannot be written, is in use or belongs to another scene, or nothing listens at `scheduler`.
     CampaignError
         The campaign could not finish; the same call resumes it.
     CampaignInterrupted
         Ctrl-C interrupted the campaign.
     """
-    home = folder_of_campaign(folder).absolute()
-    make_folder(home)
-    with locked_folder(home):
+    progress = progress or Progress()
+    with held_home(folder, progress.note) as (home, refuse_lost):
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
         try:
             here = workers is None and scheduler is None
-            campaign = _Campaign(scene, home, runner, progress or Progress(), format, here=here)
+            campaign = _Campaign(scene, home, runner, progress, format, refuse_lost, here=here)
             return campaign.finished_before() or campaign.run(opened)
         except OSError as error:
             # This process or a worker raised it: the folder for temporary files may be full, too.
@@ -158,19 +158,21 @@ def run_campaign(
 
 
 class _Campaign:
-    """One campaign in its folder, which this process holds."""
+    """One campaign in its home, which this process holds."""
 
     def __init__(
         self,
         scene: Scene,
-        home: Path,
+        home: AnyPath,
         runner: str,
         progress: Progress,
         format: DatasetFormat | None,
+        refuse_lost: Callable[[], None],
         *,
         here: bool = False,
     ) -> None:
         self._scene = scene
+        self._refuse_lost = refuse_lost
         self._home = home
         self._progress = progress
         self._parts_folder = home / "parts"
@@ -186,7 +188,7 @@ class _Campaign:
         self._report.dataset = self._destination.path
         self._kept_path = kept_path(self._parts_folder, hashed)
         self._rounds: Rounds | None = None
-        self._computed_files: list[Path] = []
+        self._computed_files: list[AnyPath] = []
         self._form: DatasetForm | None = None
         self._begins_here = here and may_begin_here(scene, runner, self._report.runs)
         self._work = Work(
@@ -216,9 +218,9 @@ class _Campaign:
         if not different:
             return
         others = different if old is None else other_differences(old, self._scene)
-        if old is None or others:
-            refuse_other_scene(self._manifest_path, others)
-        make_folder(self._parts_folder)
+        if old is None or others or isinstance(self._home, ObjectPath):
+            refuse_other_scene(self._manifest_path, others or different)
+        make_folder_in_home(self._parts_folder)
         hashed, note = self._manifest.scene_hash, self._progress.note
         store = earlier_store(self._home, old, self._shard_points, hashed, note)
         earlier = EarlierSweep(old, self._manifest, self._home, note, store)
@@ -252,9 +254,9 @@ class _Campaign:
 
     def run(self, workers: OpenedWorkers) -> CampaignReport:
         """Compute the points that are left and compact all parts; unfit parts are computed again."""
-        make_folder(self._parts_folder)
+        make_folder_in_home(self._parts_folder)
         remove_temporary_files(self._home)
-        unfit: list[tuple[Path, str]] = []
+        unfit: list[tuple[AnyPath, str]] = []
         try:
             for _ in range(MOST_ROUNDS):
                 paths = self._complete(workers)
@@ -269,7 +271,7 @@ class _Campaign:
             f"{MOST_ROUNDS} times: {names}"
         )
 
-    def _complete(self, workers: OpenedWorkers) -> list[Path]:
+    def _complete(self, workers: OpenedWorkers) -> list[AnyPath]:
         """Compute all runs that no part holds, and return the files with all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
@@ -332,14 +334,14 @@ class _Campaign:
             " resumes.",
         )
 
-    def _compute_on(self, stages: Iterable[Stage], stored: Sequence[Path], workers: OpenedWorkers) -> None:
+    def _compute_on(self, stages: Iterable[Stage], stored: Sequence[AnyPath], workers: OpenedWorkers) -> None:
         try:
             left = self._computed_here(iter(stages)) if self._begins_here else iter(stages)
             stage = next(left, None)
             if stage is None:
                 return
             with workers() as pool:
-                if not pool.is_local:
+                if not pool.is_local or isinstance(self._home, ObjectPath):
                     refuse_blind_workers(pool, self._home)
                 work = replace(
                     self._work, identity=common_identity(pool.call_everywhere(get_ready, self._work))
@@ -424,7 +426,7 @@ class _Campaign:
         finally:
             self._report.compute_seconds += time.perf_counter() - began
 
-    def _agree_with_manifest(self, pool: WorkerPool, work: Work, stored: Sequence[Path]) -> None:
+    def _agree_with_manifest(self, pool: WorkerPool, work: Work, stored: Sequence[AnyPath]) -> None:
         """Write the manifest of a new campaign; raise UsageError if workers could give an old one other results."""
         assert work.identity is not None
         if self._manifest is None:
@@ -444,15 +446,17 @@ class _Campaign:
         self._manifest = read_manifest(self._manifest_path)
 
     def _take(self, result: ChunkResult) -> list[ShardParts]:
+        self._refuse_lost()
         if result.outcomes:  # a chunk of kept runs has no outcomes and no part
             self._report.chunks.append(result.chunk)
-            self._computed_files.append(Path(result.path))
+            self._computed_files.append(located(result.path))
         self._report.outcomes.update(result.outcomes)
         self._progress.advance(sum(result.outcomes.values()))
         return self._destination.taken(result)
 
-    def _compact(self, parts: Sequence[Path]) -> list[tuple[Path, str]]:
+    def _compact(self, parts: Sequence[AnyPath]) -> list[tuple[AnyPath, str]]:
         """Write the dataset; return the unfit parts that prevent it, which are removed, each with the reason."""
+        self._refuse_lost()
         began = time.perf_counter()
         try:
             form = self._form or DatasetForm(self._scene)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_part, write_dataset
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.reading import SILENT
+from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
@@ -52,7 +53,7 @@ class Work:
     scene: Scene
     """Scene with an absolute path as its source, since a worker may run in another folder."""
     parts_folder: str
-    """Absolute path of the folder of parts."""
+    """Absolute path of the folder of parts, or its address."""
     runner: str = DEFAULT_RUNNER
     """The runner class as `module:name`."""
     scene_hash: str = ""
@@ -239,7 +240,9 @@ def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> PointC
 
 @lru_cache(maxsize=1)
 def _kept_runs(path: str) -> NDArray[np.int32]:
-    return read_part(path).run_index if path and Path(path).exists() else np.empty(0, dtype=np.int32)
+    return (
+        read_part(located(path)).run_index if path and located(path).exists() else np.empty(0, dtype=np.int32)
+    )
 
 
 def carried_attributes(state: State) -> dict[str, Any]:
@@ -265,13 +268,13 @@ def write_part(
     points: PointColumns,
     records: Sequence[RunRecord] | RunColumns,
     carried: State | None,
-) -> tuple[Path, dict[str, int]]:
+) -> tuple[AnyPath, dict[str, int]]:
     """Write the rows of a chunk, as a whole or not at all; return the file and the number of runs by outcome.
 
     The rows are a part. Those of a whole shard of a store are written there, and the file is the seal.
     """
     attrs = attributes_of_part(work, carried)
-    path = Path(work.parts_folder, chunk.part_name)
+    path = located(work.parts_folder) / chunk.part_name
     try:
         dataset = form.dataset(points, records, attrs)
         shard = None if work.store is None else work.store.shard_of(work.scene, chunk.first, chunk.stop)

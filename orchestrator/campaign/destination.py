@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from vibroimpact.analysis.dataset import read_flat, write_dataset
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, read_finished
@@ -34,15 +35,15 @@ class ShardParts:
 
     shard: Shard
     branch: int
-    paths: tuple[Path, ...]
-    kept: Path | None
+    paths: tuple[AnyPath, ...]
+    kept: AnyPath | None
     carried: State | None
 
 
 class UnfitShardsError(DatasetError):
     """Shards of a store do not have the objects that their seals name; `found` has the seals, each with the reason."""
 
-    def __init__(self, found: list[tuple[Path, str]]) -> None:
+    def __init__(self, found: list[tuple[AnyPath, str]]) -> None:
         super().__init__(f"{found[0][0].name}: {found[0][1]}")
         self.found = found
 
@@ -52,14 +53,14 @@ class Destination(ABC):
 
     Attributes
     ----------
-    path : Path
+    path : Path or ObjectPath
     store : GrowingStore or None
         The store into which workers write shards.
     shards : sequence of Shard
         Shards that no chunk crosses, in run order.
     """
 
-    path: Path
+    path: AnyPath
     store: GrowingStore | None = None
     shards: Sequence[Shard] = ()
 
@@ -72,7 +73,7 @@ class Destination(ABC):
         """Change attributes of the finished dataset."""
 
     @abstractmethod
-    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+    def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the dataset from the rows in these files; return whether a run has a message.
 
         DatasetError: a part cannot be used; `parts.unfit_parts` finds it. UnfitShardsError: shards have changed.
@@ -87,11 +88,11 @@ class Destination(ABC):
         """Return the runs that are in the dataset already; a damaged shard is named and given up."""
         return []
 
-    def rows(self, path: Path) -> xr.Dataset:
+    def rows(self, path: AnyPath) -> xr.Dataset:
         """Return the rows of a part, or of the shard of a seal."""
         return read_flat(path)
 
-    def blocks(self, path: Path) -> Iterator[xr.Dataset]:
+    def blocks(self, path: AnyPath) -> Iterator[xr.Dataset]:
         """Yield the same rows in blocks that fit in memory."""
         yield self.rows(path)
 
@@ -112,7 +113,8 @@ class JoinedFile(Destination):
     """The file `dataset.nc`, made of all parts when the last run is computed."""
 
     def __init__(self, home: Path, scene: Scene) -> None:
-        self.path, self._scene = home / "dataset.nc", scene
+        self._file = self.path = home / "dataset.nc"
+        self._scene = scene
 
     def finished(self, manifest: Manifest) -> tuple[int, Attributes] | None:
         """Return the number of runs and the attributes of the dataset of a campaign; None without one."""
@@ -125,6 +127,6 @@ class JoinedFile(Destination):
         """Change attributes of the dataset, which is written anew."""
         write_dataset(read_flat(self.path).assign_attrs(attrs), self.path)
 
-    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+    def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Join the rows of all parts to one file; return whether a run has a message."""
-        return compact(paths, self.path, form, attrs)
+        return compact(paths, self._file, form, attrs)

@@ -19,6 +19,7 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import join_files, read_part, take_runs, write_dataset
 from vibroimpact.analysis.dataset.flat_file import blocks_of
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.orchestrator.campaign.chunks import MANIFEST
 from vibroimpact.orchestrator.campaign.extension import (
     Runs,
@@ -59,7 +60,7 @@ class SealedStore(Protocol):
     def held(self) -> list[StoredPart]:
         """Return the runs in the store, in run order."""
 
-    def blocks(self, path: Path) -> Iterator[xr.Dataset]:
+    def blocks(self, path: AnyPath) -> Iterator[xr.Dataset]:
         """Yield the rows of one of them, one-dimensional."""
 
 
@@ -147,9 +148,9 @@ class EarlierSweep:
 class _Source:
     """A file of rows, or a shard of a store; `runs`, ascending, are those that are in no other source."""
 
-    path: Path
+    path: AnyPath
     runs: Runs
-    read: Callable[[Path], Iterator[xr.Dataset]] = blocks_of
+    read: Callable[[AnyPath], Iterator[xr.Dataset]] = blocks_of
     is_whole: bool = True
 
     def blocks(self) -> Iterator[xr.Dataset]:
@@ -162,7 +163,7 @@ class _Source:
             elif there.any():
                 yield take_runs(rows, np.flatnonzero(there))
 
-    def files(self, scratch: Path) -> Iterator[Path]:
+    def files(self, scratch: Path) -> Iterator[AnyPath]:
         """Yield the files with the rows: the source itself, or new files in a folder."""
         if self.read is blocks_of and self.is_whole:
             yield self.path

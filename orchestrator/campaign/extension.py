@@ -12,7 +12,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from vibroimpact.analysis.dataset import (
 from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable
 from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.schema import attributes_of
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.chunks import Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
@@ -65,7 +65,7 @@ _OF_STATES = ("run_index", "outcome", "final_state", "final_displacement", "fina
 """Variables that tell the state which a run hands on."""
 
 
-def kept_path(folder: Path, scene_hash: str) -> Path:
+def kept_path(folder: AnyPath, scene_hash: str) -> AnyPath:
     """Return the path of the kept rows of an extended campaign; only extended campaigns have the file."""
     return folder / f"kept-{scene_hash[:16]}.nc"
 
@@ -278,14 +278,14 @@ def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
 class Kept:
     """Rows of a campaign that come from an earlier sweep."""
 
-    path: Path
+    path: AnyPath
     runs: Runs
     """Numbers of the kept runs, ascending, shape (run,)."""
     stretches: list[StoredPart]
     """Neighbouring runs that chunks leave out, with the start state of the run after them."""
 
 
-def read_kept(path: Path, scene: Scene) -> Kept:
+def read_kept(path: AnyPath, scene: Scene) -> Kept:
     """Return the kept rows of a file; raise DatasetError if it is damaged."""
     with FlatFile(path) as file:
         stored = {str(name): variable for name, variable in file.dataset.variables.items()}
@@ -360,7 +360,7 @@ def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:
     return None if differences(known, flat_scene(scene)) else scene
 
 
-def read_finished(path: Path) -> Part:
+def read_finished(path: AnyPath) -> Part:
     """Return attributes and run numbers of a campaign's dataset; raise DatasetError if it is damaged."""
     try:
         return read_part(path)

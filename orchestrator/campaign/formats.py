@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from vibroimpact.analysis.dataset.store_grid import SHARD_POINTS
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.analysis.files.stores import zarr_package
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
@@ -40,20 +41,20 @@ def default_format(scene: Scene) -> DatasetFormat:
     return "zarr" if is_large and importlib.util.find_spec("zarr") is not None else "netcdf"
 
 
-def has_dataset(home: Path) -> bool:
+def has_dataset(home: AnyPath) -> bool:
     """Return whether a folder has a dataset of either format, finished or not."""
     return (home / "dataset.nc").exists() or has_rows(home / STORE)
 
 
 def chosen_shard_points(
-    home: Path, scene: Scene, manifest: Manifest | None, format: DatasetFormat | None
+    home: AnyPath, scene: Scene, manifest: Manifest | None, format: DatasetFormat | None
 ) -> int:
     """Return the number of points of a shard of a campaign's store; 0: its dataset is a file.
 
     Parameters
     ----------
-    home : Path
-        Folder of the campaign.
+    home : Path or ObjectPath
+        Folder of the campaign, or its address, where the dataset is a store.
     scene : Scene
     manifest : Manifest or None
         Manifest of the campaign that has begun in the folder.
@@ -67,6 +68,9 @@ def chosen_shard_points(
     """
     if format is not None and format not in get_args(DatasetFormat):
         raise UsageError(f'format: expected "netcdf" or "zarr", got {format!r}.')
+    if not isinstance(home, Path):
+        refuse_for_address(home, scene, format)
+        format = "zarr"
     if manifest is not None:
         began: DatasetFormat = "zarr" if manifest.shard_points else "netcdf"
         if format not in (None, began):
@@ -87,6 +91,34 @@ def chosen_shard_points(
     return shard_points_of(scene) if is_store else 0
 
 
+def refuse_for_address(home: AnyPath, scene: Scene, format: DatasetFormat | None) -> None:
+    """Raise UsageError unless the dataset of a scene is a store that grows: an object store holds no other.
+
+    Raises
+    ------
+    UsageError
+    """
+    # imported only for a store
+    from vibroimpact.orchestrator.campaign.shards import grid_of
+
+    if format == "netcdf":
+        expected, got = "the format zarr", "netcdf"
+    elif grid_of(scene, shard_points_of(scene)) is None:
+        expected, got = (
+            "a sweep whose points are a grid",
+            "one without keys, adaptive, or with repeated values",
+        )
+    else:
+        return
+    raise UsageError(
+        message(
+            f"{home}: expected {expected} for a campaign at an address, got {got}. Choose a folder of this machine",
+            WITH_OUTPUT,
+            f"; `vibroimpact convert FOLDER {home}` copies its dataset to the address.",
+        )
+    )
+
+
 def shard_points_of(scene: Scene) -> int:
     """Return the number of points of a shard: 2^20, or the power of two whose results fit in memory."""
     record = scene.record
@@ -100,9 +132,11 @@ def shard_points_of(scene: Scene) -> int:
     return points
 
 
-def destination_of(home: Path, scene: Scene, shard_points: int, scene_hash: str, note: Note) -> Destination:
+def destination_of(
+    home: AnyPath, scene: Scene, shard_points: int, scene_hash: str, note: Note
+) -> Destination:
     """Return the dataset of a campaign; `note` gets a line for each damaged shard."""
-    if not shard_points:
+    if not shard_points and isinstance(home, Path):
         return JoinedFile(home, scene)
     # imported only for a store
     from vibroimpact.orchestrator.campaign.grown_store import GrownStore
@@ -111,13 +145,14 @@ def destination_of(home: Path, scene: Scene, shard_points: int, scene_hash: str,
 
     store = GrowingStore(str(home), shard_points)
     grid = store.grid(scene)
-    if grid is None:
-        return WholeStore(store, scene, scene_hash)
+    if grid is None and isinstance(home, Path):
+        return WholeStore(home, scene, scene_hash)
+    assert grid is not None  # `refuse_for_address`
     return GrownStore(store, scene, grid, scene_hash, note)
 
 
 def earlier_store(
-    home: Path, scene: Scene, shard_points: int, scene_hash: str, note: Note
+    home: AnyPath, scene: Scene, shard_points: int, scene_hash: str, note: Note
 ) -> Destination | None:
     """Return the store of the sweep before an extension, ready to be read; None where its dataset is a file."""
     if not shard_points:

@@ -6,7 +6,6 @@ so that damaged or lost ones come back. A file of its own seals the finished sto
 
 from __future__ import annotations
 
-import shutil
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,6 +19,9 @@ from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.schema import RULES, attributes_of
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter, create_store
+from vibroimpact.analysis.files.object_paths import AnyPath, located
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.files.stores import objects_below
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
@@ -40,6 +42,7 @@ from vibroimpact.orchestrator.campaign.parts import Note, StoredPart
 from vibroimpact.orchestrator.campaign.sealing import OPTIONAL, GrowingStore, read_shard, write_shard
 from vibroimpact.orchestrator.campaign.seals import (
     FINISHED,
+    STORE,
     Seal,
     finished_store,
     read_seal,
@@ -53,8 +56,6 @@ from vibroimpact.orchestrator.campaign.seals import (
 from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid
 from vibroimpact.orchestrator.run.dataset import DatasetForm, empty_dataset, with_constants_of
 from vibroimpact.orchestrator.scene import Scene
-
-_SCRATCH = ".made-again.zarr"
 
 
 def seal_parts(work: Work, complete: ShardParts) -> Seal:
@@ -111,8 +112,21 @@ class GrownStore(Destination):
         refuse_other_store(self.path, self._seals, self._hash, extended=self._is_extended())
         self._seals.mkdir(exist_ok=True)
         (self._seals / FINISHED).unlink(missing_ok=True)
-        scratch = self.path.with_name(_SCRATCH)
-        shutil.rmtree(scratch, ignore_errors=True)
+        with ScratchFolder("store") as folder:
+            made_again = Path(folder.name, STORE)
+            self._create(made_again)
+            there = set(objects_below(self.path))
+            # the root names the scene: a store that is cut off without it would be taken for one of another program
+            for key in sorted(objects_below(made_again), key=lambda key: (key != "zarr.json", key)):
+                place, content = self.path / key, (made_again / key).read_bytes()
+                if key in there and place.read_bytes() == content:
+                    continue
+                if isinstance(place, Path):
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                place.write_bytes(content)
+
+    def _create(self, place: Path) -> None:
+        """Make the arrays of the store, without runs, at another place."""
         scene = self._scene
         axes = dict(self._grid.axes)
         like = with_constants_of(empty_dataset(scene), scene).assign_attrs(scene_hash=self._hash)
@@ -123,16 +137,10 @@ class GrownStore(Destination):
             axes["direction"] = new_variable(
                 (), np.asarray("independent"), {"long_name": RULES["direction"].long_name}
             )
-        create_store(scratch, like, self._grid.cells, axes, sizes={"period": self._periods()})
-        for made in sorted(scratch.rglob("*")):
-            place = self.path / made.relative_to(scratch)
-            if made.is_file() and not (place.is_file() and place.read_bytes() == made.read_bytes()):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                made.replace(place)
-        shutil.rmtree(scratch)
+        create_store(place, like, self._grid.cells, axes, sizes={"period": self._periods()})
 
     def _is_extended(self) -> bool:
-        return kept_path(Path(self._growing.home, "parts"), self._hash).exists()
+        return kept_path(self.path.with_name("parts"), self._hash).exists()
 
     def _periods(self) -> int:
         record = self._scene.record
@@ -154,7 +162,7 @@ class GrownStore(Destination):
             found.append(StoredPart(path, chunk, carried_state(seal.attrs), chunk.count))
         return sorted(found, key=lambda part: part.chunk.first)
 
-    def _checked(self, path: Path, shards: Mapping[int, Shard]) -> Seal:
+    def _checked(self, path: AnyPath, shards: Mapping[int, Shard]) -> Seal:
         """Return a seal whose shard is whole and belongs to this campaign."""
         seal = read_seal(path)
         shard = shards.get(seal.shard)
@@ -169,7 +177,7 @@ class GrownStore(Destination):
         refuse_changed_objects(self.path, seal.objects)
         return seal
 
-    def rows(self, path: Path) -> xr.Dataset:
+    def rows(self, path: AnyPath) -> xr.Dataset:
         """Return the rows of a part, or of the shard of a seal."""
         if path.parent != self._seals:
             return super().rows(path)
@@ -201,7 +209,7 @@ class GrownStore(Destination):
         rows = sum(result.outcomes.values())
         if not rows:
             return []
-        path = Path(result.path)
+        path = located(result.path)
         if path.parent == self._seals:
             self.sealed(read_seal(path))
             return []
@@ -226,7 +234,7 @@ class GrownStore(Destination):
         for part in self._files.pop(seal.shard, []):
             part.path.unlink(missing_ok=True)
 
-    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+    def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the shards whose runs are all in parts, then finish the store; return whether a run has a message."""
         for shard in self.shards:
             if shard.number in self._missing:
@@ -258,5 +266,5 @@ class GrownStore(Destination):
         seal_store(self.path, self._seals, runs, of_seal, {key for seal in seals for key in seal.objects})
 
 
-def _number(seal: Path) -> int:
+def _number(seal: AnyPath) -> int:
     return int(seal.stem.removeprefix("shard-"))

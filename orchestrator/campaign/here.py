@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
+from vibroimpact.analysis.files.object_paths import located
 from vibroimpact.orchestrator.campaign.chunks import (
     ChunkResult,
     Work,
@@ -101,5 +101,5 @@ def _is_past(instant: float) -> bool:
 
 def _with_parts(stage: Stage, results: Iterable[ChunkResult]) -> Stage:
     """Return a stage that also holds the parts of these results."""
-    parts = [StoredPart(Path(one.path), one.chunk, one.carried, one.chunk.count) for one in results]
+    parts = [StoredPart(located(one.path), one.chunk, one.carried, one.chunk.count) for one in results]
     return replace(stage, held=sorted([*stage.held, *parts], key=lambda part: part.chunk.first))

@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, NoReturn
 
 from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, raise_outage
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.run import OTHER_ENGINE, RunnerIdentity
@@ -161,7 +160,7 @@ def new_manifest(
     return content
 
 
-def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
+def add_build(path: AnyPath, identity: RunnerIdentity, compared: int) -> None:
     """Add another build of the components to a manifest; `compared` points, computed again, were equal."""
     content = read_content(path)
     build = {
@@ -175,7 +174,7 @@ def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
 
 
 def write_manifest(
-    path: Path,
+    path: AnyPath,
     scene: Scene,
     identity: RunnerIdentity,
     runs: int,
@@ -185,7 +184,7 @@ def write_manifest(
     write_content(path, new_manifest(scene, identity, runs, shard_points=shard_points))
 
 
-def write_content(path: Path, content: Content) -> None:
+def write_content(path: AnyPath, content: Content) -> None:
     """Write a manifest with its SHA-256, whole or not at all."""
     content = {key: value for key, value in content.items() if key != "sha256"}
     write_atomically(path, json.dumps(content | {"sha256": content_hash(content)}, indent=1).encode())
@@ -196,7 +195,7 @@ def content_hash(content: Content) -> str:
     return _hash_of({key: value for key, value in content.items() if key != "sha256"})
 
 
-def read_manifest(path: Path) -> Manifest | None:
+def read_manifest(path: AnyPath) -> Manifest | None:
     """Return the manifest of a folder; None where there is no manifest.
 
     Raises
@@ -216,6 +215,7 @@ def read_manifest(path: Path) -> Manifest | None:
     except FileNotFoundError:
         return None
     except (OSError, *DAMAGE) as error:
+        raise_outage(path, error)
         reason = error.strerror if isinstance(error, OSError) else error
         raise DamagedManifestError(
             f"{path}: expected the manifest of a campaign, got a damaged file ({reason}). "
@@ -223,14 +223,9 @@ def read_manifest(path: Path) -> Manifest | None:
         ) from error
 
 
-def read_content(path: Path) -> Content:
+def read_content(path: AnyPath) -> Content:
     """Return the JSON of a file; raise ValueError unless its size and structure suit a manifest."""
-    status = path.stat()
-    if not stat.S_ISREG(status.st_mode):
-        raise ValueError("it is no file")
-    if status.st_size > _LARGEST:
-        raise ValueError(f"it has {status.st_size} bytes, more than {_LARGEST}")
-    raw = path.read_bytes()
+    raw = bounded_bytes(path, _LARGEST)
     for character, most in _MOST_OF.items():
         if raw.count(character) > most:
             raise ValueError(f"it has more than {most} of the character {character.decode()!r}")
@@ -309,7 +304,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
+def refuse_other_scene(path: AnyPath, different: Sequence[str]) -> NoReturn:
     """Raise UsageError with the first few differences from the scene with which the campaign was started."""
     shown = "; ".join(different[:_MOST_DIFFERENCES])
     hidden = len(different) - _MOST_DIFFERENCES
@@ -341,7 +336,7 @@ def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str
     return differences(was, now)
 
 
-def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") -> NoReturn:
+def refuse_other_runner(path: AnyPath, different: Sequence[str], reason: str = "") -> NoReturn:
     """Raise UsageError, as results of different components, executions or instruction sets are never mixed.
 
     The message has the differences, and the reason why stored points do not prove equal results.

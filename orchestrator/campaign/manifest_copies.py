@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.dataset import read_part
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.campaign.chunks import MANIFEST
@@ -45,7 +45,7 @@ _RUNNER = ("execution", "instruction_set", "fmu_hashes", "engine")
 class _Copy:
     """The manifest in a file with `runs` runs; `None` in it stands for values that the scene has."""
 
-    path: Path
+    path: AnyPath
     content: Content
     runs: int
 
@@ -79,10 +79,10 @@ class _Folder:
 
     parts: list[_Copy] = field(default_factory=list)
     kept: list[_Copy] = field(default_factory=list)
-    older: list[tuple[Path, str]] = field(default_factory=list)
+    older: list[tuple[AnyPath, str]] = field(default_factory=list)
 
 
-def manifest_of_folder(home: Path, scene: Scene, note: Note) -> Manifest | None:
+def manifest_of_folder(home: AnyPath, scene: Scene, note: Note) -> Manifest | None:
     """Return the manifest of a folder, made again from its copies where it is lost; None for a new campaign.
 
     Raises
@@ -116,7 +116,7 @@ def manifest_of_folder(home: Path, scene: Scene, note: Note) -> Manifest | None:
     return manifest
 
 
-def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
+def manifest_again(home: AnyPath, scene: Scene) -> tuple[Content, str] | None:
     """Return the manifest in the files of a campaign, and the files in words; None where no file has it.
 
     `home` is the folder of the campaign, and `scene` is the scene of the present command. UsageError: the files belong
@@ -132,7 +132,7 @@ def manifest_again(home: Path, scene: Scene) -> tuple[Content, str] | None:
     return _completed(chosen, scene), origin
 
 
-def _read(folder: Path, seals: Path) -> _Folder:
+def _read(folder: AnyPath, seals: AnyPath) -> _Folder:
     found = _Folder()
     for path in [*seals_in(seals), seals / FINISHED]:
         try:
@@ -168,7 +168,7 @@ def _content_in(attrs: Mapping[str, Any]) -> Content | None:
         return None
 
 
-def _finished(path: Path, scene: Scene) -> _Copy | None:
+def _finished(path: AnyPath, scene: Scene) -> _Copy | None:
     """Return the manifest from the dataset of a finished campaign; None for any other dataset."""
     if not path.is_file():
         return None

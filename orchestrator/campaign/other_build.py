@@ -7,7 +7,6 @@ points, spread evenly over the files, are computed again: a campaign goes on onl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, take_runs
 from vibroimpact.analysis.dataset.schema import swept_names
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, compute_again
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
@@ -40,8 +40,8 @@ def compare_with_stored(
     pool: WorkerPool,
     work: Work,
     scene: Scene,
-    stored: Sequence[Path],
-    read: Callable[[Path], xr.Dataset] = read_flat,
+    stored: Sequence[AnyPath],
+    read: Callable[[AnyPath], xr.Dataset] = read_flat,
 ) -> tuple[int, str]:
     """Compute a few stored points again; return their number, and the reason why they do not prove equal results.
 
@@ -65,7 +65,7 @@ def compare_with_stored(
 
 
 def _chosen(
-    scene: Scene, stored: Sequence[Path], read: Callable[[Path], xr.Dataset]
+    scene: Scene, stored: Sequence[AnyPath], read: Callable[[AnyPath], xr.Dataset]
 ) -> Iterator[tuple[Chunk, xr.Dataset]]:
     """Yield points that can be computed again, spread evenly over the files, each with its stored row."""
     branches = expand(scene)

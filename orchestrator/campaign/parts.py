@@ -27,6 +27,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import wrapped
 from vibroimpact.analysis.files.fingerprints import has_recorded_hash
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import (
     CARRIED,
@@ -56,14 +57,14 @@ Note = Callable[[str], None]
 class StoredPart:
     """A sound part: its chunk, the start state of the next run of its branch, and its number of rows."""
 
-    path: Path
+    path: AnyPath
     chunk: Chunk
     carried: State | None
     rows: int = 0
 
 
 def list_parts(
-    folder: Path, scene_hash: str, note: Note, kept: NDArray[np.int64] = NO_RUNS
+    folder: AnyPath, scene_hash: str, note: Note, kept: NDArray[np.int64] = NO_RUNS
 ) -> list[StoredPart]:
     """Return the sound parts in a folder, in run order; damaged and duplicate parts are removed.
 
@@ -84,19 +85,19 @@ def list_parts(
     return sound
 
 
-def own_files(folder: Path) -> list[Path]:
+def own_files(folder: AnyPath) -> list[AnyPath]:
     """Return the files of a campaign in its folder of parts; other files there do not belong to it."""
     return [path for path in folder.iterdir() if _OWN.fullmatch(path.name) and path.is_file()]
 
 
-def remove_temporary_files(folder: Path) -> None:
+def remove_temporary_files(folder: AnyPath) -> None:
     """Remove the temporary files that a killed writer of a campaign left behind."""
     for path in folder.iterdir():
         if _TEMPORARY.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
-def remove_parts(folder: Path) -> None:
+def remove_parts(folder: AnyPath) -> None:
     """Remove the parts of a complete campaign, and their folder if it is empty then."""
     if not folder.is_dir():
         return
@@ -108,7 +109,7 @@ def remove_parts(folder: Path) -> None:
         folder.rmdir()
 
 
-def remove_parts_within(folder: Path, held: Sequence[StoredPart]) -> None:
+def remove_parts_within(folder: AnyPath, held: Sequence[StoredPart]) -> None:
     """Remove parts whose runs are in shards of a store: their writer ended before it removed them."""
     firsts = [part.chunk.first for part in held]
     for path, chunk in _named_parts(folder) if held else ():
@@ -117,7 +118,7 @@ def remove_parts_within(folder: Path, held: Sequence[StoredPart]) -> None:
             path.unlink()
 
 
-def _named_parts(folder: Path) -> list[tuple[Path, Chunk]]:
+def _named_parts(folder: AnyPath) -> list[tuple[AnyPath, Chunk]]:
     found = []
     for path in own_files(folder):
         match = _NAME.fullmatch(path.name)
@@ -127,19 +128,19 @@ def _named_parts(folder: Path) -> list[tuple[Path, Chunk]]:
     return sorted(found, key=lambda item: (item[1].first, -item[1].stop))
 
 
-def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) -> StoredPart:
+def _read(path: AnyPath, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) -> StoredPart:
     part = read_part(path)
     runs = np.arange(chunk.first, chunk.stop)
     if not np.array_equal(part.run_index, runs[~np.isin(runs, kept)]):
         raise DatasetError(f"{path}: expected runs {chunk.first} to {chunk.stop - 1}, got others.")
     if part.attrs.get("scene_hash") != scene_hash:
         raise DatasetError(f"{path}: expected a part of this scene, got one of another.")
-    if not has_recorded_hash(path):
+    if isinstance(path, Path) and not has_recorded_hash(path):
         check(read_flat(path))
     return StoredPart(path, chunk, carried_state(part.attrs), part.run_index.size)
 
 
-def compact(parts: Sequence[Path], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> bool:
+def compact(parts: Sequence[AnyPath], target: Path, form: DatasetForm, attrs: Mapping[str, Any]) -> bool:
     """Write the rows of all parts as one dataset, with the numbers that are not swept.
 
     It returns whether any row has a message. The file is written as a whole or not at all. DatasetError: a part cannot
@@ -160,7 +161,7 @@ def without_own_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
     return {name: value for name, value in attrs.items() if name not in own}
 
 
-def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:
+def unfit_parts(parts: Iterable[AnyPath], scene: Scene) -> Iterator[tuple[AnyPath, str]]:
     """Yield the parts that cannot be read, or that do not belong to a scene, each with the reason."""
     like = empty_dataset(scene)
     for path in parts:

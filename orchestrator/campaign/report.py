@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.orchestrator.campaign.chunks import Chunk
 
 
@@ -19,7 +19,7 @@ class CampaignReport:
 
     Attributes
     ----------
-    dataset : Path
+    dataset : Path or ObjectPath
     runs : int
         Number of runs in the dataset.
     resumed : int
@@ -40,7 +40,7 @@ class CampaignReport:
         Whether no run of the dataset has a message; known only if this command made the dataset.
     """
 
-    dataset: Path
+    dataset: AnyPath
     runs: int
     resumed: int = 0
     outcomes: Counter[str] = field(default_factory=Counter)

@@ -20,6 +20,7 @@ from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter
+from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, Seal, object_hash, write_seal
 from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid, grid_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
@@ -33,20 +34,20 @@ OPTIONAL = ("loop_residual",)
 
 @dataclass(frozen=True, slots=True)
 class GrowingStore:
-    """The store of a campaign for its workers: the folder of the campaign, and the size of a shard."""
+    """The store of a campaign for its workers: the folder or address of the campaign, and the size of a shard."""
 
     home: str
     shard_points: int
 
     @property
-    def path(self) -> Path:
+    def path(self) -> AnyPath:
         """Folder of the store."""
-        return Path(self.home, STORE)
+        return located(self.home) / STORE
 
     @property
-    def seals(self) -> Path:
+    def seals(self) -> AnyPath:
         """Folder of the seals."""
-        return Path(self.home, SEALS)
+        return located(self.home) / SEALS
 
     def grid(self, scene: Scene) -> SweepGrid | None:
         """Return the grid of a scene in shards of this store; None where its dataset is written as a whole."""
@@ -137,8 +138,10 @@ def _writer(path: str, scene_hash: str) -> StoreWriter:
     return StoreWriter(path)
 
 
-def _flushed(store: Path, keys: Sequence[str]) -> Sequence[str]:
-    """Flush objects of a store, and the names of new ones, to the disk."""
+def _flushed(store: AnyPath, keys: Sequence[str]) -> Sequence[str]:
+    """Flush objects of a store, and the names of new ones, to the disk; an object store has done so itself."""
+    if not isinstance(store, Path):
+        return keys
     folders = {str((store / key).parent) for key in keys}
     for path in (*(str(store / key) for key in keys), *sorted(folders)):
         handle = os.open(path, os.O_RDONLY)

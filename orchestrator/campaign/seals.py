@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, opened_bytes, raise_outage
 from vibroimpact.analysis.files.store_attributes import attributes_read
-from vibroimpact.analysis.files.stores import opened_group
+from vibroimpact.analysis.files.stores import objects_below, opened_group
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import CALL, message
 
@@ -67,19 +68,19 @@ class Seal:
     objects: Mapping[str, str]
 
 
-def seal_path(folder: Path, shard: int) -> Path:
+def seal_path(folder: AnyPath, shard: int) -> AnyPath:
     """Return the path of the seal of a shard."""
     return folder / f"shard-{shard:06d}.json"
 
 
-def write_seal(folder: Path, seal: Seal) -> Path:
+def write_seal(folder: AnyPath, seal: Seal) -> AnyPath:
     """Write a seal, whole or not at all, and return its path."""
     path = seal_path(folder, seal.shard)
     write_sealed(path, asdict(seal))
     return path
 
 
-def read_seal(path: Path) -> Seal:
+def read_seal(path: AnyPath) -> Seal:
     """Return the seal of a shard.
 
     Raises
@@ -94,12 +95,12 @@ def read_seal(path: Path) -> Seal:
         raise DatasetError(f"{path}: expected the seal of a shard, got other content: {error}.") from error
 
 
-def write_sealed(path: Path, content: Mapping[str, Any]) -> None:
+def write_sealed(path: AnyPath, content: Mapping[str, Any]) -> None:
     """Write facts with their SHA-256, whole or not at all."""
     write_atomically(path, json.dumps({**content, "sha256": _hash_of(content)}, indent=1).encode())
 
 
-def read_sealed(path: Path) -> dict[str, Any]:
+def read_sealed(path: AnyPath) -> dict[str, Any]:
     """Return the facts in a file.
 
     Raises
@@ -108,33 +109,32 @@ def read_sealed(path: Path) -> dict[str, Any]:
         The file has changed since `write_sealed` wrote it.
     """
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError(f"more than {_LARGEST} bytes")
-        content: dict[str, Any] = json.loads(path.read_bytes())
+        content: dict[str, Any] = json.loads(bounded_bytes(path, _LARGEST))
         if content.pop("sha256") != _hash_of(content):
             raise ValueError("not the content whose SHA-256 it has")
         return content
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise_outage(path, error)
         reason = error.strerror if isinstance(error, OSError) else error
         raise DatasetError(f"{path}: expected the seal of a shard, got {reason}.") from error
 
 
-def seals_in(folder: Path) -> Iterator[Path]:
+def seals_in(folder: AnyPath) -> Iterator[AnyPath]:
     """Yield the paths of the seals in a folder, by the number of their shard; other files do not belong to it."""
     if folder.is_dir():
         yield from sorted(path for path in folder.iterdir() if _NAME.fullmatch(path.name))
 
 
-def object_hash(path: Path) -> str:
+def object_hash(path: AnyPath) -> str:
     """Return the SHA-256 of an object of a store in a folder."""
     digest = hashlib.sha256()
-    with open(path, "rb") as file:
+    with opened_bytes(path) as file:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
 
 
-def refuse_changed_objects(store: Path, objects: Mapping[str, str]) -> None:
+def refuse_changed_objects(store: AnyPath, objects: Mapping[str, str]) -> None:
     """Raise DatasetError unless objects have their SHA-256.
 
     Raises
@@ -146,26 +146,28 @@ def refuse_changed_objects(store: Path, objects: Mapping[str, str]) -> None:
         try:
             found = object_hash(store / key)
         except OSError as error:
+            raise_outage(store, error)
             raise DatasetError(f"{store / key}: {error.strerror or error}.") from error
         if found != expected:
             raise DatasetError(f"{store / key}: its content is not the one whose SHA-256 its seal has.")
 
 
-def _scene_of(store: Path) -> str | None:
+def _scene_of(store: AnyPath) -> str | None:
     """Return the hash of the scene of a store; None without metadata that name one."""
     try:
         found = json.loads((store / "zarr.json").read_bytes())["attributes"].get("scene_hash")
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise_outage(store, error)
         return None
     return None if found is None else str(found)
 
 
-def has_rows(store: Path) -> bool:
+def has_rows(store: AnyPath) -> bool:
     """Return whether there is a store, or something else, that may hold rows of runs."""
-    return store.exists() and (_scene_of(store) is None or (store / "run_id" / "c").exists())
+    return store.exists() and (_scene_of(store) is None or (store / "run_id/c").exists())
 
 
-def refuse_other_store(store: Path, seals: Path, scene_hash: str, *, extended: bool) -> None:
+def refuse_other_store(store: AnyPath, seals: AnyPath, scene_hash: str, *, extended: bool) -> None:
     """Raise UsageError if there is a store of another scene; remove that of the sweep before an extension.
 
     Raises
@@ -174,7 +176,7 @@ def refuse_other_store(store: Path, seals: Path, scene_hash: str, *, extended: b
     """
     if _scene_of(store) in (None, scene_hash):
         return
-    if not extended:
+    if not extended or not isinstance(store, Path):
         expected = (
             "expected the store of this campaign, got that of another scene. Move it away; then the same "
         )
@@ -182,7 +184,7 @@ def refuse_other_store(store: Path, seals: Path, scene_hash: str, *, extended: b
     remove_store(store, seals)
 
 
-def remove_store(store: Path, seals: Path) -> None:
+def remove_store(store: Path, seals: AnyPath) -> None:
     """Remove a store, its metadata last, and all of its seals."""
     for path in seals_in(seals):
         path.unlink()
@@ -195,7 +197,7 @@ def remove_store(store: Path, seals: Path) -> None:
     shutil.rmtree(store)
 
 
-def finished_store(store: Path, seals: Path) -> tuple[int, dict[str, Any]] | None:
+def finished_store(store: AnyPath, seals: AnyPath) -> tuple[int, dict[str, Any]] | None:
     """Return the number of runs and the attributes of a finished store; None where it is unfinished or damaged.
 
     Objects of shards have seals of their own, and are not read.
@@ -209,11 +211,10 @@ def finished_store(store: Path, seals: Path) -> tuple[int, dict[str, Any]] | Non
 
 
 def seal_store(
-    store: Path, seals: Path, runs: int, attrs: Mapping[str, Any], sealed: Collection[str] = ()
+    store: AnyPath, seals: AnyPath, runs: int, attrs: Mapping[str, Any], sealed: Collection[str] = ()
 ) -> None:
     """Write the seal of a finished store of some runs: attributes as those of a part, objects without another seal."""
-    keys = sorted(path.relative_to(store).as_posix() for path in store.rglob("*") if path.is_file())
-    objects = {key: object_hash(store / key) for key in keys if key not in sealed}
+    objects = {key: object_hash(store / key) for key in sorted(objects_below(store)) if key not in sealed}
     write_sealed(seals / FINISHED, {"runs": runs, "attrs": dict(attrs), "objects": objects})
 
 

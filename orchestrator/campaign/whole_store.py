@@ -10,14 +10,16 @@ import xarray as xr
 from vibroimpact.analysis.dataset.converting import convert_dataset
 from vibroimpact.analysis.dataset.store_runs import StoreRuns, read_runs
 from vibroimpact.analysis.dataset.zarr_store import StoreWriter
+from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, attributes_of_part
 from vibroimpact.orchestrator.campaign.destination import Attributes, Destination
 from vibroimpact.orchestrator.campaign.extension import is_of, kept_path
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import StoredPart, compact
-from vibroimpact.orchestrator.campaign.sealing import GrowingStore
 from vibroimpact.orchestrator.campaign.seals import (
     FINISHED,
+    SEALS,
+    STORE,
     finished_store,
     read_sealed,
     refuse_other_store,
@@ -33,8 +35,9 @@ _JOINED = ".joined.nc"
 class WholeStore(Destination):
     """The store `dataset.zarr`, written when the last run is computed."""
 
-    def __init__(self, store: GrowingStore, scene: Scene, scene_hash: str) -> None:
-        self.path, self._seals, self._scene, self._hash = store.path, store.seals, scene, scene_hash
+    def __init__(self, home: Path, scene: Scene, scene_hash: str) -> None:
+        self.path = self._store = home / STORE
+        self._seals, self._scene, self._hash = home / SEALS, scene, scene_hash
 
     def make(self) -> None:
         """Raise UsageError if the store of another campaign is at this place."""
@@ -51,11 +54,11 @@ class WholeStore(Destination):
         done = finished_store(self.path, self._seals)
         return [] if done is None else [StoredPart(self.path, Chunk(0, 0, done[0]), None, done[0])]
 
-    def rows(self, path: Path) -> xr.Dataset:
+    def rows(self, path: AnyPath) -> xr.Dataset:
         """Return the rows of a part, or of the store."""
         return read_runs(path) if path == self.path else super().rows(path)
 
-    def blocks(self, path: Path) -> Iterator[xr.Dataset]:
+    def blocks(self, path: AnyPath) -> Iterator[xr.Dataset]:
         """Yield the rows of a part, or those of each shard of the store."""
         if path != self.path:
             yield from super().blocks(path)
@@ -63,9 +66,9 @@ class WholeStore(Destination):
         for shard in StoreRuns(path).shards:
             yield shard.rows()
 
-    def complete(self, work: Work, paths: Sequence[Path], form: DatasetForm, attrs: Attributes) -> bool:
+    def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the rows of all parts as one store; return whether a run has a message."""
-        joined = self.path.with_name(_JOINED)
+        joined = self._store.with_name(_JOINED)
         try:
             has_messages = compact(paths, joined, form, attrs)
             self._seals.mkdir(exist_ok=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, open_dataset
+from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.messages import counted
 
 FAILED = (Outcome.error, Outcome.crash, Outcome.timeout)
@@ -22,9 +22,9 @@ MOST_RUNS_READ = 100_000
 LONGEST_MESSAGE = 400
 
 
-def outcome_lines(path: Path, runs: int) -> Iterator[str]:
+def outcome_lines(place: Place, runs: int) -> Iterator[str]:
     """Yield the messages on a dataset's points: failures, and warnings of points that went well."""
-    with open_dataset(path) as dataset:
+    with open_dataset(place) as dataset:
         yield from failure_lines(dataset)
         if runs <= MOST_RUNS_READ:
             yield from _warning_lines(dataset)

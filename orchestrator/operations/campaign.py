@@ -21,7 +21,13 @@ class Campaign(Operation):
         Positional(python="scene: SceneLike", help="Scene file (TOML), or a system (SSP), with a sweep."),
     ]
     output: Annotated[
-        Path, Option("--output", "-o", python="folder: PathLike", help="Folder of the campaign.")
+        Path,
+        Option(
+            "--output",
+            "-o",
+            python="folder: PathLike",
+            help="Folder of the campaign, or an address such as s3://bucket/map.",
+        ),
     ]
     changes: Changes = None
     workers: Annotated[

@@ -82,7 +82,7 @@ def assert_same_rows(first: Path, second: Path) -> None:
             assert np.array_equal(variable.values.view(np.int64), other[name].values.view(np.int64)), name
 
 
-def assert_same_datasets(first: Path, second: Path) -> None:
+def assert_same_datasets(first: str | Path, second: str | Path) -> None:
     """Assert that two campaigns have the same datasets once opened, up to timing and the order of ragged rows."""
     one, other = (_comparable(open_dataset(place)) for place in (first, second))
     xr.testing.assert_identical(one, other)

@@ -81,7 +81,7 @@ def workers_here(patch: pytest.MonkeyPatch, most_chunks: int | None = None) -> N
 def campaign_here(
     patch: pytest.MonkeyPatch,
     text: str,
-    folder: Path,
+    folder: str | Path,
     *,
     runner: str = "support.busy_runner:SceneRunner",
     most_chunks: int | None = None,

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
-import fsspec
 import pytest
 import s3fs
 import xarray as xr
-from moto.server import ThreadedMotoServer
 from support.command_line import in_this_process
 from support.dataset_examples import dataset_of, record
-from zarr.core.sync import _get_loop as zarr_loop
+from support.object_store import bucket_of, close_all, served
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import dataset_place, write_dataset
@@ -25,41 +22,14 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
-    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-    server.start()
-    host, port = server.get_host_and_port()
-    yield f"http://{host}:{port}"
-    server.stop()
+    with served() as url:
+        yield url
 
 
 @pytest.fixture
 def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
-    for name, value in {
-        "AWS_ENDPOINT_URL": endpoint,
-        "AWS_ACCESS_KEY_ID": "testing",
-        "AWS_SECRET_ACCESS_KEY": "testing",
-        "AWS_DEFAULT_REGION": "us-east-1",
-        "AWS_MAX_ATTEMPTS": "1",
-    }.items():
-        monkeypatch.setenv(name, value)
-    fsspec.get_filesystem_class("s3").clear_instance_cache()
-    system = fsspec.filesystem("s3")
-    system.mkdir("bucket")
-    yield system
-    system = fsspec.filesystem("s3")
-    if system.exists("bucket"):
-        system.rm("bucket", recursive=True)
-    close_all()
-
-
-def close_all() -> None:
-    """Close the connections of all file systems: those of zarr are of its own loop."""
-    kind = fsspec.get_filesystem_class("s3")
-    for system in kind._cache.values():
-        if system._s3 is not None:
-            loop = zarr_loop() if system.asynchronous else system.loop
-            asyncio.run_coroutine_threadsafe(system._s3.close(), loop).result(10)
-    kind.clear_instance_cache()
+    with bucket_of(endpoint, monkeypatch) as system:
+        yield system
 
 
 @pytest.fixture

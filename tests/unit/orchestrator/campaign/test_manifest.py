@@ -6,6 +6,7 @@ from support.campaign_scenes import frequency_text, scene_of
 
 from vibroimpact.analysis.files.folder_lock import locked_folder
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign.home import answer_question, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
     add_build,
@@ -20,7 +21,6 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
     write_manifest,
 )
-from vibroimpact.orchestrator.campaign.shared_folder import answer_question, refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 
 TEXT = frequency_text(11, "up")

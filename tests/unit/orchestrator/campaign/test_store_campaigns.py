@@ -368,10 +368,3 @@ def test_a_shard_of_many_recorded_periods_has_fewer_points(monkeypatch: pytest.M
     few, many = (scene_of(MAP.replace("recorded_periods = 2", f"recorded_periods = {n}")) for n in (2, 200))
     assert formats.shard_points_of(few) <= 2**20
     assert formats.shard_points_of(few) == 128 * formats.shard_points_of(many)
-
-
-@pytest.mark.parametrize("folder", ["s3://bucket/map", Path("s3://bucket/map")])
-def test_an_address_is_no_folder_of_a_campaign(tmp_path: Path, folder: str | Path) -> None:
-    with pytest.raises(UsageError, match="s3://bucket/map: expected a folder of this machine for a campaign"):
-        run_campaign(scene_of(MAP), folder)
-    assert list(tmp_path.iterdir()) == []
