@@ -14,7 +14,7 @@ import pytest
 from support.campaign_scenes import assert_same_rows, frequency_text, scene_of
 from support.serial_pool import Notes, campaign_here
 
-import vibroimpact.orchestrator.campaign.extension as extension
+import vibroimpact.orchestrator.campaign.earlier_sweep as earlier_sweep
 import vibroimpact.orchestrator.campaign.manifest as manifests
 import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import read_flat, read_part, write_dataset
@@ -190,7 +190,7 @@ def test_a_manifest_that_is_lost_while_a_campaign_is_extended_costs_no_computed_
         raise Killed
 
     with monkeypatch.context() as patch:
-        patch.setattr(extension, "write_content", written)
+        patch.setattr(earlier_sweep, "write_content", written)
         with pytest.raises(Killed):
             campaign_here(patch, LONGER, half)
     (half / "campaign.json").unlink()
