@@ -76,7 +76,7 @@ def measured(points: int, impacts: bool, workers: int | None) -> None:
             openings.append(time.perf_counter() - began)
         with open_dataset(report.dataset) as opened:
             own = float(opened.point_seconds.sum())
-        size = report.dataset.stat().st_size
+        size = Path(report.dataset).stat().st_size
     client, largest = (
         resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
