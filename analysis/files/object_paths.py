@@ -166,7 +166,7 @@ def located(place: str | os.PathLike[str]) -> AnyPath:
     --------
     >>> located("memory://map") / "seals"
     ObjectPath(address='memory://map/seals')
-    >>> located("file:///tmp/map").name
+    >>> located("file:///data/map").name
     'map'
     """
     text = os.fspath(place)
