@@ -26,9 +26,9 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
     from vibroimpact import fmus as fmus
     from vibroimpact.analysis import figures as figures
     from vibroimpact.analysis.dataset import open_dataset as open_dataset
-    from vibroimpact.analysis.dataset.converting import convert as convert
     from vibroimpact.analysis.dataset.reading import open_measured as open_measured
     from vibroimpact.analysis.dataset.results import write_results as write_results
+    from vibroimpact.analysis.dataset.stores.converting import convert as convert
     from vibroimpact.analysis.decay import curve_of as curve_of
     from vibroimpact.analysis.decay import decay_samples as decay_samples
     from vibroimpact.analysis.decay import estimate_decay as estimate_decay

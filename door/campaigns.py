@@ -12,12 +12,12 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_path, prepared_scene
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
+from vibroimpact.orchestrator.campaign.workers.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.run.progress import Progress, shown_progress
 from vibroimpact.orchestrator.ssp import refuse_system_elsewhere
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.cluster import Client
+    from vibroimpact.orchestrator.campaign.workers.cluster import Client
 
 
 def campaign(

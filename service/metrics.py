@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 
-from vibroimpact.orchestrator.campaign.processors import processor_count
+from vibroimpact.orchestrator.campaign.workers.processors import processor_count
 from vibroimpact.service.store import Job, Kind, State, Store
 
 CONTENT_TYPE = CONTENT_TYPE_LATEST

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from vibroimpact.analysis.dataset.converting import convert_dataset, refuse_conversion
 from vibroimpact.analysis.dataset.outputs import refuse_overwriting, writing
 from vibroimpact.analysis.dataset.places import dataset_place, given_place
+from vibroimpact.analysis.dataset.stores.converting import convert_dataset, refuse_conversion
 from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.analysis.files.stores import size_of
 from vibroimpact.analysis.operations.convert import Convert

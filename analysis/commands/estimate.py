@@ -18,7 +18,7 @@ from vibroimpact.analysis.commands.estimate_scene import (
 from vibroimpact.analysis.dataset.outputs import refuse_places, writing
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.dataset.schema import scene_of
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.decay.estimate import print_estimates, print_remarks
 from vibroimpact.analysis.decay.free_decay import estimate_decay, print_decay
 from vibroimpact.analysis.decay.frequency_response import frequency_response

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.analysis.dataset.schema import file_name_of, scene_of, swept_names
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording

@@ -2,7 +2,7 @@
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
 `writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
-`zarr_store` writes Zarr stores, `zarr_reading` opens them, `converting` makes either form from the other.
+`stores` holds the same for Zarr stores, and the conversion of either form into the other.
 `accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
 importable from here.
 """
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         file_name_of,
         file_names,
     )
-    from vibroimpact.analysis.dataset.store_runs import read_runs
+    from vibroimpact.analysis.dataset.stores.runs import read_runs
     from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
 
 __all__ = [
@@ -79,7 +79,7 @@ _HOMES = {
     "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
     "dataset_place": "places",
-    "read_runs": "store_runs",
+    "read_runs": "stores.runs",
     **dict.fromkeys(("Part", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"),
     **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),
 }

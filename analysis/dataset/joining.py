@@ -25,7 +25,7 @@ from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.flat_file import FlatFile, is_large
 from vibroimpact.analysis.dataset.merging import joined, refuse_unlike, take_runs
 from vibroimpact.analysis.dataset.reading import FileOfRuns, read_flat
-from vibroimpact.analysis.dataset.storing import stored_variables
+from vibroimpact.analysis.dataset.stores.storing import stored_variables
 from vibroimpact.analysis.dataset.writing import define_variable, store_texts
 from vibroimpact.analysis.files.atomic import whole_or_absent
 from vibroimpact.analysis.files.fingerprints import seal

@@ -24,7 +24,7 @@ from vibroimpact.analysis.dataset.schema import (
     SCHEMA_VERSION,
     swept_names,
 )
-from vibroimpact.analysis.dataset.storing import as_read
+from vibroimpact.analysis.dataset.stores.storing import as_read
 from vibroimpact.analysis.files.lazy_store import LazyStore
 from vibroimpact.analysis.files.open_files import OpenFile, give_back, netcdf_lock
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf, taken
@@ -254,7 +254,7 @@ def open_dataset(path: Place) -> xr.Dataset:
     file = dataset_place(path)
     if is_store(file):
         # imported only for a store
-        from vibroimpact.analysis.dataset.zarr_reading import StoreContents
+        from vibroimpact.analysis.dataset.stores.reading import StoreContents
 
         return _checked_schema(file, StoreContents(file).dataset())
     flat = open_flat(file)

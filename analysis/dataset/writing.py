@@ -43,7 +43,7 @@ from vibroimpact.analysis.dataset.schema import (
     sample_rule,
     unit_in,
 )
-from vibroimpact.analysis.dataset.storing import Stored, stored_variables
+from vibroimpact.analysis.dataset.stores.storing import Stored, stored_variables
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.open_files import netcdf_lock

@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from vibroimpact.analysis.dataset.schema import Outcome, swept_names
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.decay.resonance import Curve
 from vibroimpact.analysis.decay.samples import Floats
 from vibroimpact.fmus.errors import DatasetError

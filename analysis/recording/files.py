@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import CONVENTIONS, RAGGED
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.open_files import netcdf_lock

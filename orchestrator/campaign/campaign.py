@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 from vibroimpact.analysis.files.object_paths import AnyPath, ObjectPath, located
 from vibroimpact.fmus.errors import CampaignError, DatasetError
 from vibroimpact.fmus.messages import CALL, Message, message
-from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work, common_identity, get_ready
 from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
 from vibroimpact.orchestrator.campaign.earlier_sweep import EarlierSweep
 from vibroimpact.orchestrator.campaign.extension import (
@@ -40,7 +39,6 @@ from vibroimpact.orchestrator.campaign.formats import (
     destination_of,
     earlier_store,
 )
-from vibroimpact.orchestrator.campaign.here import FEW_SECONDS, computed_here, may_begin_here, opened_here
 from vibroimpact.orchestrator.campaign.home import held_home, make_folder_in_home, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.manifest import (
     add_build,
@@ -67,11 +65,22 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
-from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
 from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
 from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.threads import BYTES_OF_A_THREAD, compute_in_threads, thread_count
+from vibroimpact.orchestrator.campaign.workers.chunks import ChunkResult, Work, common_identity, get_ready
+from vibroimpact.orchestrator.campaign.workers.here import (
+    FEW_SECONDS,
+    computed_here,
+    may_begin_here,
+    opened_here,
+)
+from vibroimpact.orchestrator.campaign.workers.pieces import MOST_BYTES
+from vibroimpact.orchestrator.campaign.workers.threads import (
+    BYTES_OF_A_THREAD,
+    compute_in_threads,
+    thread_count,
+)
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
@@ -81,8 +90,8 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.cluster import Client
-    from vibroimpact.orchestrator.campaign.pool import WorkerPool
+    from vibroimpact.orchestrator.campaign.workers.cluster import Client
+    from vibroimpact.orchestrator.campaign.workers.pool import WorkerPool
 
 MOST_ROUNDS = 3
 """Largest number of times that one command computes unfit parts, before it gives up."""
@@ -93,7 +102,7 @@ OpenedWorkers = Callable[[], AbstractContextManager["WorkerPool"]]
 
 def open_workers(**options: Any) -> AbstractContextManager[WorkerPool]:
     """Open workers, see `cluster.open_workers`; imported only when needed, since Dask takes half a second."""
-    from vibroimpact.orchestrator.campaign.cluster import open_workers as opened
+    from vibroimpact.orchestrator.campaign.workers.cluster import open_workers as opened
 
     return opened(**options)
 
@@ -387,7 +396,7 @@ class _Campaign:
 
     def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
         # imported only when workers are needed
-        from vibroimpact.orchestrator.campaign.computation import Computation
+        from vibroimpact.orchestrator.campaign.workers.computation import Computation
 
         self._report.workers = len(pool.worker_addresses())
         try:

@@ -13,18 +13,18 @@ import xarray as xr
 from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import ChunkResult, Work
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, read_finished
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import StoredPart, compact
+from vibroimpact.orchestrator.campaign.workers.chunks import ChunkResult, Work
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
-    from vibroimpact.orchestrator.campaign.seals import Seal
-    from vibroimpact.orchestrator.campaign.shards import Shard
+    from vibroimpact.orchestrator.campaign.stores.sealing import GrowingStore
+    from vibroimpact.orchestrator.campaign.stores.seals import Seal
+    from vibroimpact.orchestrator.campaign.stores.shards import Shard
 
 Attributes = Mapping[str, Any]
 

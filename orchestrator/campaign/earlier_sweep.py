@@ -20,7 +20,6 @@ import xarray as xr
 from vibroimpact.analysis.dataset import join_files, read_part, take_runs, write_dataset
 from vibroimpact.analysis.dataset.flat_file import blocks_of
 from vibroimpact.analysis.files.object_paths import AnyPath
-from vibroimpact.orchestrator.campaign.chunks import MANIFEST
 from vibroimpact.orchestrator.campaign.extension import (
     Runs,
     is_of,
@@ -46,7 +45,8 @@ from vibroimpact.orchestrator.campaign.parts import (
     own_files,
     remove_parts_within,
 )
-from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, remove_store
+from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, remove_store
+from vibroimpact.orchestrator.campaign.workers.chunks import MANIFEST
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.scene import Scene
 

@@ -28,7 +28,6 @@ from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import Chunk
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
     differences,
@@ -38,6 +37,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
 from vibroimpact.orchestrator.campaign.parts import (
     StoredPart,
 )
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk
 from vibroimpact.orchestrator.run.dataset import (
     coordinate_names,
     empty_dataset,

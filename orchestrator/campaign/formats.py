@@ -6,7 +6,7 @@ import importlib.util
 from pathlib import Path
 from typing import Literal, get_args
 
-from vibroimpact.analysis.dataset.store_grid import SHARD_POINTS
+from vibroimpact.analysis.dataset.stores.grid import SHARD_POINTS
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.analysis.files.stores import zarr_package
 from vibroimpact.fmus.errors import UsageError
@@ -14,8 +14,8 @@ from vibroimpact.fmus.messages import WITH_OUTPUT, message
 from vibroimpact.orchestrator.campaign.destination import Destination, JoinedFile
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note
-from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
-from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, finished_store, has_rows
+from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, finished_store, has_rows
+from vibroimpact.orchestrator.campaign.workers.pieces import MOST_BYTES
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
@@ -99,7 +99,7 @@ def refuse_for_address(home: AnyPath, scene: Scene, format: DatasetFormat | None
     UsageError
     """
     # imported only for a store
-    from vibroimpact.orchestrator.campaign.shards import grid_of
+    from vibroimpact.orchestrator.campaign.stores.shards import grid_of
 
     if format == "netcdf":
         expected, got = "the format zarr", "netcdf"
@@ -139,9 +139,9 @@ def destination_of(
     if not shard_points and isinstance(home, Path):
         return JoinedFile(home, scene)
     # imported only for a store
-    from vibroimpact.orchestrator.campaign.grown_store import GrownStore
-    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
-    from vibroimpact.orchestrator.campaign.whole_store import WholeStore
+    from vibroimpact.orchestrator.campaign.stores.grown import GrownStore
+    from vibroimpact.orchestrator.campaign.stores.sealing import GrowingStore
+    from vibroimpact.orchestrator.campaign.stores.whole import WholeStore
 
     store = GrowingStore(str(home), shard_points)
     grid = store.grid(scene)

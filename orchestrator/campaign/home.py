@@ -20,7 +20,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.pool import WorkerPool
+    from vibroimpact.orchestrator.campaign.workers.pool import WorkerPool
 
 _NO_NAME = re.compile(r"[a-z][a-z0-9+]+:")
 """Form of an address without a name, as a path has it; no folder of a campaign."""

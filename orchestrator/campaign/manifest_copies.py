@@ -15,7 +15,6 @@ from vibroimpact.analysis.dataset import read_part
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import WITH_OUTPUT, message
-from vibroimpact.orchestrator.campaign.chunks import MANIFEST
 from vibroimpact.orchestrator.campaign.formats import has_dataset
 from vibroimpact.orchestrator.campaign.manifest import (
     DAMAGE,
@@ -31,7 +30,8 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import Note, own_files
-from vibroimpact.orchestrator.campaign.seals import FINISHED, SEALS, read_sealed, seals_in
+from vibroimpact.orchestrator.campaign.stores.seals import FINISHED, SEALS, read_sealed, seals_in
+from vibroimpact.orchestrator.campaign.workers.chunks import MANIFEST
 from vibroimpact.orchestrator.run import OTHER_ENGINE
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 

@@ -17,14 +17,14 @@ from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, take
 from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, compute_again
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, Work, compute_again
 from vibroimpact.orchestrator.run.runner import CARRYING
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.pool import WorkerPool
+    from vibroimpact.orchestrator.campaign.workers.pool import WorkerPool
 
 MOST_POINTS = 8
 """Largest number of points that are computed again."""

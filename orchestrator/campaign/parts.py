@@ -29,7 +29,7 @@ from vibroimpact.analysis.dataset.assembling import wrapped
 from vibroimpact.analysis.files.fingerprints import has_recorded_hash
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import (
+from vibroimpact.orchestrator.campaign.workers.chunks import (
     CARRIED,
     CARRIED_STATE,
     MANIFEST,

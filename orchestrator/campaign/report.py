@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from vibroimpact.analysis.files.object_paths import AnyPath
-from vibroimpact.orchestrator.campaign.chunks import Chunk
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk
 
 
 class CampaignInterrupted(KeyboardInterrupt):

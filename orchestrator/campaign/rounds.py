@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat, take_runs
 from vibroimpact.analysis.jumps import RunClasses, classes_of
-from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of
 from vibroimpact.orchestrator.campaign.extension import final_states
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.refinement import Known, Refined, cut_cells, halved_intervals
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, points_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.runner import CARRYING

@@ -23,14 +23,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.parts import StoredPart
-from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult
+from vibroimpact.orchestrator.campaign.workers.pieces import MOST_BYTES
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene.sweep import Branch, first_runs
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.shards import Shard
+    from vibroimpact.orchestrator.campaign.stores.shards import Shard
 
 CHUNK_SECONDS = 2.0
 """Planned time of one chunk, s, of up to 200 workers."""

@@ -11,7 +11,7 @@ from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.formats import DatasetFormat
-from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
+from vibroimpact.orchestrator.campaign.workers.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.commands.failures import outcome_lines
 from vibroimpact.orchestrator.operations.campaign import Campaign
 from vibroimpact.orchestrator.run.progress import shown_progress

@@ -17,9 +17,9 @@ from vibroimpact.orchestrator.campaign.check import (
     MOST_TRIAL_SECONDS,
     Trial,
 )
-from vibroimpact.orchestrator.campaign.here import HERE_SECONDS, may_begin_here
-from vibroimpact.orchestrator.campaign.processors import processor_count
-from vibroimpact.orchestrator.campaign.threads import thread_count
+from vibroimpact.orchestrator.campaign.workers.here import HERE_SECONDS, may_begin_here
+from vibroimpact.orchestrator.campaign.workers.processors import processor_count
+from vibroimpact.orchestrator.campaign.workers.threads import thread_count
 from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.limits import goes_by_lanes

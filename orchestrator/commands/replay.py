@@ -79,7 +79,7 @@ def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
 
 def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
     # Dask takes a tenth of a second to load, and a replay into a dataset does not need it
-    from vibroimpact.orchestrator.campaign.processors import refuse_two_kinds_of_workers
+    from vibroimpact.orchestrator.campaign.workers.processors import refuse_two_kinds_of_workers
     from vibroimpact.orchestrator.commands.campaign import compute
 
     refuse_two_kinds_of_workers(workers, scheduler)

@@ -27,7 +27,7 @@ from pathlib import Path
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.processors import processor_count
+from vibroimpact.orchestrator.campaign.workers.processors import processor_count
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 OPENINGS = 5

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import (
+from vibroimpact.orchestrator.campaign.workers.chunks import (
     Chunk,
     Work,
     get_ready,

@@ -26,13 +26,13 @@ import dask
 import matplotlib
 from distributed import Client, LocalCluster
 
-import vibroimpact.orchestrator.campaign.computation as computation
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
-from vibroimpact.orchestrator.campaign.cluster import QUIET
+import vibroimpact.orchestrator.campaign.workers.computation as computation
 from vibroimpact.orchestrator.campaign.destination import ShardParts
-from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.seals import Seal
+from vibroimpact.orchestrator.campaign.stores.seals import Seal
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, Work
+from vibroimpact.orchestrator.campaign.workers.cluster import QUIET
+from vibroimpact.orchestrator.campaign.workers.pool import Cluster, WorkerPool
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, axis_of_range, expand

@@ -32,7 +32,7 @@ from vibroimpact.fmus.core import Oscillator, motion, oscillator
 from vibroimpact.fmus.packaging.build import NATIVE
 from vibroimpact.fmus.packaging.platform_names import library_suffix
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Work, get_ready, run_chunk
+from vibroimpact.orchestrator.campaign.workers.chunks import Work, get_ready, run_chunk
 from vibroimpact.orchestrator.scene import parse_scene
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

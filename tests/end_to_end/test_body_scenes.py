@@ -12,9 +12,9 @@ from support.command_line import in_this_process
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.orchestrator.campaign import destination, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, run_chunk
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
 from vibroimpact.orchestrator.campaign.parts import compact, list_parts
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, Work, run_chunk
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.running import run_scene

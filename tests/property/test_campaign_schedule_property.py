@@ -9,9 +9,9 @@ from types import SimpleNamespace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.schedule import CHUNK_SECONDS, MOST_POINTS, ChunkSchedule
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, SweepPath, expand
 

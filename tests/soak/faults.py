@@ -31,11 +31,11 @@ from soak.flipped_parts import DAMAGES
 from soak.kills import Content, bits_of, difference
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.analysis.dataset.places import dataset_place
-from vibroimpact.analysis.dataset.store_runs import read_runs
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.orchestrator.campaign import formats
 from vibroimpact.orchestrator.campaign.formats import DatasetFormat
-from vibroimpact.orchestrator.campaign.seals import read_seal
+from vibroimpact.orchestrator.campaign.stores.seals import read_seal
 
 CASES = 2
 FORMATS: tuple[DatasetFormat, ...] = ("netcdf", "zarr")

@@ -4,8 +4,8 @@ import math
 import sys
 
 import vibroimpact.orchestrator.campaign.campaign as campaign
-import vibroimpact.orchestrator.campaign.here as here
 import vibroimpact.orchestrator.campaign.schedule as schedule
+import vibroimpact.orchestrator.campaign.workers.here as here
 from vibroimpact.orchestrator.commands import cli
 
 CHUNK_SECONDS = 0.25

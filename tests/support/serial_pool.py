@@ -13,7 +13,7 @@ import pytest
 import vibroimpact.orchestrator.campaign.campaign as campaign
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.formats import DatasetFormat
-from vibroimpact.orchestrator.campaign.pool import Finished
+from vibroimpact.orchestrator.campaign.workers.pool import Finished
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
 

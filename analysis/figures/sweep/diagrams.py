@@ -17,8 +17,8 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.grid import RANGE
-from vibroimpact.analysis.dataset.overview import LARGEST_IMPACT, MEAN_IMPACTS
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
+from vibroimpact.analysis.dataset.stores.overview import LARGEST_IMPACT, MEAN_IMPACTS
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.analysis.figures.sweep.map_overview import block_values, edges_of_blocks

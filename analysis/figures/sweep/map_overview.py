@@ -12,8 +12,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.grid import RANGE
-from vibroimpact.analysis.dataset.overview import CLASSES, LARGEST_IMPACT, MEAN_IMPACTS, PARTS, BlockGrid
-from vibroimpact.analysis.dataset.zarr_reading import StoreContents
+from vibroimpact.analysis.dataset.stores.overview import (
+    CLASSES,
+    LARGEST_IMPACT,
+    MEAN_IMPACTS,
+    PARTS,
+    BlockGrid,
+)
+from vibroimpact.analysis.dataset.stores.reading import StoreContents
 from vibroimpact.analysis.files.stores import is_store
 
 _AROUND = 2

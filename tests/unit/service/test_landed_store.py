@@ -8,7 +8,7 @@ import numpy as np
 from support.dataset_examples import up_down
 
 from vibroimpact.analysis.dataset import Outcome, write_dataset
-from vibroimpact.analysis.dataset.converting import convert_dataset
+from vibroimpact.analysis.dataset.stores.converting import convert_dataset
 from vibroimpact.service.landed import LandedReader, files_of
 
 

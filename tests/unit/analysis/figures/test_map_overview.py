@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from support.dataset_examples import dataset_of, record
 
 import vibroimpact as vi
-from vibroimpact.analysis.dataset import overview, store_grid, write_dataset
-from vibroimpact.analysis.dataset.overview import BlockGrid
+from vibroimpact.analysis.dataset import write_dataset
 from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, OrbitClass
-from vibroimpact.analysis.dataset.store_grid import StoreGrid
+from vibroimpact.analysis.dataset.stores import grid as store_grid
+from vibroimpact.analysis.dataset.stores import overview
+from vibroimpact.analysis.dataset.stores.grid import StoreGrid
+from vibroimpact.analysis.dataset.stores.overview import BlockGrid
 from vibroimpact.analysis.figures.sweep.map_overview import block_classes, block_values
 
 SIDE, LENGTH = 40, 4

@@ -20,7 +20,6 @@ import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import read_flat, read_part, write_dataset
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
-from vibroimpact.orchestrator.campaign.chunks import MANIFEST
 from vibroimpact.orchestrator.campaign.manifest import (
     DamagedManifestError,
     carried_manifest,
@@ -30,6 +29,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_manifest,
 )
 from vibroimpact.orchestrator.campaign.manifest_copies import manifest_again
+from vibroimpact.orchestrator.campaign.workers.chunks import MANIFEST
 from vibroimpact.orchestrator.run import RunnerIdentity
 
 TEXT = frequency_text(30, "up-down", milliseconds=0.001)

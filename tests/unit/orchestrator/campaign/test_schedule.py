@@ -1,7 +1,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.campaign.schedule import (
     CHUNK_SECONDS,
     FIRST_POINTS,
@@ -11,6 +10,7 @@ from vibroimpact.orchestrator.campaign.schedule import (
     SHORTEST_SECONDS,
     ChunkSchedule,
 )
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult
 from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, SweepPath, expand
 
 

@@ -9,7 +9,7 @@ from support.scenes import BEAM, CHAIN, YIELDING, changed, problems_of, scene_of
 from vibroimpact.analysis.dataset import Outcome, check
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
+from vibroimpact.orchestrator.campaign.workers.chunks import carried_attributes, carried_state
 from vibroimpact.orchestrator.run.dataset import dataset_of
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables

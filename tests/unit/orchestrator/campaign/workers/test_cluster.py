@@ -19,10 +19,10 @@ from distributed.security import Security
 from support.busy_runner import die_while, freeze_once, keep_the_interpreter, same
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
-from vibroimpact.orchestrator.campaign import cluster
-from vibroimpact.orchestrator.campaign import pool as pool_module
-from vibroimpact.orchestrator.campaign.cluster import MOST_STARTS, open_workers
-from vibroimpact.orchestrator.campaign.pool import MOST_DEATHS
+from vibroimpact.orchestrator.campaign.workers import cluster
+from vibroimpact.orchestrator.campaign.workers import pool as pool_module
+from vibroimpact.orchestrator.campaign.workers.cluster import MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign.workers.pool import MOST_DEATHS
 from vibroimpact.orchestrator.run.progress import Progress
 
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")

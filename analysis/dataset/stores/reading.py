@@ -17,9 +17,9 @@ from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import refuse_foreign, structure_problems
-from vibroimpact.analysis.dataset.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
-from vibroimpact.analysis.dataset.zarr_store import LABELS, SHARD_ORDER, grid_of
+from vibroimpact.analysis.dataset.stores.overview import OVERVIEW, BlockGrid
+from vibroimpact.analysis.dataset.stores.store import LABELS, SHARD_ORDER, grid_of
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
 from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_of

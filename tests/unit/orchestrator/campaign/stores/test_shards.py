@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from support.campaign_scenes import scene_of
 from support.store_scenes import BODY, axis
 
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, points_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, points_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count

@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.grid import RANGE, RANGE_ENDS, range_over_periods
-from vibroimpact.analysis.dataset.store_grid import SHARD_POINTS, Block, StoreGrid
+from vibroimpact.analysis.dataset.stores.grid import SHARD_POINTS, Block, StoreGrid
 
 OVERVIEW = "overview"
 """Group of the overview in a store."""

@@ -19,9 +19,9 @@ from vibroimpact.analysis.dataset.joining import appended_file, blocks_in_order
 from vibroimpact.analysis.dataset.outputs import DATASET_ENDING, refuse_outputs, writing
 from vibroimpact.analysis.dataset.places import dataset_place, given_place
 from vibroimpact.analysis.dataset.reading import open_dataset
-from vibroimpact.analysis.dataset.store_grid import StoreGrid
-from vibroimpact.analysis.dataset.store_runs import StoreRuns
-from vibroimpact.analysis.dataset.zarr_store import StoreWriter, create_store
+from vibroimpact.analysis.dataset.stores.grid import StoreGrid
+from vibroimpact.analysis.dataset.stores.runs import StoreRuns
+from vibroimpact.analysis.dataset.stores.store import StoreWriter, create_store
 from vibroimpact.analysis.files.atomic import sync_folder, whole_or_absent
 from vibroimpact.analysis.files.fingerprints import seal
 from vibroimpact.analysis.files.stores import (

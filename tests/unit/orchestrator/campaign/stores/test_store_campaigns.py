@@ -15,10 +15,10 @@ from support.serial_pool import Notes, campaign_here
 from support.store_scenes import BODY, axis
 
 import vibroimpact.orchestrator.campaign.formats as formats
-import vibroimpact.orchestrator.campaign.grown_store as grown_store
-import vibroimpact.orchestrator.campaign.pieces as pieces
 import vibroimpact.orchestrator.campaign.schedule as schedule
-import vibroimpact.orchestrator.campaign.sealing as sealing
+import vibroimpact.orchestrator.campaign.stores.grown as grown_store
+import vibroimpact.orchestrator.campaign.stores.sealing as sealing
+import vibroimpact.orchestrator.campaign.workers.pieces as pieces
 from vibroimpact.analysis import open_dataset
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.campaign_scenes import scene_of
 
-import vibroimpact.orchestrator.campaign.pieces as pieces
+import vibroimpact.orchestrator.campaign.workers.pieces as pieces
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns
-from vibroimpact.orchestrator.campaign.pieces import run_in_pieces
+from vibroimpact.orchestrator.campaign.workers.pieces import run_in_pieces
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene

@@ -34,9 +34,9 @@ from vibroimpact.fmus.surroundings import (
     refuse_few_descriptors,
     refuse_no_loopback,
 )
-from vibroimpact.orchestrator.campaign.computation import Computation
-from vibroimpact.orchestrator.campaign.pool import Cluster, WorkerPool
-from vibroimpact.orchestrator.campaign.processors import processor_count
+from vibroimpact.orchestrator.campaign.workers.computation import Computation
+from vibroimpact.orchestrator.campaign.workers.pool import Cluster, WorkerPool
+from vibroimpact.orchestrator.campaign.workers.processors import processor_count
 from vibroimpact.orchestrator.run.progress import Progress
 
 CONNECT_SECONDS = 5.0

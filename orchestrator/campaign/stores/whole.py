@@ -7,16 +7,15 @@ from pathlib import Path
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset.converting import convert_dataset
-from vibroimpact.analysis.dataset.store_runs import StoreRuns, read_runs
-from vibroimpact.analysis.dataset.zarr_store import StoreWriter
+from vibroimpact.analysis.dataset.stores.converting import convert_dataset
+from vibroimpact.analysis.dataset.stores.runs import StoreRuns, read_runs
+from vibroimpact.analysis.dataset.stores.store import StoreWriter
 from vibroimpact.analysis.files.object_paths import AnyPath
-from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, attributes_of_part
 from vibroimpact.orchestrator.campaign.destination import Attributes, Destination
 from vibroimpact.orchestrator.campaign.extension import is_of, kept_path
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import StoredPart, compact
-from vibroimpact.orchestrator.campaign.seals import (
+from vibroimpact.orchestrator.campaign.stores.seals import (
     FINISHED,
     SEALS,
     STORE,
@@ -25,6 +24,7 @@ from vibroimpact.orchestrator.campaign.seals import (
     refuse_other_store,
     seal_store,
 )
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, Work, attributes_of_part
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.scene import Scene
 

@@ -12,10 +12,10 @@ from support.campaign_scenes import assert_same_rows, scene_of
 
 import vibroimpact.orchestrator.campaign.campaign as campaign
 import vibroimpact.orchestrator.campaign.schedule as schedule
-import vibroimpact.orchestrator.campaign.threads as threads
+import vibroimpact.orchestrator.campaign.workers.threads as threads
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.scene import Scene
 
 SCENE = """

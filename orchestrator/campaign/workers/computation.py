@@ -11,12 +11,18 @@ from collections.abc import Callable, Sequence
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.processes.call import ProcessDied, call_alone
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
 from vibroimpact.orchestrator.campaign.destination import ShardParts
-from vibroimpact.orchestrator.campaign.grown_store import seal_parts
-from vibroimpact.orchestrator.campaign.pool import Finished, WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.seals import Seal
+from vibroimpact.orchestrator.campaign.stores.grown import seal_parts
+from vibroimpact.orchestrator.campaign.stores.seals import Seal
+from vibroimpact.orchestrator.campaign.workers.chunks import (
+    Chunk,
+    ChunkResult,
+    Work,
+    run_chunk,
+    write_crashed,
+)
+from vibroimpact.orchestrator.campaign.workers.pool import Finished, WorkerPool
 
 CRASH_MESSAGE = "this point kills the process that runs it"
 

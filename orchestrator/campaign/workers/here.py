@@ -14,16 +14,16 @@ from dataclasses import replace
 from functools import partial
 
 from vibroimpact.analysis.files.object_paths import located
-from vibroimpact.orchestrator.campaign.chunks import (
+from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.rounds import Stage
+from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.campaign.workers.chunks import (
     ChunkResult,
     Work,
     lay_down,
     run_chunk,
     take_up,
 )
-from vibroimpact.orchestrator.campaign.parts import StoredPart
-from vibroimpact.orchestrator.campaign.rounds import Stage
-from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.run.record import RunsAbandonedError, runs_abandoned
 from vibroimpact.orchestrator.running.kept import OpenedScene, opened_scene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER

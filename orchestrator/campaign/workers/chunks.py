@@ -25,8 +25,8 @@ from vibroimpact.analysis.dataset.reading import SILENT
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
-from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES, run_in_pieces
-from vibroimpact.orchestrator.campaign.seals import seal_path
+from vibroimpact.orchestrator.campaign.stores.seals import seal_path
+from vibroimpact.orchestrator.campaign.workers.pieces import MOST_BYTES, run_in_pieces
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, named_runner
 from vibroimpact.orchestrator.run.dataset import DatasetForm, dataset_of, empty_dataset, has_messages, tally
 from vibroimpact.orchestrator.run.empty_record import empty_record
@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Paths, expand
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.sealing import GrowingStore
+    from vibroimpact.orchestrator.campaign.stores.sealing import GrowingStore
 
 CARRIED = ("carried_displacement", "carried_velocity")
 CARRIED_STATE = "carried_state"
@@ -280,7 +280,7 @@ def write_part(
         shard = None if work.store is None else work.store.shard_of(work.scene, chunk.first, chunk.stop)
         if work.store is not None and shard is not None and len(points) == shard.count:
             # imported only for a store
-            from vibroimpact.orchestrator.campaign.sealing import write_shard
+            from vibroimpact.orchestrator.campaign.stores.sealing import write_shard
 
             seal = write_shard(work.store, work.scene, shard, dataset, chunk.branch, attrs)
             return seal_path(work.store.seals, shard.number), dict(seal.outcomes)

@@ -8,14 +8,6 @@ from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_
 
 from vibroimpact.analysis.dataset import Outcome, read_flat, write_dataset
 from vibroimpact.fmus.errors import CampaignError
-from vibroimpact.orchestrator.campaign.chunks import (
-    Chunk,
-    Work,
-    get_ready,
-    points_of,
-    run_chunk,
-    write_crashed,
-)
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
 from vibroimpact.orchestrator.campaign.parts import (
     StoredPart,
@@ -25,6 +17,14 @@ from vibroimpact.orchestrator.campaign.parts import (
     unfit_parts,
 )
 from vibroimpact.orchestrator.campaign.schedule import gaps_between
+from vibroimpact.orchestrator.campaign.workers.chunks import (
+    Chunk,
+    Work,
+    get_ready,
+    points_of,
+    run_chunk,
+    write_crashed,
+)
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.dataset import DatasetForm
 from vibroimpact.orchestrator.scene.sweep import expand

@@ -19,10 +19,10 @@ import xarray as xr
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.schema import attributes_of
-from vibroimpact.analysis.dataset.zarr_store import StoreWriter
+from vibroimpact.analysis.dataset.stores.store import StoreWriter
 from vibroimpact.analysis.files.object_paths import AnyPath, located
-from vibroimpact.orchestrator.campaign.seals import SEALS, STORE, Seal, object_hash, write_seal
-from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, Seal, object_hash, write_seal
+from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid, grid_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import Scene

@@ -13,13 +13,13 @@ from support.campaign_scenes import assert_same_rows, frequency_text, scene_of
 from support.serial_pool import SerialPool, campaign_here
 
 import vibroimpact.orchestrator.campaign.campaign as campaign
-import vibroimpact.orchestrator.campaign.here as here
 import vibroimpact.orchestrator.campaign.schedule as schedule
+import vibroimpact.orchestrator.campaign.workers.here as here
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work
+from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.run import PointRunner, Runner
 from vibroimpact.orchestrator.running import kept
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER

@@ -23,9 +23,9 @@ from vibroimpact.analysis.dataset.schema import (
     UnitSystem,
     attributes_of,
 )
-from vibroimpact.analysis.dataset.store_grid import Block
-from vibroimpact.analysis.dataset.zarr_reading import StoreContents
-from vibroimpact.analysis.dataset.zarr_store import LABELS
+from vibroimpact.analysis.dataset.stores.grid import Block
+from vibroimpact.analysis.dataset.stores.reading import StoreContents
+from vibroimpact.analysis.dataset.stores.store import LABELS
 from vibroimpact.analysis.files.stores import Place, is_store, one_store_error
 from vibroimpact.fmus.errors import DatasetError
 

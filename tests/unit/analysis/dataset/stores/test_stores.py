@@ -35,14 +35,14 @@ from vibroimpact.analysis.dataset import (
     open_dataset,
     read_flat,
     read_runs,
-    store_grid,
     with_constants,
     write_dataset,
 )
-from vibroimpact.analysis.dataset.converting import convert, convert_dataset
 from vibroimpact.analysis.dataset.schema import RAGGED, SWEPT_ALONG
-from vibroimpact.analysis.dataset.store_grid import StoreGrid
-from vibroimpact.analysis.dataset.zarr_store import LABELS, StoreWriter, create_store
+from vibroimpact.analysis.dataset.stores import grid as store_grid
+from vibroimpact.analysis.dataset.stores.converting import convert, convert_dataset
+from vibroimpact.analysis.dataset.stores.grid import StoreGrid
+from vibroimpact.analysis.dataset.stores.store import LABELS, StoreWriter, create_store
 from vibroimpact.analysis.files import stores
 from vibroimpact.analysis.files.stores import system_of, zarr_package
 from vibroimpact.fmus.errors import DatasetError, UsageError

@@ -11,10 +11,17 @@ from collections.abc import Callable
 from contextvars import copy_context
 from queue import Empty, SimpleQueue
 
-from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, lay_down, run_chunk, take_up
-from vibroimpact.orchestrator.campaign.pieces import MOST_BYTES
-from vibroimpact.orchestrator.campaign.processors import processor_count
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.campaign.workers.chunks import (
+    Chunk,
+    ChunkResult,
+    Work,
+    lay_down,
+    run_chunk,
+    take_up,
+)
+from vibroimpact.orchestrator.campaign.workers.pieces import MOST_BYTES
+from vibroimpact.orchestrator.campaign.workers.processors import processor_count
 from vibroimpact.orchestrator.run.record import RunsAbandonedError, runs_abandoned
 from vibroimpact.orchestrator.running.kept import opened_scene
 

@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.grid import axis_of, direction_axis, shared_axes
-from vibroimpact.analysis.dataset.store_grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
+from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, dimensions

@@ -18,18 +18,11 @@ from vibroimpact.analysis.dataset.assembling import new_variable
 from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.schema import RULES, attributes_of
-from vibroimpact.analysis.dataset.zarr_store import StoreWriter, create_store
+from vibroimpact.analysis.dataset.stores.store import StoreWriter, create_store
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.files.stores import objects_below
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.campaign.chunks import (
-    Chunk,
-    ChunkResult,
-    Work,
-    attributes_of_part,
-    carried_state,
-)
 from vibroimpact.orchestrator.campaign.destination import (
     Attributes,
     Destination,
@@ -39,8 +32,8 @@ from vibroimpact.orchestrator.campaign.destination import (
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, kept_path
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note, StoredPart
-from vibroimpact.orchestrator.campaign.sealing import OPTIONAL, GrowingStore, read_shard, write_shard
-from vibroimpact.orchestrator.campaign.seals import (
+from vibroimpact.orchestrator.campaign.stores.sealing import OPTIONAL, GrowingStore, read_shard, write_shard
+from vibroimpact.orchestrator.campaign.stores.seals import (
     FINISHED,
     STORE,
     Seal,
@@ -53,7 +46,14 @@ from vibroimpact.orchestrator.campaign.seals import (
     seal_store,
     seals_in,
 )
-from vibroimpact.orchestrator.campaign.shards import Shard, SweepGrid
+from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid
+from vibroimpact.orchestrator.campaign.workers.chunks import (
+    Chunk,
+    ChunkResult,
+    Work,
+    attributes_of_part,
+    carried_state,
+)
 from vibroimpact.orchestrator.run.dataset import DatasetForm, empty_dataset, with_constants_of
 from vibroimpact.orchestrator.scene import Scene
 
