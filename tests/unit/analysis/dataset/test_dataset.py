@@ -691,7 +691,9 @@ def test_residuals_and_events_need_the_names_of_what_they_belong_to() -> None:
 
 def test_time_may_start_again_with_the_next_run_even_after_runs_without_impacts() -> None:
     runs = [record(5.0, impacts=2), record(0.0), record(0.0), record(1.0, impacts=2), record(0.0)]
-    check(dataset_of(runs))
+    dataset = dataset_of(runs)
+    check(dataset)
+    assert (np.diff(dataset["impact_time"].values) < 0.0).any()
 
 
 def test_a_stick_that_does_not_end_and_an_unforced_impact_are_legal() -> None:
@@ -850,7 +852,9 @@ def test_an_opened_file_can_be_replaced_and_closed(tmp_path: Path) -> None:
 
 
 def test_a_dataset_without_runs_can_be_built_and_checked() -> None:
-    check(build_dataset([], coordinates={}, direction=[], run_index=[]))
+    dataset = build_dataset([], coordinates={}, direction=[], run_index=[])
+    check(dataset)
+    assert dataset.sizes["run"] == 0
 
 
 def test_files_from_before_durations_of_contacts_were_stored_are_still_read(tmp_path: Path) -> None:

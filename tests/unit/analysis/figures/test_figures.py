@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import vibroimpact as vi
 from vibroimpact.analysis import figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.analysis.dataset.derived import largest_impact_velocity
 from vibroimpact.analysis.figures.scene_text import limits
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.landmarks import observed_order
@@ -160,7 +161,7 @@ def test_two_swept_parameters_give_colour_maps_of_the_grid(tmp_path: Path) -> No
     runs = [record(float(k), impacts=k) for k in range(6)]
     grid = {"mass": mass.ravel(), "position": position.ravel()}
     dataset = opened(dataset_of(runs, coordinates=grid), tmp_path)
-    largest = figures.largest_impact_velocity(dataset)
+    largest = largest_impact_velocity(dataset)
     np.testing.assert_allclose(largest, [[np.nan, 1.0, 2.01], [3.02, 4.03, 5.04]])
     figure = figures.draw(dataset)
     assert {"mass (kg)", "position (m)", "largest impact velocity (m/s)"} <= set(texts(figure))
