@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
+from vibroimpact.analysis.dataset import (
+    Direction,
+    Outcome,
+    RunRecord,
+    build_dataset,
+    with_constants,
+    write_dataset,
+)
 from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, MEASURED_COLUMNS, ORBIT_COLUMNS, RULES
 
 PERIODS = 3
+
+
+def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
+    """Write a dataset and return the path of its file."""
+    write_dataset(dataset, folder / name)
+    return folder / name
 
 
 def impact_rows(number: int, start: float) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from support.dataset_examples import (
     impact_rows,
     record,
     up_down,
+    written,
 )
 from support.places import ROOT
 
@@ -56,11 +57,6 @@ passed, errors = ComplianceChecker.run_checker(
 )
 sys.exit(0 if passed and not errors else 1)
 """
-
-
-def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
-    write_dataset(dataset, folder / name)
-    return folder / name
 
 
 @pytest.mark.parametrize("units", ["SI", "nondimensional"])
