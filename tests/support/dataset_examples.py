@@ -14,6 +14,7 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
     build_dataset,
+    open_dataset,
     with_constants,
     write_dataset,
 )
@@ -26,6 +27,11 @@ def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
     """Write a dataset and return the path of its file."""
     write_dataset(dataset, folder / name)
     return folder / name
+
+
+def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
+    """Write a dataset and return it as it opens."""
+    return open_dataset(written(dataset, folder))
 
 
 def impact_rows(number: int, start: float) -> NDArray[np.float64]:
