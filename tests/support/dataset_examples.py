@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -191,3 +192,12 @@ def everything(**changes: Any) -> xr.Dataset:
         **changes,
     )
     return with_constants(dataset, {"restitution": 0.7, "stop_position": 1e-3}, unit_of=UNITS)
+
+
+def grid_of_runs() -> xr.Dataset:
+    """Return 15 runs over two parameters in no order, with rows; the fifth failed."""
+    axes = itertools.product([2.0, 1.0, 4.0], [0.3, 0.1, 0.2, 0.4, 0.5])
+    points = np.array(list(axes))
+    runs = [record(float(k), impacts=k % 3, sticks=k % 2, samples=1) for k in range(len(points))]
+    runs[4] = failed("it broke: \u03c9 too large")
+    return dataset_of(runs, coordinates={"mass": points[:, 0], "restitution": points[:, 1]})
