@@ -47,8 +47,8 @@ def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["run_id"].copy(data=np.append(largest, np.nan)[run_id])
 
 
-def mean_of_periods(impacts: NDArray[Any]) -> Floats:
-    """Return the mean over the last axis, periods, of the impacts of runs; NaN without an impact."""
+def mean_of_periods(impacts: NDArray[Any], axis: int = -1) -> Floats:
+    """Return the mean of the impacts of runs over the axis of their periods; NaN without an impact."""
     there = ~np.isnan(impacts)
-    mean = np.sum(impacts, axis=-1, where=there) / np.maximum(there.sum(axis=-1), 1)
+    mean = np.sum(impacts, axis=axis, where=there) / np.maximum(there.sum(axis=axis), 1)
     return np.where(mean > 0.0, mean, np.nan)

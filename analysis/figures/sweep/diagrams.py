@@ -338,13 +338,8 @@ def draw_impacts_per_period(dataset: xr.Dataset) -> Figure:
             "figure: expected the impacts of each period in the dataset, got none recorded. "
             "Set impacts = true in [record] of a forced scene."
         )
-
-    def whole() -> xr.DataArray:
-        found = xr.apply_ufunc(mean_of_periods, dataset["impacts_per_period"], input_core_dims=[["period"]])
-        assert isinstance(found, xr.DataArray)
-        return found
-
-    means = _Mapped.of(dataset, MEAN_IMPACTS, whole)
+    impacts = dataset["impacts_per_period"]
+    means = _Mapped.of(dataset, MEAN_IMPACTS, lambda: impacts.reduce(mean_of_periods, "period"))
     return _draw_maps(dataset, [replace(means, text="impacts per forcing period (-)", missing="no impact")])
 
 
