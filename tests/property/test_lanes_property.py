@@ -158,12 +158,15 @@ def test_a_record_changes_no_bit_of_the_motion(modes: int, contacts: int) -> Non
     points = drawn(40, modes, contacts, seed=30 * modes + contacts)
     whole = run(points, impact_limit=MOST)
     ends = ("state", "reached", "final_q", "final_p")
-    for recorded in ({"extrema": False}, {"impacts": False}, {"extrema": False, "impacts": False}):
+    records = [{"extrema": False}, {"impacts": False}, {"extrema": False, "impacts": False}]
+    if modes == 1:  # strobes cut the flights of several modes
+        records.append({"extrema": False, "periods": False})
+    for recorded in records:
         other = run(points, impact_limit=MOST, **recorded)
         assert all(np.array_equal(other.columns[name], whole.columns[name], equal_nan=True) for name in ends)
         for one, rows in zip(whole.rows, other.rows, strict=True):
             strobes, impacts = (rows[rows[:, 0] == kind] for kind in (PERIOD, IMPACT))
-            assert np.array_equal(strobes[:, 4:], one[one[:, 0] == PERIOD][:, 4:])
+            assert len(strobes) == 0 or np.array_equal(strobes[:, 4:], one[one[:, 0] == PERIOD][:, 4:])
             assert len(impacts) == 0 or np.array_equal(impacts, one[one[:, 0] == IMPACT])
 
 
@@ -179,7 +182,9 @@ def test_one_row_for_all_periods_reduces_the_rows_of_each(modes: int, contacts: 
             found = one[one[:, 0] == PERIOD][0, 2:7]
             last = periods[-1, 4:6]
             expected = [periods[:, 2].max(), periods[:, 3].min(), *last, periods[:, 6].sum() / len(periods)]
-            assert found.tolist() == expected
+            assert found[2:].tolist() == expected[2:]
+            # a strobe that cuts the record of a flight moves its extremes by roundings
+            assert found[:2] == pytest.approx(expected[:2], rel=1e-14, abs=1e-14 * np.ptp(found[:2]))
 
 
 @settings(max_examples=10)

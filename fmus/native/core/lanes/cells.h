@@ -8,7 +8,7 @@ typedef struct {
 
 /* The lanes of a vector during a round. */
 typedef struct {
-    state now, start;           /* from here the contacts are searched; start: of the round, or its last strobe */
+    state now, start;           /* from here the contacts are searched; start: of the round */
     vector on;
     vector to_goal;             /* cells */
     vector jumped;              /* whole cells passed from `start` to `now` */

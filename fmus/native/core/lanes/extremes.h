@@ -1,202 +1,297 @@
-/* Extremes of a body of one mode, in lockstep: crests of the motion, where its velocity changes its sign in a cell.
+/* Extremes of the flights of one lane: crests of the motion, where its velocity changes its sign in a cell.
  *
- * A crest counts where it may lie beyond the extremes so far, and short of the stop of its side. The curvature keeps its
- * sign over its cell, so it is the only one there. Of each side one crest waits for its Taylor polynomial: most waiting
- * crests turn out to be needless. A cell in which rounding or the curvature decide nothing is doubtful: see `extremes`
- * of lane_body.h.
+ * All ends of cells count. A crest is computed only where a bound of its cell lies beyond the extreme so far. That
+ * extreme is short of the stop of its side. The bound exceeds each computed value, so what is left out changes no bit.
+ * A crest whose curvature keeps its sign is the only one of its cell. The careful search of lane_cell.h does other cells.
  */
-#include "lanes/cells.h"
+#ifndef VIBROIMPACT_LANE_EXTREMES_H
+#define VIBROIMPACT_LANE_EXTREMES_H
+
+#include "lanes/lane_cell.h"
+#include "lanes/one_lane.h"
+#include "motion/majorant.h"
 
 /* Largest last step of Newton's method towards a crest, in cells: the value is then exact to the cube of the step. */
 #define LAST_STEP 1e-5
-
-/* A crest to be computed: the state at the start of its cell, a first guess, and the length of the cell's part. */
-typedef struct {
-    state start;
-    vector guess, length;
-    mask waits;
-} crest;
+/* Rounding of an end or a crest, in units of the displacements and of the bound of the acceleration. */
+#define ROUNDING_OF_CREST (64.0 * 2.220446049250313e-16)
 
 enum { UPPER, LOWER, SIDES };
+/* Stretches of VI_CELLS cells in the longest flight. */
+enum { MOST_SEGMENTS = 5 };
 
-/* Extremes of the open periods of a vector of lanes. */
+/* Largest q and -q of a period, so far. */
 typedef struct {
-    mask follows;
-    mask doubtful[SIDES];
-    vector most[SIDES], stop[SIDES]; /* largest q and -q, so far; place of the nearest stop on this side */
-    crest waiting[SIDES];
+    double most[SIDES];
+} range;
+
+/* Cells that may have a crest: their starts, lengths, sides (1, -1), bounds of the fourth derivative of q. */
+typedef struct {
+    _Alignas(64) double q[VI_WIDTH];
+    _Alignas(64) double p[VI_WIDTH];
+    _Alignas(64) double cosine[VI_WIDTH];
+    _Alignas(64) double sine[VI_WIDTH];
+    _Alignas(64) double length[VI_WIDTH];
+    _Alignas(64) double side[VI_WIDTH];
+    _Alignas(64) double fourth[VI_WIDTH];
+    int32_t period[VI_WIDTH];
+    int count;
+} crests;
+
+/* The search for the extremes of a lane. */
+typedef struct {
+    const vi_lane_group *g;
+    int lane;
+    double stop[SIDES]; /* place of the nearest stop on this side */
+    range *range_of;    /* of each period */
+    crests waiting;
 } extremes;
 
-/* A cell, or a part of it, between two states; velocities and curvatures over the length of a cell. */
+/* Bounds of derivatives of q over VI_CELLS cells, times powers of the cell: `bound` of cells.h. */
 typedef struct {
-    state start;
-    vector end_q, slope, end_slope, half, end_half; /* half: of the second derivative */
-    vector length;
-    vector slack, bend;                    /* largest deviations of q and of `half` from a line */
-} piece;
+    vector second, third, fourth;
+} bounds;
 
-LANES_INLINE vector of_side(int side, vector a)
+LANES_INLINE bounds bound_lane(const vi_lane_group *g, int lane, const state *s)
 {
-    return side == UPPER ? a : -a;
-}
-
-LANES_INLINE extremes begin_extremes(const vi_lane_group *g, int at, int contacts)
-{
-    extremes e = {0};
-    e.follows = load(g->record.extremes + at) > 0.0;
-    if (!any(e.follows)) {
-        return e;
-    }
-    e.most[UPPER] = load(g->record.most + at);
-    e.most[LOWER] = -load(g->record.least + at);
-    for (int side = 0; side < SIDES; ++side) {
-        e.stop[side] = all(HUGE_VAL);
-        for (int c = 0; c < contacts; ++c) {
-            const mask here = of_side(side, load(g->sign[c] + at)) > 0.0;
-            e.stop[side] = choose(here, smaller(load(g->limit[c] + at), e.stop[side]), e.stop[side]);
-        }
-    }
-    return e;
+    const double k = g->one.stiffness[lane], loads = g->one.load[lane], drag = g->one.drag[lane];
+    const double w = g->angular_frequency[lane], cell = g->cell[lane], square = cell * cell;
+    const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * g->one.span[lane];
+    const vector second = loads + g->one.root_rate[lane] * norm;
+    const vector third = w * loads + (drag * second + k * norm);
+    const vector fourth = w * (w * loads) + (drag * third + k * second);
+    return (bounds){second * square, third * (square * cell), fourth * (square * square)};
 }
 
 /* Let a displacement count. */
-LANES_INLINE void reach(extremes *e, int side, mask where, vector q)
+static inline void reach(extremes *e, int32_t period, int side, double q)
 {
-    const vector most = larger(e->most[side], smaller(of_side(side, q), e->stop[side]));
-    e->most[side] = choose(where, most, e->most[side]);
+    double *most = &e->range_of[period].most[side];
+    const double value = vi_min(side == UPPER ? q : -q, e->stop[side]);
+    *most = value > *most ? value : *most;
 }
 
-/* Compute the waiting crests of some lanes: two steps of Newton's method. */
-LANES_INLINE void compute_crests(const vi_lane_group *g, int at, extremes *e, mask where, vector sign, const crest *c)
+/* Compute the waiting crests: two steps of Newton's method. */
+static void compute_crests(extremes *e)
 {
-    vector term[VI_LANE_ORDER + 1], share = c->guess, value = share, step = share;
-    expand(g, at, &c->start, term);
+    crests *c = &e->waiting;
+    const state start = {load(c->q), load(c->p), load(c->cosine), load(c->sine)};
+    const vector length = load(c->length), side = load(c->side), bend = load(c->fourth) * (1.0 / 16.0) * (length * length);
+    vector term[VI_LANE_ORDER + 1], added, slope;
+    expand_of_lane(e->g, e->lane, &start, term);
+    evaluate(term, length, &added, &slope);
+    const vector first = -side * term[1], last = -side * slope;
+    const vector half = -side * term[2], end_half = -side * half_bend(term, length);
+    const mask bent = (smaller(half, end_half) > bend) | (larger(half, end_half) < -bend);
+    const mask turns = bent & (half > 0.0) & (first < 0.0) & (last >= 0.0);
+    vector share = first_guess(first, 2.0 * half, last, 2.0 * end_half, length), value = share, step = share;
     for (int i = 0; i < 2; ++i) {
-        vector added, slope, half;
         evaluate(term, share, &added, &slope);
-        half = half_bend(term, share);
-        step = -0.5 * slope / half;
+        step = -0.5 * slope / half_bend(term, share);
         value = term[0] + (added + 0.5 * (slope * step));
-        share = smaller(larger(share + step, all(0.0)), c->length);
+        share = smaller(larger(share + step, all(0.0)), length);
     }
-    const mask sure = size_of(step) <= LAST_STEP, upper = where & (sign > 0.0), lower = where & (sign < 0.0);
-    reach(e, UPPER, upper & sure, value);
-    reach(e, LOWER, lower & sure, value);
-    e->doubtful[UPPER] |= upper & ~sure;
-    e->doubtful[LOWER] |= lower & ~sure;
-}
-
-LANES_INLINE crest either(mask where, const crest *a, const crest *b)
-{
-    return (crest){chosen(where, &a->start, &b->start), choose(where, a->guess, b->guess),
-                   choose(where, a->length, b->length), a->waits | b->waits};
-}
-
-/* Compute all waiting crests of some lanes that still count. */
-LANES_INLINE void finish_crests(const vi_lane_group *g, int at, extremes *e, mask where)
-{
-    const mask short_of_stop[SIDES] = {e->most[UPPER] < e->stop[UPPER], e->most[LOWER] < e->stop[LOWER]};
-    const mask upper = where & e->waiting[UPPER].waits & short_of_stop[UPPER];
-    const mask lower = where & e->waiting[LOWER].waits & short_of_stop[LOWER];
-    e->waiting[UPPER].waits &= ~where;
-    e->waiting[LOWER].waits &= ~where;
-    if (!any(upper | lower)) {
-        return;
-    }
-    const crest one = either(upper, &e->waiting[UPPER], &e->waiting[LOWER]);
-    compute_crests(g, at, e, upper | lower, choose(upper, all(1.0), all(-1.0)), &one);
-    if (any(upper & lower)) {
-        compute_crests(g, at, e, upper & lower, all(-1.0), &e->waiting[LOWER]);
-    }
-}
-
-/* Look for crests in a piece of some lanes. */
-LANES_INLINE void look_into(const vi_lane_group *g, int at, extremes *e, mask where, const piece *a)
-{
-    for (int side = 0; side < SIDES; ++side) {
-        const vector edge = larger(of_side(side, a->start.q), of_side(side, a->end_q));
-        const vector slope = -of_side(side, a->slope), end_slope = -of_side(side, a->end_slope);
-        const vector half = -of_side(side, a->half), end_half = -of_side(side, a->end_half);
-        const mask matters = where & (edge + a->slack > e->most[side]) & (e->most[side] < e->stop[side]);
-        const mask bent = (smaller(half, end_half) > a->bend) | (larger(half, end_half) < -a->bend);
-        mask turns = matters & bent & (half > 0.0) & (slope < 0.0) & (end_slope >= 0.0);
-        e->most[side] = choose(matters, larger(e->most[side], edge), e->most[side]);
-        e->doubtful[side] |= matters & ~bent;
-        const mask both = turns & e->waiting[side].waits;
-        if (any(both)) {
-            compute_crests(g, at, e, both, of_side(side, all(1.0)), &e->waiting[side]);
-            turns &= ~both | (edge + a->slack > e->most[side]);
-        }
-        if (any(turns)) {
-            const vector guess = first_guess(slope, 2.0 * half, end_slope, 2.0 * end_half, a->length);
-            const crest new = {a->start, guess, a->length, turns};
-            e->waiting[side] = either(turns, &new, &e->waiting[side]);
+    const mask sure = turns & (size_of(step) <= LAST_STEP), careful = ~bent | (turns & ~sure);
+    for (int i = 0; i < c->count; ++i) {
+        const int of = c->side[i] > 0.0 ? UPPER : LOWER;
+        if (sure[i]) {
+            reach(e, c->period[i], of, value[i]);
+        } else if (careful[i]) {
+            vi_lane_cell cell;
+            for (int n = 0; n <= VI_LANE_ORDER; ++n) {
+                cell.term[n] = term[n][i];
+            }
+            reach(e, c->period[i], of, c->side[i] * vi_lane_cell_crest(&cell, c->side[i], c->length[i]));
         }
     }
+    c->count = 0;
 }
 
-/* Follow the extremes of some lanes over their next whole cells, as many as passed, whose ends are q[]. */
-LANES_INLINE void follow_cells(const vi_lane_group *g, int at, extremes *e, mask where, const flight *f,
-                               const vector q[], vector passed)
+/* A vector of flights, in segments of VI_CELLS cells. */
+typedef struct {
+    int32_t period[VI_WIDTH];
+    vector cells, whole, end_q;
+    int segments;
+    state segment[MOST_SEGMENTS];                       /* at its start */
+    vector q[MOST_SEGMENTS * VI_CELLS + 1];             /* at the ends of cells */
+    vector highest[MOST_SEGMENTS], lowest[MOST_SEGMENTS]; /* of a segment's ends of cells */
+} stretch;
+
+/* Compute the displacements at the ends of the cells. */
+LANES_INLINE void pass_cells(const vi_lane_group *g, int lane, stretch *s)
 {
-    const vector cell = load(g->cell + at), slack = 0.125 * f->second;
-    const vector steep = 0.125 * f->third * load(g->cell_rate + at);
-    vector p = f->now.p;
-    for (int i = 1; i <= VI_CELLS; ++i) {
-        const mask inside = where & (passed >= (double)i);
-        if (!any(inside)) {
+    s->q[0] = s->segment[0].q;
+    for (s->segments = 1;; ++s->segments) {
+        const int segment = s->segments - 1, first = segment * VI_CELLS;
+        const state *now = &s->segment[segment];
+        const bool is_whole = !any(s->whole < (double)(first + VI_CELLS));
+        vector highest = larger(s->q[first], s->end_q), lowest = smaller(s->q[first], s->end_q);
+#pragma GCC unroll 8
+        for (int i = 1; i <= VI_CELLS; ++i) {
+            vector q = s->q[first + i] = row_of_lane(g->one.end_q[i], lane, now);
+            if (!is_whole) {
+                q = choose(s->whole >= (double)(first + i), q, s->end_q);
+            }
+            highest = larger(highest, q);
+            lowest = smaller(lowest, q);
+        }
+        s->highest[segment] = highest;
+        s->lowest[segment] = lowest;
+        if (s->segments == MOST_SEGMENTS || !any(s->cells > (double)(first + VI_CELLS))) {
             return;
         }
-        const vector end_p = linear(g->one.end_p[i], at, &f->now);
-        const mask steady = (smaller(p, end_p) > steep) | (larger(p, end_p) < -steep);
-        const mask beyond = (larger(q[i - 1], q[i]) + slack > e->most[UPPER])
-                            | (slack - smaller(q[i - 1], q[i]) > e->most[LOWER]);
-        const mask may = inside & beyond & ~steady;
-        if (any(may)) {
-            const state from = turned(g, at, i - 1, q[i - 1], p, &f->now), to = turned(g, at, i, q[i], end_p, &f->now);
-            const piece whole = {.start = from,
-                                 .end_q = to.q,
-                                 .slope = p * cell,
-                                 .end_slope = end_p * cell,
-                                 .half = linear(g->one.taylor[2], at, &from),
-                                 .end_half = linear(g->one.taylor[2], at, &to),
-                                 .length = all(1.0),
-                                 .slack = slack,
-                                 .bend = f->fourth * (1.0 / 16.0)};
-            look_into(g, at, e, may, &whole);
+        s->segment[s->segments] = after_all_cells(&g->one, lane, now);
+    }
+}
+
+/* Put the cells of some flights in line for their crests. */
+static inline void put_in_line(extremes *e, const state *start, const stretch *s, vector length, vector fourth, int side,
+                               mask where)
+{
+    crests *c = &e->waiting;
+    for (int n = 0; n < VI_WIDTH; ++n) {
+        if (where[n]) {
+            const int to = c->count++;
+            c->q[to] = start->q[n];
+            c->p[to] = start->p[n];
+            c->cosine[to] = start->cosine[n];
+            c->sine[to] = start->sine[n];
+            c->length[to] = length[n];
+            c->side[to] = side == UPPER ? 1.0 : -1.0;
+            c->fourth[to] = fourth[n];
+            c->period[to] = s->period[n];
+            if (c->count == VI_WIDTH) {
+                compute_crests(e);
+            }
         }
-        p = end_p;
     }
 }
 
-/* Follow the extremes of some lanes over the part of a cell up to a share, which ends in this state. */
-LANES_INLINE void follow_part(const vi_lane_group *g, int at, extremes *e, mask where, const flight *f,
-                              const state *start, const vector term[], vector share, vector end_q, vector end_slope)
+/* Look for crests in cell `i`, from 1, of a segment, for some flights of each side.
+ *
+ * The velocity deviates from a line over the cell by an eighth of its largest second derivative. Its slope deviates from
+ * the line's by half of it: then the velocity is monotone, and its signs tell crests. */
+LANES_INLINE void look_into(extremes *e, const stretch *s, int segment, int i, const bounds *b, const mask may[SIDES])
 {
-    const vector square = share * share, slack = 0.125 * f->second * square, steep = 0.125 * f->third * square;
-    const mask steady = (smaller(term[1], end_slope) > steep) | (larger(term[1], end_slope) < -steep);
-    const mask beyond = (larger(start->q, end_q) + slack > e->most[UPPER])
-                        | (slack - smaller(start->q, end_q) > e->most[LOWER]);
-    const mask may = where & beyond & ~steady;
-    if (any(may)) {
-        const piece part = {.start = *start,
-                            .end_q = end_q,
-                            .slope = term[1],
-                            .end_slope = end_slope,
-                            .half = term[2],
-                            .end_half = half_bend(term, share),
-                            .length = share,
-                            .slack = slack,
-                            .bend = f->fourth * (1.0 / 16.0) * square};
-        look_into(g, at, e, may, &part);
+    const vi_lane_group *g = e->g;
+    const state *now = &s->segment[segment];
+    const int cell = segment * VI_CELLS + i - 1;
+    state start = {s->q[cell], i == 1 ? now->p : row_of_lane(g->one.end_p[i - 1], e->lane, now), now->cosine, now->sine};
+    const vector end_p = row_of_lane(g->one.end_p[i], e->lane, now), third = b->third * g->cell_rate[e->lane];
+    const mask steady = (smaller(start.p, end_p) > 0.125 * third) | (larger(start.p, end_p) < -0.125 * third);
+    const mask bends = ~steady & ~(size_of(end_p - start.p) > 0.5 * third);
+    const mask here[SIDES] = {may[UPPER] & (bends | ((start.p > 0.0) & (end_p < 0.0))),
+                              may[LOWER] & (bends | ((start.p < 0.0) & (end_p > 0.0)))};
+    if (!any(here[UPPER] | here[LOWER])) {
+        return;
     }
-    reach(e, UPPER, where, end_q);
-    reach(e, LOWER, where, end_q);
+    const vector length = smaller(s->cells - (double)cell, all(1.0));
+    turn_on(&g->one, e->lane, i - 1, now, &start.cosine, &start.sine);
+    for (int side = 0; side < SIDES; ++side) {
+        if (any(here[side])) {
+            put_in_line(e, &start, s, length, b->fourth, side, here[side]);
+        }
+    }
 }
 
-/* Keep the extremes in the record. */
-LANES_INLINE void keep_extremes(vi_lane_group *g, int at, const extremes *e)
+/* Look for crests in the cells of a vector of flights. */
+LANES_INLINE void look_for_crests(extremes *e, const stretch *s)
 {
-    store(g->record.most + at, choose(e->follows, e->most[UPPER], load(g->record.most + at)));
-    store(g->record.least + at, choose(e->follows, -e->most[LOWER], load(g->record.least + at)));
+    vector most[SIDES];
+    for (int side = 0; side < SIDES; ++side) {
+        vector so_far;
+#pragma GCC unroll 8
+        for (int n = 0; n < VI_WIDTH; ++n) {
+            so_far[n] = e->range_of[s->period[n]].most[side];
+        }
+        most[side] = choose(so_far < e->stop[side], so_far, all(HUGE_VAL));
+    }
+    for (int segment = 0; segment < s->segments; ++segment) {
+        const bounds b = bound_lane(e->g, e->lane, &s->segment[segment]);
+        const vector size = larger(s->highest[segment], -s->lowest[segment]);
+        const vector slack = 0.125 * b.second + ROUNDING_OF_CREST * (size + b.second);
+        const vector highest = most[UPPER] - slack, lowest = slack - most[LOWER];
+        const mask begun = s->cells > (double)(segment * VI_CELLS);
+        if (!any(begun & ((s->highest[segment] > highest) | (s->lowest[segment] < lowest)))) {
+            continue;
+        }
+        for (int i = 1; i <= VI_CELLS; ++i) {
+            const int cell = segment * VI_CELLS + i - 1;
+            const mask inside = s->cells > (double)cell;
+            const vector q = s->q[cell], end = choose(s->whole > (double)cell, s->q[cell + 1], s->end_q);
+            const mask may[SIDES] = {inside & (larger(q, end) > highest), inside & (smaller(q, end) < lowest)};
+            if (any(may[UPPER] | may[LOWER])) {
+                look_into(e, s, segment, i, &b, may);
+            }
+        }
+    }
 }
+
+/* Order flights: those of several segments come first, so that vectors hold flights of about one length. */
+static inline void order_flights(const vi_waiting_flights *w, int32_t count, int32_t order[])
+{
+    int32_t first = 0, last = count;
+    for (int32_t n = 0; n < count; ++n) {
+        const bool is_long = w->cells[n] > (double)VI_CELLS;
+        last -= !is_long;
+        order[is_long ? first : last] = n;
+        first += is_long;
+    }
+}
+
+LANES_INLINE vector pick(const double *from, const int32_t order[])
+{
+    vector found;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        found[i] = from[order[i]];
+    }
+    return found;
+}
+
+/* Read a vector of flights, and let their ends of cells count. */
+LANES_INLINE void begin_stretch(extremes *e, const int32_t order[], stretch *s)
+{
+    const vi_waiting_flights *w = &e->g->waiting[e->lane];
+    s->segment[0] = (state){pick(w->q, order), pick(w->p, order), pick(w->cosine, order), pick(w->sine, order)};
+    s->cells = pick(w->cells, order);
+    s->whole = whole_part(s->cells);
+    s->end_q = pick(w->end_q, order);
+    pass_cells(e->g, e->lane, s);
+    vector highest = s->highest[0], lowest = s->lowest[0];
+    for (int segment = 1; segment < s->segments; ++segment) {
+        const mask begun = s->cells > (double)(segment * VI_CELLS);
+        highest = choose(begun, larger(highest, s->highest[segment]), highest);
+        lowest = choose(begun, smaller(lowest, s->lowest[segment]), lowest);
+    }
+    for (int n = 0; n < VI_WIDTH; ++n) {
+        s->period[n] = w->strobes_before[order[n]];
+        if (order[n] < w->flights) {
+            reach(e, s->period[n], UPPER, highest[n]);
+            reach(e, s->period[n], LOWER, lowest[n]);
+        }
+    }
+}
+
+/* Extend the ranges of the periods by the waiting flights of a lane, which fill their last vector. */
+LANES_INLINE void follow_flights(const vi_lane_group *g, int lane, int contacts, range range_of[])
+{
+    const int32_t count = (int32_t)(g->waiting[lane].flights + VI_WIDTH - 1) / VI_WIDTH * VI_WIDTH;
+    extremes e = {.g = g, .lane = lane, .stop = {HUGE_VAL, HUGE_VAL}, .range_of = range_of};
+    int32_t order[VI_FLIGHTS];
+    for (int c = 0; c < contacts; ++c) {
+        double *stop = &e.stop[g->sign[c][lane] > 0.0 ? UPPER : LOWER];
+        *stop = vi_min(*stop, g->limit[c][lane]);
+    }
+    order_flights(&g->waiting[lane], count, order);
+    for (int32_t first = 0; first < count; first += VI_WIDTH) {
+        stretch s;
+        begin_stretch(&e, order + first, &s);
+        look_for_crests(&e, &s);
+    }
+    if (e.waiting.count > 0) {
+        compute_crests(&e);
+    }
+}
+
+#endif

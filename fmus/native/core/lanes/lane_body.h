@@ -20,7 +20,7 @@ typedef struct {
     vi_cell_result (*search)(vi_lane_group *group, int lane, int modes, int contacts, double *share, vi_lane_meeting *met);
     /* Turn the velocity of a contact just met into a rebound at this speed; false for a touch that may be no impact. */
     bool (*rebound)(vi_lane_group *group, int lane, int modes, const vi_lane_meeting *met, double after);
-    /* Extend `most` and `least` of the record over the lane's last round. */
+    /* Extend `most` and `least` of the record over the lane's last round. NULL: flights wait for their record. */
     void (*extremes)(vi_lane_group *group, int lane, int modes, int contacts);
     /* The observed displacement and velocity, in units of the record; a body of one mode beyond its stop by rounding is
      * put on it. */

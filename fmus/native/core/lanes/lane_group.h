@@ -119,8 +119,28 @@ typedef struct {
     vi_lane_array most, least;                /* so far */
     vi_lane_array strobe, strobe_velocity;    /* at its start */
     vi_lane_array impacts_before;             /* number of impacts at its start */
+    vi_lane_array open, turn;                 /* 1: there is one; whole periods of the clock at its start */
+    /* 1: flights wait for their record; start of the present round, and impacts before it */
+    vi_lane_array waits, from_periods, from_rest, from_rest_low, from_impacts;
     vi_lane_array doubtful;                   /* 1: `most` and `least` lack the last round, see `extremes` of the body */
 } vi_lane_record;
+
+/* Flights of a lane that wait for the record of their strobes and extremes, and most strobes of a round (see
+ * VI_LONGEST_CELL). */
+enum { VI_FLIGHTS = 64, VI_STROBES_OF_ROUND = 3 };
+
+/* The record of one lane that waits: rigid stops, one mode. A flight covers some cells from a state. It is a round, or a
+ * part of one between strobes. Many flights fill whole vectors, whatever the other lanes do. */
+typedef struct {
+    double q[VI_FLIGHTS], p[VI_FLIGHTS], cosine[VI_FLIGHTS], sine[VI_FLIGHTS]; /* at the start */
+    double cells[VI_FLIGHTS], end_q[VI_FLIGHTS];
+    /* strobes: the start of the round, cells up to the strobe, whole periods of the clock, impacts before it */
+    double from_q[VI_FLIGHTS], from_p[VI_FLIGHTS], from_cosine[VI_FLIGHTS], from_sine[VI_FLIGHTS];
+    double strobe_cells[VI_FLIGHTS], turn[VI_FLIGHTS], impacts[VI_FLIGHTS];
+    int32_t strobes_before[VI_FLIGHTS];       /* of each flight */
+    int32_t flight_before[VI_FLIGHTS];        /* of each strobe; the next flight begins there */
+    int64_t flights, strobes, unused[6];      /* vectors stay aligned */
+} vi_waiting_flights;
 
 /* The time series of the lanes. */
 typedef struct {
@@ -155,6 +175,7 @@ typedef struct {
     vi_one_mode one;
     vi_yielding yielding;
     vi_many_modes many;
+    vi_waiting_flights waiting[VI_LANES];     /* last: the other members are arrays over the lanes */
 } vi_lane_group;
 
 /* Most rounds in a row, each of which writes at most one impact of a lane. */

@@ -30,6 +30,12 @@ static void put_instant(vi_lane_group *g, int lane, vi_instant now)
 
 /* ---- the goals of a run ---- */
 
+/* Do the flights of the lanes wait for the record of their periods? */
+static bool flights_wait(const vi_lanes_work *w)
+{
+    return w->plan->periods && w->body->extremes == NULL;
+}
+
 /* Set the next goal of the flight: the end of a recorded period, or of a part of the run. */
 static void set_goal(const vi_lanes_work *w, int lane)
 {
@@ -37,7 +43,7 @@ static void set_goal(const vi_lanes_work *w, int lane)
     vi_lane_run *run = &w->run[lane];
     const vi_instant now = instant_of(g, lane);
     vi_instant goal = run->recording ? run->end : run->begin;
-    run->goal_is_period = run->recording && w->plan->periods
+    run->goal_is_period = run->recording && w->plan->periods && !flights_wait(w)
                           && vi_clock_to_period_end(&run->clock, now) <= vi_clock_elapsed(&run->clock, now, goal);
     if (run->goal_is_period) {
         goal = (vi_instant){now.periods + 1, 0.0, 0.0};
@@ -65,6 +71,7 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     vi_lanes_points *points = w->points;
     const int64_t point = w->run[lane].point;
     double q[VI_LANES_MODES], p[VI_LANES_MODES], displacement, velocity;
+    vi_lane_record_waiting(w->group, w->plan, points, lane);
     w->body->observe(w->group, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
     w->body->state(w->group, lane, w->plan->modes, q, p);
     if (!isfinite(displacement) || !isfinite(velocity)) {
@@ -93,12 +100,13 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
 /* A period begins, and the open one ends. */
 static void turn_period(const vi_lanes_work *w, int lane, double displacement, double velocity)
 {
-    vi_lane_run *run = &w->run[lane];
-    if (run->period_open) {
+    vi_lane_record *record = &w->group->record;
+    if (record->open[lane] > 0.0) {
         vi_lane_end_period(w->group, w->plan, w->points, lane);
     }
-    run->period_open = true;
-    w->group->record.last_turn[lane] = (double)run->end.periods;
+    record->open[lane] = 1.0;
+    record->turn[lane] = w->group->periods[lane];
+    record->last_turn[lane] = (double)w->run[lane].end.periods;
     vi_lane_begin_period(w->group, lane, displacement, velocity);
 }
 
@@ -116,6 +124,9 @@ static void arrive(vi_lanes_work *w, int lane)
         run->recording = true;
         g->record.impacts[lane] = w->plan->impacts ? 1.0 : 0.0;
         g->record.extremes[lane] = w->plan->periods && w->plan->extrema ? 1.0 : 0.0;
+        g->record.waits[lane] = flights_wait(w) ? 1.0 : 0.0;
+        g->record.last_turn[lane] = flights_wait(w) ? (double)run->end.periods : -1.0;
+        g->waiting[lane].flights = g->waiting[lane].strobes = 0;
         vi_lane_begin_period(g, lane, displacement, velocity);
         if (w->plan->periods && g->rest[lane] == 0.0) {
             turn_period(w, lane, displacement, velocity);
@@ -208,11 +219,18 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
         if (w->plan->rate > 0.0) {
             w->body->sample_from(g, lane, w->plan->modes);
         }
+        const bool waits = g->record.waits[lane] > 0.0;
+        if (waits) {
+            vi_lane_note_start(g, lane);
+        }
         event = search(w, lane);
+        if (waits && event != VI_EVENT_LEAVE) {
+            vi_lane_note_flight(g, w->plan, w->points, lane);
+        }
         if (event != VI_EVENT_LEAVE && w->plan->rate > 0.0) {
             w->body->take_samples(g, w->plan, w->points, lane);
         }
-        if (event != VI_EVENT_LEAVE && g->record.extremes[lane] > 0.0) {
+        if (event != VI_EVENT_LEAVE && !waits && g->record.extremes[lane] > 0.0) {
             w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
         }
     }
@@ -230,7 +248,7 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
 void vi_lane_idle(vi_lanes_work *w, int lane)
 {
     double *all = (double *)w->group; /* all arrays over the lanes */
-    for (size_t i = (size_t)lane; i < sizeof *w->group / sizeof *all; i += VI_LANES) {
+    for (size_t i = (size_t)lane; i < offsetof(vi_lane_group, waiting) / sizeof *all; i += VI_LANES) {
         all[i] = 0.0;
     }
     vi_lane_group *g = w->group;
@@ -327,7 +345,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     double q[VI_LANES_MODES], p[VI_LANES_MODES];
     run->point = point;
     w->group->samples.next[lane] = w->group->samples.count[lane] = 0.0;
-    run->recording = run->goal_is_period = run->period_open = false;
+    run->recording = run->goal_is_period = false;
     w->points->rows_of[point] = w->points->periods_of[point] = 0;
     if (w->plan->rate > 0.0) {
         w->points->samples_of[point] = 0;
@@ -335,6 +353,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
     g->hit_cells[lane] = -1.0;
     g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;
+    g->record.waits[lane] = g->record.open[lane] = 0.0;
     g->record.last_turn[lane] = -1.0;
     g->record.point[lane] = (double)point;
     g->record.scale[lane] = 1.0;

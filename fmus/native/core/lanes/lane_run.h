@@ -14,7 +14,6 @@ typedef struct {
     vi_clock clock;
     vi_instant begin, end;  /* of the recording */
     bool recording, goal_is_period;
-    bool period_open;
 } vi_lane_run;
 
 /* Everything that a lane needs to run points, for the length of a call. */

@@ -1,6 +1,7 @@
 /* A body of one mode: its tables, and the motion of one lane of it. */
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 
 #include "body/landing.h"
 #include "lanes/lane_body.h"
@@ -87,101 +88,6 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
     g->q[0][lane] = sign * g->limit[met->contact][lane];
     g->p[0][lane] = -sign * after;
     return met->approach * met->approach > g->resolution[met->contact][lane];
-}
-
-/* ---- extremes ---- */
-
-/* Largest deviations of q and p from a line over a cell ahead, as in the rounds. */
-typedef struct {
-    double q, p;
-} bulges;
-
-static bulges bulges_of(const vi_lane_group *g, int lane)
-{
-    const vi_one_mode *one = &g->one;
-    const double q = g->start_q[0][lane], p = g->start_p[0][lane], k = one->stiffness[lane], load = one->load[lane];
-    const double norm = sqrt(p * p + k * (q * q)) + load * one->span[lane];
-    const double second = load + one->root_rate[lane] * norm;
-    const double third = g->angular_frequency[lane] * load + (one->drag[lane] * second + k * norm);
-    const double eighth = 0.125 * g->cell[lane] * g->cell[lane];
-    return (bulges){second * eighth, third * eighth};
-}
-
-/* Does q rise, or fall, throughout the cell after `passed`? */
-static bool is_monotone(const vi_lane_group *g, int lane, int passed, double bulge)
-{
-    const double first = after_cells(g->one.end_p[passed], g, lane);
-    const double last = after_cells(g->one.end_p[passed + 1], g, lane);
-    return vi_min(first, last) > bulge || vi_max(first, last) < -bulge;
-}
-
-/* Limit that the stops on this side set to sign * q. */
-static double stop_on(const vi_lane_group *g, int lane, int contacts, double sign)
-{
-    double farthest = HUGE_VAL;
-    for (int c = 0; c < contacts; ++c) {
-        if (g->sign[c][lane] == sign) {
-            farthest = vi_min(farthest, g->limit[c][lane]);
-        }
-    }
-    return farthest;
-}
-
-/* The largest sign * q over cells that end at edge[], and so far (`most`). */
-static double extend(const vi_lane_group *g, int lane, int contacts, double sign, const double edge[], int passed,
-                     double share, const bulges *bulge, double most)
-{
-    const int last = share > 0.0 ? passed + 1 : passed;
-    const double stop = stop_on(g, lane, contacts, sign);
-    for (int i = 0; i <= last; ++i) {
-        most = vi_max(most, vi_min(stop, sign * edge[i]));
-    }
-    for (int i = 0; i < last && most < stop; ++i) {
-        if (vi_max(sign * edge[i], sign * edge[i + 1]) + bulge->q > most
-            && !(i < passed && is_monotone(g, lane, i, bulge->p))) {
-            const vi_lane_cell cell = cell_after(g, lane, i);
-            const double inside = vi_lane_cell_crest(&cell, sign, i < passed ? 1.0 : share);
-            most = vi_max(most, vi_min(stop, inside));
-        }
-    }
-    return most;
-}
-
-/* Extend the extremes over some whole cells after the start, and a share of one more that ends at q. */
-static void extend_both(vi_lane_group *g, int lane, int contacts, int passed, double share, double end)
-{
-    vi_lane_record *record = &g->record;
-    const bulges bulge = bulges_of(g, lane);
-    double edge[VI_CELLS + 2];
-    edge[0] = g->start_q[0][lane];
-    for (int i = 1; i <= passed; ++i) {
-        edge[i] = after_cells(g->one.end_q[i], g, lane);
-    }
-    edge[passed + 1] = end;
-    record->most[lane] = extend(g, lane, contacts, 1.0, edge, passed, share, &bulge, record->most[lane]);
-    record->least[lane] = -extend(g, lane, contacts, -1.0, edge, passed, share, &bulge, -record->least[lane]);
-}
-
-/* Move the start of the round by VI_CELLS cells. */
-static void jump(vi_lane_group *g, int lane)
-{
-    const double q = after_cells(g->one.end_q[VI_CELLS], g, lane), p = after_cells(g->one.end_p[VI_CELLS], g, lane);
-    const double c = g->one.turn_cosine[VI_CELLS][lane], n = g->one.turn_sine[VI_CELLS][lane];
-    const double cosine = g->start_cosine[lane], sine = g->start_sine[lane];
-    g->start_q[0][lane] = q;
-    g->start_p[0][lane] = p;
-    g->start_cosine[lane] = cosine * c - sine * n;
-    g->start_sine[lane] = sine * c + cosine * n;
-}
-
-static void extremes(vi_lane_group *g, int lane, int modes, int contacts)
-{
-    (void)modes;
-    for (; g->jumped[lane] > 0.0; g->jumped[lane] -= VI_CELLS) {
-        extend_both(g, lane, contacts, VI_CELLS, 0.0, g->start_q[0][lane]);
-        jump(g, lane);
-    }
-    extend_both(g, lane, contacts, (int)g->passed[lane], g->share[lane], g->q[0][lane]);
 }
 
 static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
@@ -293,5 +199,5 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     return take_contacts(g, lane, plan->contacts, points, point, steady);
 }
 
-const vi_lane_body vi_lane_one_mode = {take,    search, rebound,             extremes,
+const vi_lane_body vi_lane_one_mode = {take,    search, rebound,             NULL,
                                             observe, state,  vi_lane_sample_from, vi_lane_take_samples};

@@ -80,11 +80,12 @@ LANES_INLINE void write_impacts(const vi_lane_group *g, vi_lanes_points *points,
     }
 }
 
-/* Write a period that ends, or join it to those before. */
-static inline void put_period(const vi_lanes_plan *plan, vi_lanes_points *points, int64_t point,
+/* Write a period that ends, or join it to those before; without each_period it may stand for `count` periods. */
+static inline void put_period(const vi_lanes_plan *plan, vi_lanes_points *points, int64_t point, int64_t count,
                               const double period[VI_PERIOD_WIDTH])
 {
-    const int64_t done = points->periods_of[point]++, column = points->count * points->most_periods;
+    const int64_t done = points->periods_of[point], column = points->count * points->most_periods;
+    points->periods_of[point] += count;
     double *row = points->periods + point * points->most_periods;
     if (plan->each_period || done == 0) {
         row += plan->each_period ? done : 0;
@@ -119,7 +120,7 @@ LANES_INLINE void end_periods(const vi_lane_group *g, const vi_lanes_plan *plan,
             for (int c = 0; c < VI_PERIOD_WIDTH; ++c) {
                 period[c] = column[c][i];
             }
-            put_period(plan, points, (int64_t)r->point[at + i], period);
+            put_period(plan, points, (int64_t)r->point[at + i], 1, period);
         }
     }
 }

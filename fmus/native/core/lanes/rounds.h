@@ -1,6 +1,6 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
-#include "lanes/extremes.h"
 #include "lanes/rounds_samples.h"
+#include "lanes/waiting.h"
 
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
@@ -10,8 +10,8 @@
 #define ALIKE 1e-3
 /* Step of third order below which its error is a rounding. */
 #define EXACT_FROM 4e-6
-/* Most times in a row that a lane goes through all its cells in one round, and most strobes that it passes there. */
-enum { MOST_JUMPS = 3, MOST_STROBES = 1 };
+/* Most times in a row that a lane goes through all its cells in one round. */
+enum { MOST_JUMPS = 3 };
 
 /* The cell in which a lane may meet a contact or its goal. */
 typedef struct {
@@ -112,90 +112,24 @@ LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, flight *f)
     f->to_goal -= only(jumps, all((double)VI_CELLS));
 }
 
-/* Turn the periods of some lanes, whose goal is then the next strobe. Returns their displacements. */
-LANES_INLINE vector turn_periods(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
-                                 int contacts, mask turns, vector q, vector p)
-{
-    for (int c = 0; c < contacts; ++c) { /* beyond a stop by rounding: put on it */
-        const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
-        q = choose(turns & (sign * q > limit), sign * limit, q);
-    }
-    end_periods(g, plan, points, at, turns);
-    begin_periods(g, at, turns, q, p);
-    store(g->goal_periods + at, load(g->goal_periods + at) + only(turns, all(1.0)));
-    return q;
-}
-
-/* Lanes at a strobe after some whole cells go on from there in the same round. Returns these lanes: all but those with
- * doubtful extremes. */
-LANES_INLINE mask pass_strobe(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
-                              bool follows, mask turns, const vector cells_q[], vector passed, flight *f,
-                              extremes *e)
-{
-    const state start = after_cells(g, at, &f->now, cells_q, passed);
-    const vector length = larger(f->to_goal - passed, all(0.0));
-    vector term[VI_LANE_ORDER + 1], added, slope;
-    expand(g, at, &start, term);
-    evaluate(term, length, &added, &slope);
-    if (follows) {
-        follow_part(g, at, e, turns & e->follows, f, &start, term, length, start.q + added, slope);
-        finish_crests(g, at, e, turns & e->follows);
-        turns &= ~(e->doubtful[UPPER] | e->doubtful[LOWER]);
-        keep_extremes(g, at, e);
-    }
-    const vector p = slope * load(g->cell_rate + at);
-    store(g->periods + at, choose(turns, load(g->goal_periods + at), load(g->periods + at)));
-    store(g->rest + at, only(~turns, load(g->rest + at)));
-    store(g->rest_low + at, only(~turns, load(g->rest_low + at)));
-    const vector q = turn_periods(g, plan, points, at, contacts, turns, start.q + added, p);
-    const state next = {q, p, all(1.0), all(0.0)};
-    if (plan->rate > 0.0) {
-        sample_to_strobe(g, plan, points, at, turns, q, p);
-    }
-    if (follows) {
-        e->most[UPPER] = choose(turns, q, e->most[UPPER]);
-        e->most[LOWER] = choose(turns, -q, e->most[LOWER]);
-    }
-    const vector to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
-    f->now = chosen(turns, &next, &f->now);
-    f->start = chosen(turns, &next, &f->start);
-    f->on = only(~turns, f->on);
-    f->jumped = only(~turns, f->jumped);
-    f->to_goal = choose(turns, to_goal, f->to_goal);
-    return turns;
-}
-
 /* Move on to the cell in which each lane may meet a contact, its goal or the end of its round. */
-LANES_INLINE candidate choose_cell(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at,
-                                   int contacts, bool follows, flight *f, extremes *e)
+LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, flight *f)
 {
     candidate cell;
     vector count[VI_LANES_CONTACTS], cleared, q[VI_CELLS + 1];
-    const vector last = load(g->record.last_turn + at);
-    mask fresh = e->follows, on_strobe = load(g->goal_periods + at) < last;
-    for (int i = 0; i <= (MOST_STROBES + 1) * (MOST_JUMPS + 1); ++i) {
+    for (int i = 0;; ++i) {
         ends_of_cells(g, at, f, q);
         const vector bend = 2.0 * linear(g->one.taylor[2], at, &f->now);
         for (int c = 0; c < contacts; ++c) {
             count[c] = count_clear(g, at, c, f, q, bend);
         }
         cell.passed = sure_cells(f, contacts, count, &cleared);
-        if (follows) {
-            follow_cells(g, at, e, fresh, f, q, cell.passed);
-        }
-        const mask all_cells = cell.passed == (double)VI_CELLS;
-        const mask jumps = all_cells & (f->jumped < (double)(MOST_JUMPS * VI_CELLS));
-        mask turns = on_strobe & (cleared > cell.passed) & (f->to_goal - cell.passed <= 1.0);
-        if (any(turns)) {
-            turns = pass_strobe(g, plan, points, at, contacts, follows, turns, q, cell.passed, f, e);
-            on_strobe = on_strobe & ~on_strobe; /* once */
-        }
-        if (!any(jumps | turns)) {
+        const mask jumps = cell.passed == (double)VI_CELLS;
+        if (i == MOST_JUMPS || !any(jumps)) {
             break;
         }
         jump(g, at, jumps, f);
         bound(g, at, f);
-        fresh = e->follows & (jumps | turns);
     }
     const mask jumps = cell.passed == (double)VI_CELLS;
     const vector length = larger(f->to_goal - cell.passed, all(0.0));
@@ -336,43 +270,21 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
     store(g->periods + at, choose(arrives, load(g->goal_periods + at), load(g->periods + at) + turns));
 }
 
-/* Follow the extremes over the last part of the round of some lanes, and keep the extremes so far. */
-LANES_INLINE void end_extremes(vi_lane_group *g, int at, const flight *f, const candidate *cell, const vector term[],
-                               const arrival *a, extremes *e)
-{
-    follow_part(g, at, e, e->follows & ~a->careful, f, &cell->start, term, a->share, a->q, a->slope);
-    finish_crests(g, at, e, e->follows);
-    const mask doubtful = (e->doubtful[UPPER] & (e->most[UPPER] < e->stop[UPPER]))
-                          | (e->doubtful[LOWER] & (e->most[LOWER] < e->stop[LOWER]));
-    keep_extremes(g, at, e);
-    store(g->record.doubtful + at, only(doubtful, all(1.0)));
-}
-
-/* Do one round of a vector of lanes; true when one of them has an event. follows: some lanes may follow extremes. */
-LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
-                            bool follows)
+/* Do one round of a vector of lanes; true when one of them has an event. */
+LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts)
 {
     flight f = begin_round(g, at);
     if (plan->rate > 0.0) {
         sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }
-    extremes e = {0};
     vector term[VI_LANE_ORDER + 1];
-    if (follows) {
-        e = begin_extremes(g, at, contacts);
-    }
-    const candidate cell = choose_cell(g, plan, points, at, contacts, follows, &f, &e);
+    const candidate cell = choose_cell(g, at, contacts, &f);
     expand(g, at, &cell.start, term);
     arrival a = search(g, at, &f, &cell, term);
-    if (follows) {
-        end_extremes(g, at, &f, &cell, term, &a, &e);
-    }
     const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
     const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
-    const mask turns = arrives & (load(g->goal_periods + at) < load(g->record.last_turn + at))
-                       & (load(g->record.doubtful + at) == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    vector q = choose(moves, a.q, cell.start.q);
+    const vector q = choose(moves, a.q, cell.start.q);
     const vector p = choose(moves, a.p, cell.start.p);
     store(g->start_q[0] + at, f.start.q);
     store(g->start_p[0] + at, f.start.p);
@@ -387,20 +299,16 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
     store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
     move_clock(g, at, f.jumped + cell.passed, share, arrives);
     if (plan->rate > 0.0) {
-        take_samples(g, plan, points, at, moves | ~moves);
+        take_samples(g, plan, points, at);
     }
     const mask written = a.hits & ~leaves & (load(g->record.impacts + at) > 0.0);
     if (any(written)) {
         write_impacts(g, points, at, contacts, written);
     }
-    if (any(turns)) {
-        q = turn_periods(g, plan, points, at, contacts, turns, q, p);
-    }
     store(g->q[0] + at, q);
     store(g->p[0] + at, p);
-    vector event = only(load(g->record.doubtful + at) > 0.0, all((double)VI_EVENT_FLIGHT));
-    event = choose(a.hits & (impacts >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT), event);
-    event = choose(arrives & ~turns, all((double)VI_EVENT_GOAL), event);
+    vector event = only(a.hits & (impacts >= load(g->most_impacts + at)), all((double)VI_EVENT_IMPACT));
+    event = choose(arrives, all((double)VI_EVENT_GOAL), event);
     event = choose(a.careful, all((double)VI_EVENT_CELL), event);
     event = choose(leaves, all((double)VI_EVENT_LEAVE), event);
     store(g->event + at, event);
@@ -410,14 +318,17 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
 /* Do rounds until a lane has an event. */
 LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts)
 {
-    bool found = false, follows = false;
-    for (int lane = 0; lane < VI_LANES; ++lane) {
-        follows = follows || g->record.extremes[lane] > 0.0;
-    }
+    const bool waits = some_wait(g);
+    bool found = false;
     for (int i = 0; i < VI_MOST_ROUNDS && !found; ++i) {
         for (int at = 0; at < VI_LANES; at += VI_WIDTH) {
-            found |= follows ? one_round(g, plan, points, at, contacts, true)
-                             : one_round(g, plan, points, at, contacts, false);
+            if (waits) {
+                note_start(g, at);
+            }
+            found |= one_round(g, plan, points, at, contacts);
+        }
+        if (waits) {
+            note_rounds(g, plan, points);
         }
     }
 }

@@ -30,28 +30,14 @@ LANES_INLINE mask may_have_samples(const vi_lane_group *g, int at)
     return sampled & (load(g->samples.time + at) <= time_of(g, at) * (1.0 + 16.0 * 2.220446049250313e-16));
 }
 
-/* Take the samples of some lanes since the start of the round, after their clocks have moved. */
-LANES_INLINE void take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, mask where)
+/* Take the samples since the start of the round, after the clocks have moved. */
+LANES_INLINE void take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
 {
     const mask samples = may_have_samples(g, at);
     for (int i = 0; i < VI_WIDTH; ++i) {
-        if (samples[i] & where[i]) {
+        if (samples[i]) {
             vi_lane_take_samples(g, plan, points, at + i);
         }
-    }
-}
-
-/* Take the samples of lanes up to a strobe inside a round; further samples are taken from there on. */
-LANES_INLINE void sample_to_strobe(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, mask turns,
-                                   vector q, vector p)
-{
-    vi_lane_samples *samples = &g->samples;
-    double *const to[] = {samples->from_q,       samples->from_p,    samples->from_cosine,  samples->from_sine,
-                          samples->from_periods, samples->from_rest, samples->from_rest_low};
-    const vector value[] = {q, p, all(1.0), all(0.0), load(g->periods + at), all(0.0), all(0.0)};
-    take_samples(g, plan, points, at, turns);
-    for (int i = 0; i < 7; ++i) {
-        store(to[i] + at, choose(turns, value[i], load(to[i] + at)));
     }
 }
 

@@ -443,7 +443,7 @@ LANES_INLINE bool one_phase_round(vi_lane_group *g, const vi_lanes_plan *plan, v
     store(g->p[0] + at, a.p);
     move_clock(g, at, s.jumped + cell.passed, share, arrives);
     if (plan->rate > 0.0) {
-        take_samples(g, plan, points, at, moves | ~moves);
+        take_samples(g, plan, points, at);
     }
     set_cells(g, at, contacts);
     store(g->record.doubtful + at, load(g->record.extremes + at));
