@@ -318,9 +318,7 @@ class _Campaign:
         """Return the sealed shards, and the parts of earlier commands and of this one that are in no shard."""
         held = self._destination.held()
         others = [
-            part
-            for part in (*parts, *self._computed())
-            if part.path.suffix == ".nc" and part.path.exists()
+            part for part in (*parts, *self._computed()) if part.path.suffix == ".nc" and part.path.exists()
         ]
         return sorted([*held, *others], key=lambda part: part.chunk.first)
 

@@ -334,7 +334,9 @@ class StoreWriter:
                     del self._group[name]
             grid = replace(
                 self.grid,
-                shape=tuple((sizes or {}).get(d, n) for d, n in zip(self.grid.dims, self.grid.shape, strict=True)),
+                shape=tuple(
+                    (sizes or {}).get(d, n) for d, n in zip(self.grid.dims, self.grid.shape, strict=True)
+                ),
             )
             self._announce_sizes({**(sizes or {}), **{dim: grid.shards for dim in OF_SHARDS}})
             for dim in self._ragged:

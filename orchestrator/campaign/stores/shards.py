@@ -4,8 +4,8 @@ Runs are numbered from the slowest axis of a sweep to the fastest. A shard takes
 stretch of the next axis. So its runs follow one another, and its cells are one block. The arrays of a store have the
 dimensions and the order that `analysis.dataset.grid` gives them.
 
-The runs of other campaigns lie one after the other along the dimension `run`: those of rounds, whose number is known at
-the end only, and points that are no grid. Reading the store lays them on their grid.
+Rounds of points have no grid beforehand, and their number is known at the end only. Their runs lie one after the other
+along the dimension `run`, and so do points in no order. Reading the store lays them on their grid.
 """
 
 from __future__ import annotations
@@ -277,8 +277,8 @@ def cells_of(scene: Scene, shard_points: int = SHARD_POINTS) -> Cells:
 def grid_of(scene: Scene, shard_points: int = SHARD_POINTS) -> SweepGrid | None:
     """Return the grid of a scene's sweep with its shards; None where the points of the sweep are no grid.
 
-    Points are no grid if a value of an axis occurs twice, if no key is swept, or if rounds add points. A grid whose
-    unordered axis is longer than a shard is no grid of shards, either.
+    Points are no grid if a point occurs twice, if no key is swept, or if rounds add points. A grid whose unordered axis
+    is longer than a shard is no grid of shards, either.
     """
     if not scene.sweep or any(axis.adaptive is not None for axis in scene.sweep):
         return None
