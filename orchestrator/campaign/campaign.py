@@ -123,8 +123,8 @@ def run_campaign(
     ----------
     scene : Scene
     folder : path or address
-        Folder of this campaign alone; made when absent. A sweep that is a grid may go to an address of
-        fsspec, such as `s3://bucket/map`; its dataset is then a store.
+        Folder of this campaign alone; made when absent. It may be an address of fsspec, such as `s3://bucket/map`;
+        the dataset is then a store.
     workers : int, optional
         Worker processes on this machine. By default the campaign begins in this process. If more than 2 s of work are
         left, one worker for each processor goes on. Points in lanes stay here, in threads, on up to four processors.

@@ -5,6 +5,9 @@ Impacts, sticks, samples and events are the exception, since their number is not
 dimensions, such as `impact_shard` and `impact_row`: the rows of the runs of one shard, those of the first run first.
 `impact_rows` has the number of rows of each shard, and `shard_order` the shards in the order of their runs.
 
+Runs that have no grid beforehand lie along the dimension `run`, with their coordinates. Reading lays them on their
+grid.
+
 `create_store` makes the arrays. A `StoreWriter` in any process writes the runs of one shard at a time: a shard of a
 variable is one object, with one writer. `finish` writes the numbers of rows and, last, the consolidated
 metadata: a store without them is unfinished, and is not opened.

@@ -1,7 +1,7 @@
 """The Zarr store of a campaign: made before the first run, filled by shards in any order, finished after the last run.
 
-Each sealed shard is the truth about its runs, as a part is. Shards of rounds are appended: the last one has the runs that
-are left. It is sealed at the end, and grows if a later command finds more points.
+Each sealed shard is the truth about its runs, as a part is. Shards of rounds are appended: the last one has the runs
+that are left. It is sealed at the end, and grows if a later command finds more points.
 
 The metadata of the store are made again by each command, so that damaged or lost ones come back. A file of its own
 seals the finished store.
