@@ -44,6 +44,7 @@ from vibroimpact.analysis.dataset.stores import grid as store_grid
 from vibroimpact.analysis.dataset.stores.converting import convert, convert_dataset
 from vibroimpact.analysis.dataset.stores.grid import StoreGrid
 from vibroimpact.analysis.dataset.stores.store import LABELS, StoreWriter, create_store
+from vibroimpact.analysis.files import stores
 from vibroimpact.analysis.files.stores import system_of, zarr_package
 from vibroimpact.fmus.errors import DatasetError, UsageError
 

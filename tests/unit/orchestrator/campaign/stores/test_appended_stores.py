@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.campaign_scenes import assert_same_datasets, scene_of
+from support.campaign_scenes import assert_same_datasets, axis, scene_of, swept_text
 from support.serial_pool import Notes, campaign_here
-from support.store_scenes import BODY, axis
+from support.store_scenes import BODY
 
 import vibroimpact.orchestrator.campaign.formats as formats
 import vibroimpact.orchestrator.campaign.schedule as schedule
@@ -21,9 +21,7 @@ from vibroimpact.orchestrator.campaign.rounds import Rounds
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
 FREQUENCY, AMPLITUDE = "forcing.angular_frequency", "forcing.amplitude"
-IMPACTING = BODY.replace("mass = 0.001", "mass = 1.0\ndamping_ratio = 0.05").replace(
-    "transient_periods = 3", "transient_periods = 30"
-)
+IMPACTING = swept_text(transient_periods=30)
 
 
 def adaptive(path: str = "independent", at_most: int = 24) -> str:
