@@ -37,7 +37,7 @@ def campaign(
         A scene with a sweep, the file of a scene or of a system (SSP), or the tables of a scene.
     folder : path
         Folder of this campaign alone; it is made when absent. The dataset is its file `dataset.nc`, or its store
-        `dataset.zarr`. A sweep that is a grid may go to an address such as `s3://bucket/map`, as a store.
+        `dataset.zarr`. The folder may be an address such as `s3://bucket/map`; the dataset is then a store.
     workers : int, optional
         Number of worker processes on this machine. By default the campaign begins in this process. One worker for
         each processor takes over where more than 2 s of work are left.

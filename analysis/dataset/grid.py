@@ -97,9 +97,8 @@ def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
     coordinates |= {name: labelled.variables[name] for name in constants}
     if dims == ("run",):
         coordinates |= {name: labelled.variables[name] for name in swept}
-        coordinates["direction"] = new_variable(
-            "run", _direction_names(labelled), _plain(labelled.variables["direction"])
-        )
+        words = direction_words(labelled.variables["direction"].values)
+        coordinates["direction"] = new_variable("run", words, _plain(labelled.variables["direction"]))
         axes = {}
     return xr.Dataset(variables, coords=coordinates | axes | scalars, attrs=labelled.attrs)
 
@@ -107,7 +106,7 @@ def on_grid(flat: Flat, *, lazily: bool) -> xr.Dataset:
 def _with_labels(flat: Flat) -> Flat:
     """Return runs with names as dimensions, where there are some: a dataset in memory selects by them."""
     renamed = {"connection": "interface", "compared": "comparison"}
-    if not renamed.keys() & set(flat.variables):
+    if not set(renamed.values()) & set(flat.sizes):
         return flat
     if isinstance(flat, xr.Dataset):
         dataset = flat
@@ -300,11 +299,21 @@ def _run_grid(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int)
     return run_id.reshape(shape)
 
 
-def _direction_names(flat: Flat) -> NDArray[np.str_]:
-    """Return the direction of each run as a word."""
-    names = np.array([member.name for member in Direction])
-    words: NDArray[np.str_] = names[flat.variables["direction"].values]
+def direction_words(codes: NDArray[Any]) -> NDArray[np.str_]:
+    """Return the direction of each run as a word, from its code."""
+    words: NDArray[np.str_] = np.array([member.name for member in Direction])[codes]
     return words
+
+
+def direction_codes(words: NDArray[Any]) -> NDArray[Any]:
+    """Return the direction of each run as a code, from its word; -1 for another word."""
+    codes = {member.name: int(member) for member in Direction}
+    return np.array([codes.get(word, -1) for word in words.tolist()], dtype=RULES["direction"].dtype)
+
+
+def are_grid(flat: Flat) -> bool:
+    """Return whether runs form a grid, on which `on_grid` lays them."""
+    return _grid(_with_labels(flat))[0] != ("run",)
 
 
 def _plain(variable: xr.Variable) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import logging
 import math
 import os
 import re
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -25,6 +26,8 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 
 STORE_ENDING = ".zarr"
 LONGEST_REASON = 200
+_SETTING = threading.RLock()
+"""Held while the settings of zarr are those of this module."""
 _TASK_OF_ZARR = re.compile(r"never retrieved(?s:.)* defined at [^\n]*[/\\]zarr[/\\]")
 _NUMBERS = {
     FileNotFoundError: errno.ENOENT,
@@ -121,11 +124,16 @@ def is_written(place: Place, mode: str) -> bool:
     return mode == "w-" or (mode == "r+" and is_address(place))
 
 
-def _settings() -> Any:
-    """Return the context in which arrays are made and opened: it has the bounded codecs."""
+@contextmanager
+def _settings() -> Iterator[None]:
+    """Hold the settings with which arrays are made and opened, with the bounded codecs, for one thread at a time.
+
+    They are zarr's for the whole process: a thread that leaves would take them from another one.
+    """
     from vibroimpact.analysis.files.bounded_stores import SETTINGS
 
-    return zarr_package().config.set(SETTINGS)
+    with _SETTING, zarr_package().config.set(SETTINGS):
+        yield
 
 
 def arrays_of(group: Any) -> dict[str, Any]:

@@ -131,9 +131,15 @@ class Operation:
     door: ClassVar[Door | None]
     study: ClassVar[str] = ""
 
+    @classmethod
+    def function(cls) -> Callable[..., None]:
+        """Return the function that the operation names; the first call imports its module."""
+        found: Callable[..., None] = pkgutil.resolve_name(f"{ROOT}.{cls.runs}")
+        return found
+
     def carry_out(self, **how: Any) -> None:
         """Call the function that the operation names; pass keywords that are no arguments of the operation."""
-        pkgutil.resolve_name(f"{ROOT}.{self.runs}")(self, **how)
+        self.function()(self, **how)
 
     @classmethod
     def fields(cls) -> Iterator[Field]:

@@ -123,8 +123,8 @@ def run_campaign(
     ----------
     scene : Scene
     folder : path or address
-        Folder of this campaign alone; made when absent. A sweep that is a grid may go to an address of
-        fsspec, such as `s3://bucket/map`; its dataset is then a store.
+        Folder of this campaign alone; made when absent. It may be an address of fsspec, such as `s3://bucket/map`;
+        the dataset is then a store.
     workers : int, optional
         Worker processes on this machine. By default the campaign begins in this process. If more than 2 s of work are
         left, one worker for each processor goes on. Points in lanes stay here, in threads, on up to four processors.
@@ -300,8 +300,9 @@ class _Campaign:
         stages = stages_of(
             self._scene,
             self._rounds,
-            lambda: [*parts, *self._computed()],
+            lambda: self._stored(parts),
             outside.stretches if outside is not None else (),
+            self._destination,
         )
         # a sweep is complete by its number of runs; rounds are complete if no stage comes
         stage = next(stages, None) if self._rounds or self._report.resumed < self._report.runs else None
@@ -310,8 +311,16 @@ class _Campaign:
             self._compute_on(chain([stage], stages), there, workers)
         found = [path for path in stored if path.exists()] + [part.path for part in self._computed()]
         if self._rounds is not None:
-            self._report.runs = sum(part.rows for part in [*parts, *self._computed()] if part.path.exists())
+            self._report.runs = sum(part.rows for part in self._stored(parts))
         return found
+
+    def _stored(self, parts: Sequence[StoredPart]) -> list[StoredPart]:
+        """Return the sealed shards, and the parts of earlier commands and of this one that are in no shard."""
+        held = self._destination.held()
+        others = [
+            part for part in (*parts, *self._computed()) if part.path.suffix == ".nc" and part.path.exists()
+        ]
+        return sorted([*held, *others], key=lambda part: part.chunk.first)
 
     def _computed(self) -> list[StoredPart]:
         """Return the parts that this command has computed so far."""
@@ -386,12 +395,13 @@ class _Campaign:
                 threads = thread_count(identity.execution)
                 for stage in stages:
                     own, schedule = self._of_stage(work, stage), self._schedule(work, stage, 1)
-                    left = computed_here(own, stage, schedule, self._take, FEW_SECONDS if threads else None)
+                    take = partial(self._take_and_seal, own)
+                    left = computed_here(own, stage, schedule, take, FEW_SECONDS if threads else None)
                     if left is not None and not threads:
                         return chain([left], stages)
                     if left is not None:
                         schedule = self._schedule(work, left, threads, BYTES_OF_A_THREAD)
-                        compute_in_threads(own, schedule, threads, self._take)
+                        compute_in_threads(own, schedule, threads, take)
         return iter(())
 
     def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
@@ -463,6 +473,11 @@ class _Campaign:
         self._progress.advance(sum(result.outcomes.values()))
         return self._destination.taken(result)
 
+    def _take_and_seal(self, work: Work, result: ChunkResult) -> None:
+        """Take the result of a chunk of this process, and write the shards that are complete by it."""
+        for complete in self._take(result):
+            self._destination.seal(work, complete)
+
     def _compact(self, parts: Sequence[AnyPath]) -> list[tuple[AnyPath, str]]:
         """Write the dataset; return the unfit parts that prevent it, which are removed, each with the reason."""
         self._refuse_lost()
@@ -472,7 +487,9 @@ class _Campaign:
             work, attrs = self._with_manifest(self._work), self._attributes()
             has_messages = self._destination.complete(work, parts, form, attrs)
         except DatasetError as error:
-            files = [path for path in parts if path.suffix == ".nc"]
+            # parts of sealed shards are removed
+            is_file = self._destination.store is None
+            files = [path for path in parts if path.suffix == ".nc" and (is_file or path.exists())]
             unfit = (
                 error.found if isinstance(error, UnfitShardsError) else list(unfit_parts(files, self._scene))
             )

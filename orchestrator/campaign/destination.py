@@ -96,6 +96,10 @@ class Destination(ABC):
         """Yield the same rows in blocks that fit in memory."""
         yield self.rows(path)
 
+    def drop(self, part: StoredPart) -> None:
+        """Remove a part, or a shard from the dataset, whose points are computed again."""
+        part.path.unlink(missing_ok=True)
+
     def expect(self, parts: Sequence[StoredPart], kept: Kept | None) -> None:
         """Take note of the parts that are there before the first chunk."""
         return
@@ -106,6 +110,10 @@ class Destination(ABC):
 
     def sealed(self, seal: Seal) -> None:
         """Take note of a shard that is written."""
+        return
+
+    def seal(self, work: Work, complete: ShardParts) -> None:
+        """Write a complete shard; it stays in its parts where one of them is damaged, which is met again at the end."""
         return
 
 

@@ -69,7 +69,15 @@ def chosen_shard_points(
     if format is not None and format not in get_args(DatasetFormat):
         raise UsageError(f'format: expected "netcdf" or "zarr", got {format!r}.')
     if not isinstance(home, Path):
-        refuse_for_address(home, scene, format)
+        if format == "netcdf":
+            raise UsageError(
+                message(
+                    f"{home}: expected the format zarr for a campaign at an address, got netcdf. "
+                    "Leave the format out, or choose a folder of this machine",
+                    WITH_OUTPUT,
+                    ".",
+                )
+            )
         format = "zarr"
     if manifest is not None:
         began: DatasetFormat = "zarr" if manifest.shard_points else "netcdf"
@@ -89,34 +97,6 @@ def chosen_shard_points(
     if manifest is not None:
         return manifest.shard_points
     return shard_points_of(scene) if is_store else 0
-
-
-def refuse_for_address(home: AnyPath, scene: Scene, format: DatasetFormat | None) -> None:
-    """Raise UsageError unless the dataset of a scene is a store that grows: an object store holds no other.
-
-    Raises
-    ------
-    UsageError
-    """
-    # imported only for a store
-    from vibroimpact.orchestrator.campaign.stores.shards import grid_of
-
-    if format == "netcdf":
-        expected, got = "the format zarr", "netcdf"
-    elif grid_of(scene, shard_points_of(scene)) is None:
-        expected, got = (
-            "a sweep whose points are a grid",
-            "one without keys, adaptive, or with repeated values",
-        )
-    else:
-        return
-    raise UsageError(
-        message(
-            f"{home}: expected {expected} for a campaign at an address, got {got}. Choose a folder of this machine",
-            WITH_OUTPUT,
-            f"; `vibroimpact convert FOLDER {home}` copies its dataset to the address.",
-        )
-    )
 
 
 def shard_points_of(scene: Scene) -> int:
@@ -141,14 +121,8 @@ def destination_of(
     # imported only for a store
     from vibroimpact.orchestrator.campaign.stores.grown import GrownStore
     from vibroimpact.orchestrator.campaign.stores.sealing import GrowingStore
-    from vibroimpact.orchestrator.campaign.stores.whole import WholeStore
 
-    store = GrowingStore(str(home), shard_points)
-    grid = store.grid(scene)
-    if grid is None and isinstance(home, Path):
-        return WholeStore(home, scene, scene_hash)
-    assert grid is not None  # `refuse_for_address`
-    return GrownStore(store, scene, grid, scene_hash, note)
+    return GrownStore(GrowingStore(str(home), shard_points), scene, scene_hash, note)
 
 
 def earlier_store(

@@ -6,16 +6,19 @@ interruption and any number of workers. Runs are numbered round after round.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat, take_runs
+from vibroimpact.analysis.dataset import Direction, take_runs
+from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.jumps import RunClasses, classes_of
+from vibroimpact.orchestrator.campaign.destination import Destination
 from vibroimpact.orchestrator.campaign.extension import final_states
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.refinement import Known, Refined, cut_cells, halved_intervals
@@ -29,7 +32,7 @@ from vibroimpact.orchestrator.scene.sweep import Branch, Points, SweepAxis, Swee
 _WAYS: dict[int, SweepDirection] = {Direction.up: "up", Direction.down: "down"}
 
 Stored = Callable[[], Sequence[StoredPart]]
-"""Returns the present sound parts of a campaign, in run order."""
+"""Returns the present sound parts and sealed shards of a campaign, in run order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,41 @@ class Stage:
 def adaptive_axes(scene: Scene) -> tuple[SweepAxis, ...]:
     """Return the adaptive axes of a scene, with points where the motion jumps."""
     return tuple(axis for axis in scene.sweep if axis.adaptive is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """Rows of a round from one part or shard."""
+
+    part: StoredPart
+    rows: xr.Dataset
+
+
+class _DroppedShardError(Exception):
+    """A shard was dropped that has points of earlier rounds, too."""
+
+
+class _Files:
+    """The parts and shards of a campaign; the last shard that was read stays in memory, as rounds share it."""
+
+    def __init__(self, destination: Destination) -> None:
+        self._destination = destination
+        self._read: tuple[StoredPart | None, xr.Dataset] = (None, xr.Dataset())
+
+    def rows(self, part: StoredPart, first: int, stop: int) -> xr.Dataset:
+        """Return the rows of the runs `first` to `stop - 1`."""
+        if self._read[0] != part:
+            self._read = (part, self._destination.rows(part.path))
+        rows = self._read[1]
+        if (part.chunk.first, part.chunk.stop) == (first, stop):
+            return rows
+        return take_runs(rows, np.arange(first, stop) - part.chunk.first)
+
+    def drop(self, part: StoredPart, first: int) -> None:
+        """Remove a part or a shard; its runs before `first` are of earlier rounds."""
+        self._destination.drop(part)
+        if part.chunk.first < first:
+            raise _DroppedShardError
 
 
 class Rounds:
@@ -69,18 +107,35 @@ class Rounds:
         self._states: NDArray[np.float64] = np.empty((0, 0))
         self._usable: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
 
-    def stages(self, stored: Stored) -> Iterator[Stage]:
-        """Yield each round that is not complete; its parts must be stored before the next round is requested."""
+    def stages(self, stored: Stored, destination: Destination) -> Iterator[Stage]:
+        """Yield each round that is not complete; its parts must be stored before the next round is requested.
+
+        Parts and shards with other points than their round are dropped: rows before them were computed again, and came
+        out otherwise. A dropped shard may have points of earlier rounds; the rounds then begin anew.
+        """
+        files = _Files(destination)
+        while True:
+            try:
+                yield from self._stages(stored, files)
+                return
+            except _DroppedShardError:
+                self.left, self._known = 0, None
+
+    def _stages(self, stored: Stored, files: _Files) -> Iterator[Stage]:
         branches, first, number = expand(self._scene), 0, 0
         while branches:
             stop = first + sum(len(branch.points) for branch in branches)
-            parts = self._parts(stored(), branches, first, stop)
-            if sum(part.rows for part in parts) < stop - first:
+            pieces = self._pieces(stored(), branches, first, stop, files)
+            if sum(piece.part.rows for piece in pieces) < stop - first:
                 before = [StoredPart(Path(), Chunk(0, 0, first), None, first)] if first else []
-                yield Stage(branches, [*before, *parts], stop, f" of round {number + 1}")
-                parts = self._parts(stored(), branches, first, stop)
-            self._take(merge_datasets([part.path for part in parts]))
+                held = [*before, *(piece.part for piece in pieces)]
+                yield Stage(branches, held, stop, f" of round {number + 1}")
+                pieces = self._pieces(stored(), branches, first, stop, files)
+            self._take(joined([one.rows for one in pieces], [os.fspath(one.part.path) for one in pieces]))
             branches, first, number = self._next(stop), stop, number + 1
+        for part in stored():
+            if part.chunk.stop > first:
+                files.drop(part, first)
 
     def branch_of(self, rows: xr.Dataset, run: int) -> Branch | None:
         """Return the branch of a run; None where no round has the run, or a round before it is not complete.
@@ -106,18 +161,22 @@ class Rounds:
             branches, first = self._next(stop), stop
         return None
 
-    def _parts(
-        self, stored: Sequence[StoredPart], branches: Sequence[Branch], first: int, stop: int
-    ) -> list[StoredPart]:
-        """Return the parts of a round; parts with other points, from rows computed again since, are removed."""
+    def _pieces(
+        self, stored: Sequence[StoredPart], branches: Sequence[Branch], first: int, stop: int, files: _Files
+    ) -> list[_Piece]:
+        """Return the stored rows of a round, in run order; parts with other points are dropped."""
         found = []
         for part in stored:
-            if first <= part.chunk.first and part.chunk.stop <= stop and part.path.exists():
-                if self._is_of(read_flat(part.path), branches):
-                    found.append(part)
-                else:
-                    part.path.unlink()
-        return sorted(found, key=lambda part: part.chunk.first)
+            begin, end = max(part.chunk.first, first), min(part.chunk.stop, stop)
+            if begin >= end:
+                continue
+            rows = files.rows(part, begin, end)
+            if self._is_of(rows, branches):
+                chunk = replace(part.chunk, first=begin, stop=end)
+                found.append(_Piece(replace(part, chunk=chunk, rows=chunk.count), rows))
+            else:
+                files.drop(part, first)
+        return sorted(found, key=lambda piece: piece.part.chunk.first)
 
     def _is_of(self, rows: xr.Dataset, branches: Sequence[Branch]) -> bool:
         runs = rows.run_index.values
@@ -205,14 +264,18 @@ class Rounds:
 
 
 def stages_of(
-    scene: Scene, rounds: Rounds | None, stored: Stored, kept: Sequence[StoredPart]
+    scene: Scene,
+    rounds: Rounds | None,
+    stored: Stored,
+    kept: Sequence[StoredPart],
+    destination: Destination,
 ) -> Iterator[Stage]:
     """Yield the stages of a campaign, one after the other: its sweep, or each round of an adaptive sweep.
 
     `rounds` is None for a plain sweep; `kept` are stretches of runs from an earlier sweep.
     """
     if rounds is not None:
-        yield from rounds.stages(stored)
+        yield from rounds.stages(stored, destination)
         return
     held = sorted([*stored(), *kept], key=lambda part: part.chunk.first)
     yield Stage(expand(scene), held, run_count(scene.sweep))

@@ -125,23 +125,30 @@ def _with_called(words: Sequence[str]) -> typer.Typer:
             app.registered_groups[:],
         )
         _add_foreign(called)
+        gc.enable()  # commands of others may keep no modules out of a collection
     add_commands(called, named)
     return called
 
 
 @contextmanager
-def _no_vain_collections() -> Iterator[None]:
+def _no_vain_collections(*, is_own_process: bool) -> Iterator[None]:
     """Collect garbage less often, and not at the end of the process.
 
-    Imports make some 300,000 objects that stay. Repeated collections over them take a tenth of a short command.
+    Imports make some 300,000 objects that stay. Repeated collections over them take a tenth of a short command. A
+    process of its own begins to collect when the command's modules are in, and leaves their objects out.
     """
     atexit.register(gc.freeze)
     usual = gc.get_threshold()
     gc.set_threshold(_COLLECT_AFTER, *usual[1:])
+    if is_own_process:
+        gc.disable()
     try:
         yield
     finally:
         gc.set_threshold(*usual)
+        if is_own_process:
+            gc.freeze()
+            gc.enable()
 
 
 @contextmanager
@@ -213,7 +220,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         for word in given:
             refuse_no_text(word)
-        with _no_interrupt_is_lost(), _no_vain_collections(), _no_library_warns():
+        own = arguments is None
+        with _no_interrupt_is_lost(), _no_vain_collections(is_own_process=own), _no_library_warns():
             # typer reports misuse (2) and Ctrl-C (130) by itself; our own errors come out
             typer.main.get_command(_with_called(given)).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:

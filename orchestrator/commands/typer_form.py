@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import inspect
 import pkgutil
 from collections.abc import Callable, Sequence
@@ -63,7 +64,12 @@ def as_function(declared: type[Operation]) -> Callable[..., None]:
     """Return a function that carries out an operation, with a signature for typer."""
 
     def command(**given: Any) -> None:
-        declared(**given).carry_out()
+        operation = declared(**given)
+        operation.function()
+        if not gc.isenabled():  # in a process of its own, see `cli.main`
+            gc.freeze()
+            gc.enable()
+        operation.carry_out()
 
     annotated: Any = Annotated
     parameters, annotations = [], {}

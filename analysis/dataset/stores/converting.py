@@ -130,6 +130,7 @@ def _to_store(flat: FlatFile, output: Place, shown: Shown) -> int:
     run_id = opened.variables["run_id"]
     grid = StoreGrid.cut(tuple(map(str, run_id.dims)), run_id.shape)
     axes = {str(name): one.variable for name, one in opened.coords.items() if _is_axis(str(name), one, grid)}
+    axes = {} if grid.is_line else axes
     done, ids = 0, run_id.values
     with whole_store(output) as place:
         create_store(place, flat.dataset, grid, axes)

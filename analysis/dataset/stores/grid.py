@@ -16,6 +16,8 @@ CHUNK_VALUES = 1 << 19
 SHARD_VALUES = 1 << 23
 """Largest number of values of a shard of a variable with a further dimension: 64 MiB."""
 
+LINE = ("run",)
+"""Dimensions of runs one after the other."""
 Block = tuple[slice, ...]
 """The cells of a shard along each dimension."""
 
@@ -47,6 +49,11 @@ class StoreGrid:
             for size, wanted, part in zip(shape, _stretch(shape, SHARD_POINTS), chunk, strict=True)
         ]
         return cls(dims, shape, chunk, tuple(shard))
+
+    @property
+    def is_line(self) -> bool:
+        """Whether runs lie one after the other, each with its own coordinates."""
+        return self.dims == LINE
 
     @property
     def counts(self) -> tuple[int, ...]:

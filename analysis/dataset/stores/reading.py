@@ -17,9 +17,11 @@ from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import new_axis, new_variable
 from vibroimpact.analysis.dataset.checking import refuse_foreign, structure_problems
+from vibroimpact.analysis.dataset.grid import are_grid, direction_codes, on_grid
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.stores.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.stores.store import LABELS, SHARD_ORDER, grid_of
+from vibroimpact.analysis.dataset.stores.storing import Read
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
 from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_up_to
@@ -265,7 +267,34 @@ class StoreContents:
                 raise ValueError(f"values of {promised} bytes, at most {most} fit into its objects")
 
     def dataset(self) -> xr.Dataset:
-        """Return the dataset on the dimensions of its sweep; values are read when used, those of coordinates now."""
+        """Return the dataset on the dimensions of its sweep; values are read when used, those of coordinates now.
+
+        Runs one after the other are laid on their grid as those of a file are.
+        """
+        stored = self.stored()
+        if not self.grid.is_line:
+            return stored
+        flat = self._as_file(stored)
+        if not are_grid(flat):
+            return stored
+        opened = on_grid(flat, lazily=True)
+        opened.encoding["source"] = os.fspath(self._place)
+        return opened
+
+    def _as_file(self, stored: xr.Dataset) -> Read:
+        """Return runs one after the other as a file has them: directions are codes."""
+        variables = {
+            str(name): variable.copy(deep=False)
+            for name, variable in stored.variables.items()
+            if name not in _DERIVED
+        }
+        codes = direction_codes(variables["direction"].values)
+        variables["direction"] = new_variable("run", codes, variables["direction"].attrs)
+        variables["outcome"].encoding["coordinates"] = " ".join(self.linked)
+        return Read(variables, tuple(map(str, stored.coords)), self.attrs)
+
+    def stored(self) -> xr.Dataset:
+        """Return the dataset on the dimensions of the arrays of the store."""
         variables = {name: self._variable(name) for name in self.names}
         linked = sorted((name for name in self.linked if name in variables), key=self._rank)
         coords = {name: variables.pop(name) for name in linked}

@@ -13,23 +13,17 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import Described, assembled
 from vibroimpact.analysis.dataset.checking import count_problems
+from vibroimpact.analysis.dataset.grid import direction_codes
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.places import dataset_place
 from vibroimpact.analysis.dataset.reading import read_flat
-from vibroimpact.analysis.dataset.schema import (
-    RAGGED,
-    RULES,
-    Direction,
-    UnitSystem,
-    attributes_of,
-)
+from vibroimpact.analysis.dataset.schema import RAGGED, UnitSystem, attributes_of
 from vibroimpact.analysis.dataset.stores.grid import Block
 from vibroimpact.analysis.dataset.stores.reading import StoreContents
 from vibroimpact.analysis.dataset.stores.store import LABELS
 from vibroimpact.analysis.files.stores import Place, is_store, one_store_error
 from vibroimpact.fmus.errors import DatasetError
 
-_CODES = {member.name: int(member) for member in Direction}
 _DIMS = {label: dim for dim, label in LABELS.items()}
 
 
@@ -78,7 +72,7 @@ class StoreRuns:
 
     def __post_init__(self) -> None:
         self._contents = StoreContents(self.place)
-        self._opened = self._contents.dataset()
+        self._opened = self._contents.stored()
         self.shards = list(self._found_shards())
         rows = {dim: int(count.sum()) for dim, count in self._contents.rows.items()}
         self.sizes = {"run": sum(shard.count for shard in self.shards), **rows}
@@ -175,9 +169,8 @@ class StoreRuns:
     def _of_runs(self, name: str, block: Block, places: NDArray[Any], attrs: dict[str, Any]) -> Described:
         variable, values = self._opened.variables[name], self._values(name, block)[places]
         if name == "direction":
-            codes = [_CODES.get(word, -1) for word in values.tolist()]
             units: UnitSystem = self._contents.attrs["units_system"]
-            return ("run",), np.array(codes, dtype=RULES[name].dtype), attributes_of(name, units)
+            return ("run",), direction_codes(values), attributes_of(name, units)
         further = [d for d in variable.dims if d not in self._contents.grid.dims]
         return ("run", *(_DIMS.get(str(d), d) for d in further)), values, attrs
 

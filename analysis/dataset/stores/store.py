@@ -5,6 +5,9 @@ Impacts, sticks, samples and events are the exception, since their number is not
 dimensions, such as `impact_shard` and `impact_row`: the rows of the runs of one shard, those of the first run first.
 `impact_rows` has the number of rows of each shard, and `shard_order` the shards in the order of their runs.
 
+Runs that have no grid beforehand lie along the dimension `run`, with their coordinates. Reading lays them on their
+grid.
+
 `create_store` makes the arrays. A `StoreWriter` in any process writes the runs of one shard at a time: a shard of a
 variable is one object, with one writer. `finish` writes the numbers of rows and, last, the consolidated
 metadata: a store without them is unfinished, and is not opened.
@@ -14,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 from uuid import uuid4
@@ -25,7 +28,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import Named, new_variable
 from vibroimpact.analysis.dataset.derived import RANGE, RANGE_ENDS, range_over_periods
-from vibroimpact.analysis.dataset.grid import range_attributes
+from vibroimpact.analysis.dataset.grid import direction_codes, direction_words, range_attributes
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, constant_names, swept_names
 from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
 from vibroimpact.analysis.dataset.stores.overview import CLASSES, OVERVIEW, BlockGrid, names_of, quantities_of
@@ -46,6 +49,8 @@ from vibroimpact.analysis.files.stores import (
 from vibroimpact.fmus.errors import DatasetError
 
 SHARD_ORDER = "shard_order"
+OF_SHARDS = ("shard", *(f"{dim}_shard" for dim in RAGGED))
+"""Dimensions with an element for each shard."""
 LABELS = {"interface": "connection", "comparison": "compared"}
 """Dimensions of a file that are named by a variable in an opened dataset."""
 MOST_ROWS = 1 << 40
@@ -88,7 +93,8 @@ def create_store(
     grid : StoreGrid
         Dimensions of the runs, and their shards.
     axes : mapping of str to xarray.Variable
-        All coordinates along these dimensions, and the scalar `direction` of independent runs.
+        All coordinates along these dimensions, and the scalar `direction` of independent runs. Coordinates along `run`
+        are written with the shards.
     sizes : mapping of str to int, optional
         Sizes of further dimensions (`period`, `state`) where they are not those of `like`.
 
@@ -139,7 +145,7 @@ class StoreWriter:
             self._of_cells = {
                 name: array
                 for name, array in self._arrays.items()
-                if name not in kept
+                if (self.grid.is_line or name not in kept)
                 and not _is_of_rows(_dims(array))
                 and _dims(array)[: len(self.grid.dims)] == self.grid.dims
             }
@@ -219,6 +225,8 @@ class StoreWriter:
                 array = self._of_cells[name]
                 values = np.asarray(array[block], dtype=_kind(array))
                 found[name] = values.reshape(-1, *values.shape[len(block) :])[cells]
+            if "direction" in found:
+                found["direction"] = direction_codes(found["direction"])
             for dim in self._ragged:
                 count = int(self._arrays[RAGGED[dim]][block].sum())
                 for name, array in self._arrays.items():
@@ -311,7 +319,7 @@ class StoreWriter:
         attrs : mapping, optional
             Further global attributes.
         sizes : mapping of str to int, optional
-            Smaller sizes of further dimensions than those announced.
+            Smaller sizes of dimensions than those announced.
         absent : collection of str
             Variables that no run has, which are removed.
         """
@@ -321,30 +329,39 @@ class StoreWriter:
                 if self._arrays.pop(name, None) is not None:
                     self._of_cells.pop(name, None)
                     del self._group[name]
-            for array in self._arrays.values():
-                shape = tuple(
-                    (sizes or {}).get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True)
-                )
-                if shape != array.shape:
-                    announce(self._place, array.path, shape)
+            grid = replace(
+                self.grid,
+                shape=tuple(
+                    (sizes or {}).get(d, n) for d, n in zip(self.grid.dims, self.grid.shape, strict=True)
+                ),
+            )
+            self._announce_sizes({**(sizes or {}), **{dim: grid.shards for dim in OF_SHARDS}})
             for dim in self._ragged:
                 counts = self._arrays[RAGGED[dim]]
-                rows = [int(np.maximum(counts[block], 0).sum()) for block in self.grid.blocks()]
-                self._arrays[f"{dim}_rows"][...] = np.array(rows, dtype=np.int64)
+                rows = [int(np.maximum(counts[block], 0).sum()) for block in grid.blocks()]
+                self._arrays[f"{dim}_rows"][: grid.shards] = np.array(rows, dtype=np.int64)
                 most = max([1, *rows])
                 for name, array in self._arrays.items():
                     if _dims(array) == (f"{dim}_shard", f"{dim}_row"):
-                        announce(self._place, name, (self.grid.shards, most))
+                        announce(self._place, name, (grid.shards, most))
             if self._ragged:
-                index = (self._arrays["run_index"][block] for block in self.grid.blocks())
+                index = (self._arrays["run_index"][block] for block in grid.blocks())
                 first = [int(each[each >= 0].min(initial=_LAST)) for each in index]
-                self._arrays[SHARD_ORDER][...] = np.argsort(first, kind="stable")
+                self._arrays[SHARD_ORDER][: grid.shards] = np.argsort(first, kind="stable")
         consolidate(self._place)
+
+    def _announce_sizes(self, sizes: Mapping[str, int]) -> None:
+        """Write the final sizes of dimensions into the metadata of each array."""
+        for array in self._arrays.values():
+            shape = tuple(sizes.get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True))
+            if shape != array.shape:
+                announce(self._place, array.path, shape)
 
 
 def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict[str, _Array]:
     """Return the arrays of runs and rows, by name."""
-    kept = {"direction", *swept_names(like), *_fixed(like)}
+    kept = {*_fixed(like)}
+    kept |= set() if grid.is_line else {"direction", *swept_names(like)}
     found: dict[str, _Array] = {}
     for name, variable in like.variables.items():
         if name in kept:
@@ -355,6 +372,8 @@ def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict
             further = {LABELS.get(str(d), str(d)): sizes.get(str(d), n) for d, n in variable.sizes.items()}
             further.pop("run")
             found[str(name)] = _cells(grid, further, variable.dtype, variable.attrs)
+    if grid.is_line:
+        found["direction"] = _cells(grid, {}, object, {"long_name": RULES["direction"].long_name})
     found["run_id"] = _cells(grid, {}, np.int32, RUN_ID)
     if all(name in found for name in RANGE_ENDS):
         attributes = range_attributes(like.variables[RANGE_ENDS[0]])
@@ -415,7 +434,9 @@ def _whole(variable: xr.Variable) -> _Array:
 def _linked(like: xr.Dataset, grid: StoreGrid, fixed: Mapping[str, xr.Variable]) -> str:
     """Return the names of the coordinates of runs, in the order of the scene, for the attribute of each variable."""
     names = ["run_index", "direction", *swept_names(like), *fixed]
-    return " ".join(dict.fromkeys(name for name in names if name in fixed or name == "run_index"))
+    return " ".join(
+        dict.fromkeys(name for name in names if grid.is_line or name in fixed or name == "run_index")
+    )
 
 
 def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
@@ -451,6 +472,8 @@ def _column(columns: Mapping[Any, xr.Variable], name: str) -> NDArray[Any] | Non
     """Return the values of runs, those of derived variables too; None for a variable that the runs lack."""
     if name == RANGE:
         return range_over_periods(*(columns[end].values for end in RANGE_ENDS))
+    if name == "direction":
+        return direction_words(columns[name].values).astype(object)
     return None if name not in columns else np.asarray(columns[name].values)
 
 

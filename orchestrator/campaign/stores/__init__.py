@@ -1,1 +1,1 @@
-"""The Zarr store of a campaign: filled by shards, each with its seal, or written from all parts."""
+"""The Zarr store of a campaign: filled by shards, each with its seal."""

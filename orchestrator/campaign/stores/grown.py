@@ -1,13 +1,17 @@
 """The Zarr store of a campaign: made before the first run, filled by shards in any order, finished after the last run.
 
-Each sealed shard is the truth about its runs, as a part is. The metadata of the store are made again by each command,
-so that damaged or lost ones come back. A file of its own seals the finished store.
+Each sealed shard is the truth about its runs, as a part is. Shards of rounds are appended: the last one has the runs
+that are left. It is sealed at the end, and grows if a later command finds more points.
+
+The metadata of the store are made again by each command, so that damaged or lost ones come back. A file of its own
+seals the finished store.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +50,7 @@ from vibroimpact.orchestrator.campaign.stores.seals import (
     seal_store,
     seals_in,
 )
-from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid
+from vibroimpact.orchestrator.campaign.stores.shards import Shard
 from vibroimpact.orchestrator.campaign.workers.chunks import (
     Chunk,
     ChunkResult,
@@ -69,7 +73,7 @@ def seal_parts(work: Work, complete: ShardParts) -> Seal:
         The shard cannot be written.
     """
     assert work.store is not None
-    shard, pieces = complete.shard, [read_flat(path) for path in complete.paths]
+    shard, pieces = complete.shard, [_rows(work.store, work.scene, path) for path in complete.paths]
     if complete.kept is not None:
         with FlatFile(complete.kept) as kept:
             index = kept.dataset.variables["run_index"].values
@@ -82,15 +86,19 @@ def seal_parts(work: Work, complete: ShardParts) -> Seal:
     return write_shard(work.store, work.scene, shard, rows, complete.branch, attrs)
 
 
+def _rows(store: GrowingStore, scene: Scene, path: AnyPath) -> xr.Dataset:
+    """Return the rows of a part, or of the shard of a seal."""
+    return read_shard(store, scene, read_seal(path)) if path.parent == store.seals else read_flat(path)
+
+
 class GrownStore(Destination):
     """The store `dataset.zarr` of a campaign, with a seal for each of its shards."""
 
-    def __init__(
-        self, store: GrowingStore, scene: Scene, grid: SweepGrid, scene_hash: str, note: Note
-    ) -> None:
-        self.path, self.store, self.shards = store.path, store, grid.shards
+    def __init__(self, store: GrowingStore, scene: Scene, scene_hash: str, note: Note) -> None:
+        self._cells = store.cells(scene)
+        self.path, self.store, self.shards = store.path, store, self._cells.shards
         self._growing, self._seals = store, store.seals
-        self._scene, self._grid, self._hash, self._note = scene, grid, scene_hash, note
+        self._scene, self._hash, self._note = scene, scene_hash, note
         self._sealed: dict[int, Seal] = {}
         self._files: dict[int, list[StoredPart]] = defaultdict(list)
         self._missing: dict[int, int] = {}
@@ -128,16 +136,16 @@ class GrownStore(Destination):
     def _create(self, place: Path) -> None:
         """Make the arrays of the store, without runs, at another place."""
         scene = self._scene
-        axes = dict(self._grid.axes)
+        axes, cells = dict(self._cells.axes), self._cells.cells
         like = with_constants_of(empty_dataset(scene), scene).assign_attrs(scene_hash=self._hash)
         if not scene.is_one_body:
             empty = new_variable("run", np.empty(1), attributes_of("loop_residual", scene.units))
             like = like.assign(loop_residual=empty)
-        if "direction" not in axes:
+        if "direction" not in axes and not cells.is_line:
             axes["direction"] = new_variable(
                 (), np.asarray("independent"), {"long_name": RULES["direction"].long_name}
             )
-        create_store(place, like, self._grid.cells, axes, sizes={"period": self._periods()})
+        create_store(place, like, cells, axes, sizes={"period": self._periods()})
 
     def _is_extended(self) -> bool:
         return kept_path(self.path.with_name("parts"), self._hash).exists()
@@ -148,29 +156,29 @@ class GrownStore(Destination):
 
     def held(self) -> list[StoredPart]:
         """Return the runs in sealed shards; a damaged shard is named and loses its seal."""
-        numbers = {shard.number: shard for shard in self.shards}
         found = []
         for path in seals_in(self._seals):
             try:
-                seal = self._sealed.get(_number(path)) or self._checked(path, numbers)
+                seal = self._sealed.get(_number(path)) or self._checked(path)
             except DatasetError as error:
                 path.unlink()
                 self._note(f"{path.stem} of the store was damaged; its points come again: {error}")
                 continue
             self._sealed[seal.shard] = seal
-            chunk = Chunk(seal.branch, seal.first, seal.stop)
-            found.append(StoredPart(path, chunk, carried_state(seal.attrs), chunk.count))
+            found.append(self._part_of(seal))
         return sorted(found, key=lambda part: part.chunk.first)
 
-    def _checked(self, path: AnyPath, shards: Mapping[int, Shard]) -> Seal:
+    def _part_of(self, seal: Seal) -> StoredPart:
+        """Return the runs of a sealed shard as a part."""
+        chunk = Chunk(seal.branch, seal.first, seal.stop)
+        path = seal_path(self._seals, seal.shard)
+        return StoredPart(path, chunk, carried_state(seal.attrs), chunk.count)
+
+    def _checked(self, path: AnyPath) -> Seal:
         """Return a seal whose shard is whole and belongs to this campaign."""
         seal = read_seal(path)
-        shard = shards.get(seal.shard)
-        if (
-            shard is None
-            or (shard.first, shard.stop) != (seal.first, seal.stop)
-            or _number(path) != seal.shard
-        ):
+        shard = self._cells.sealed_shard(seal.first, seal.stop)
+        if shard is None or not shard.number == seal.shard == _number(path):
             raise DatasetError(f"{path}: expected a shard of this sweep, got another.")
         if seal.attrs.get("scene_hash") != self._hash:
             raise DatasetError(f"{path}: expected a shard of this scene, got one of another.")
@@ -179,9 +187,18 @@ class GrownStore(Destination):
 
     def rows(self, path: AnyPath) -> xr.Dataset:
         """Return the rows of a part, or of the shard of a seal."""
-        if path.parent != self._seals:
-            return super().rows(path)
-        return read_shard(self._growing, self._scene, read_seal(path))
+        return _rows(self._growing, self._scene, path)
+
+    def drop(self, part: StoredPart) -> None:
+        """Remove a part, or the seal of a shard."""
+        super().drop(part)
+        shard = self._cells.shard_around(part.chunk.first)
+        if part.path.parent == self._seals:
+            self._sealed.pop(shard.number, None)
+            self._missing.setdefault(shard.number, shard.count)
+        else:
+            self._missing[shard.number] += part.rows
+        self._files[shard.number] = [one for one in self._files[shard.number] if one.path != part.path]
 
     def expect(self, parts: Sequence[StoredPart], kept: Kept | None) -> None:
         """Take note of the parts that are there before the first chunk."""
@@ -194,12 +211,17 @@ class GrownStore(Destination):
             if shard.number in self._missing and kept is not None:
                 first, stop = np.searchsorted(kept.runs, (shard.first, shard.stop))
                 self._missing[shard.number] -= int(stop - first)
+        for shard in self.shards:
+            seal = self._sealed.get(shard.number)
+            if seal is not None and seal.stop < shard.stop:
+                self._missing[shard.number] = shard.count
+                self._add(self._part_of(seal))
         for part in parts:
             self._add(part)
 
     def _add(self, part: StoredPart) -> Shard:
         """Take note of a part, which lies in one shard; return the shard."""
-        shard = self._grid.shard_around(part.chunk.first)
+        shard = self._cells.shard_around(part.chunk.first)
         self._files[shard.number].append(part)
         self._missing[shard.number] -= part.rows
         return shard
@@ -225,23 +247,40 @@ class GrownStore(Destination):
 
     def _branch_of(self, run: int) -> int:
         carried = next((axis for axis in self._scene.sweep if axis.continuation), None)
-        return 0 if carried is None else run // len(carried.values)
+        return 0 if carried is None or self._cells.is_open else run // len(carried.values)
 
     def sealed(self, seal: Seal) -> None:
         """Take note of a shard that is written, and remove its parts."""
         self._sealed[seal.shard] = seal
         self._missing.pop(seal.shard, None)
         for part in self._files.pop(seal.shard, []):
-            part.path.unlink(missing_ok=True)
+            if part.path.parent != self._seals:
+                part.path.unlink(missing_ok=True)
+
+    def seal(self, work: Work, complete: ShardParts) -> None:
+        """Write a complete shard; it stays in its parts where one of them is damaged, which is met again at the end."""
+        with suppress(DatasetError):
+            self.sealed(seal_parts(work, complete))
 
     def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the shards whose runs are all in parts, then finish the store; return whether a run has a message."""
-        for shard in self.shards:
-            if shard.number in self._missing:
-                self.sealed(seal_parts(work, self._of_shard(shard)))
+        for shard in self._unsealed():
+            self.sealed(seal_parts(work, self._of_shard(shard)))
         self._refuse_changed_shards()
         self._finish(attrs, attributes_of_part(work, None))
         return any(seal.has_messages for seal in self._sealed.values())
+
+    def _unsealed(self) -> Iterator[Shard]:
+        """Yield the shards that are not in the store as they are at the end."""
+        end = self.shards[-1].stop
+        if self._cells.is_open:
+            end = max(part.chunk.stop for parts in [self.held(), *self._files.values()] for part in parts)
+        for shard in self.shards:
+            seal = self._sealed.get(shard.number)
+            stop = min(shard.stop, end)
+            whole = self._cells.sealed_shard(shard.first, stop) if shard.first < stop else None
+            if whole is not None and (seal is None or seal.stop < stop):
+                yield whole
 
     def _refuse_changed_shards(self) -> None:
         """Raise UnfitShardsError unless all shards are as they were sealed: a worker that was lost may still write."""
@@ -261,8 +300,9 @@ class GrownStore(Destination):
         seals = list(self._sealed.values())
         absent = [name for name in OPTIONAL if all(name in seal.absent for seal in seals)]
         writer = StoreWriter(self.path)
-        writer.finish(attrs, sizes={"period": max(seal.periods for seal in seals)}, absent=absent)
         runs = sum(seal.stop - seal.first for seal in seals)
+        sizes = {"period": max(seal.periods for seal in seals), "run": runs}
+        writer.finish(attrs, sizes=sizes, absent=absent)
         seal_store(self.path, self._seals, runs, of_seal, {key for seal in seals for key in seal.objects})
 
 

@@ -22,7 +22,7 @@ from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.dataset.stores.store import StoreWriter
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, Seal, object_hash, write_seal
-from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.campaign.stores.shards import Cells, Shard, cells_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import Scene
@@ -49,14 +49,13 @@ class GrowingStore:
         """Folder of the seals."""
         return located(self.home) / SEALS
 
-    def grid(self, scene: Scene) -> SweepGrid | None:
-        """Return the grid of a scene in shards of this store; None where its dataset is written as a whole."""
-        return grid_of(scene, self.shard_points)
+    def cells(self, scene: Scene) -> Cells:
+        """Return the cells of a scene's runs in shards of this store."""
+        return cells_of(scene, self.shard_points)
 
     def shard_of(self, scene: Scene, first: int, stop: int) -> Shard | None:
         """Return the shard with exactly these runs."""
-        grid = self.grid(scene)
-        return None if grid is None else grid.shard_with(first, stop)
+        return self.cells(scene).shard_with(first, stop)
 
 
 def write_shard(
@@ -80,10 +79,8 @@ def write_shard(
     OSError
         The shard cannot be written.
     """
-    grid = store.grid(scene)
-    assert grid is not None
     writer = _writer(str(store.path), str(attrs["scene_hash"]))
-    writer.write_shard(shard.block, rows, grid.places(shard))
+    writer.write_shard(shard.block, rows, store.cells(scene).places(shard))
     objects = {
         key: object_hash(store.path / key) for key in _flushed(store.path, writer.objects(shard.block))
     }
@@ -112,15 +109,17 @@ def read_shard(store: GrowingStore, scene: Scene, seal: Seal) -> xr.Dataset:
     DatasetError
         An object of the shard is damaged.
     """
-    grid = store.grid(scene)
-    assert grid is not None
-    shard, like = grid.shard_around(seal.first), empty_dataset(scene)
-    points = columns_of_points(expand(scene), shard.first, shard.stop)
-    values: dict[str, Any] = {name: points.values[key] for key, name in coordinate_names(scene).items()}
-    values |= {"direction": points.direction, "run_index": points.index.astype(np.int32)}
+    cells = store.cells(scene)
+    shard, like = cells.sealed_shard(seal.first, seal.stop), empty_dataset(scene)
+    assert shard is not None, "a seal is checked before its shard is read"
+    values: dict[str, Any] = {"run_index": np.arange(shard.first, shard.stop, dtype=np.int32)}
+    if not cells.cells.is_line:
+        points = columns_of_points(expand(scene), shard.first, shard.stop)
+        values |= {name: points.values[key] for key, name in coordinate_names(scene).items()}
+        values |= {"direction": points.direction}
     names = {str(name) for name in (*like.variables, *OPTIONAL)} - values.keys() - set(seal.absent)
     writer = _writer(str(store.path), str(seal.attrs["scene_hash"]))
-    values |= writer.read_shard(shard.block, names, grid.places(shard))
+    values |= writer.read_shard(shard.block, names, cells.places(shard))
     variables: dict[str, Any] = {
         str(name): variable if str(name) not in values else (variable.dims, values[str(name)], variable.attrs)
         for name, variable in like.variables.items()

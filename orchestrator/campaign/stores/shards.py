@@ -1,16 +1,20 @@
-"""The grid of a sweep, cut into shards: stretches of runs that are blocks of the arrays of a store.
+"""The cells of a campaign's store, cut into shards: stretches of runs that are blocks of its arrays.
 
 Runs are numbered from the slowest axis of a sweep to the fastest. A shard takes the fastest axes as a whole and a
 stretch of the next axis. So its runs follow one another, and its cells are one block. The arrays of a store have the
 dimensions and the order that `analysis.dataset.grid` gives them.
+
+Rounds of points have no grid beforehand, and their number is known at the end only. Their runs lie one after the other
+along the dimension `run`, and so do points in no order. Reading the store lays them on their grid.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -21,8 +25,10 @@ from vibroimpact.analysis.dataset.grid import axis_of, direction_axis, shared_ax
 from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, dimensions
+from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, dimensions, most_points, run_count
 
+ROUND_POINTS = CHUNK_POINTS
+"""Largest number of points of a shard of an adaptive sweep, which has at most 10^6 points in all."""
 Ranks = NDArray[np.intp]
 
 
@@ -58,16 +64,90 @@ class _RunAxis:
         return self.size < 2 or bool(np.all(np.diff(self.ranks) == self.ranks[1] - self.ranks[0]))
 
 
-class SweepGrid:
-    """The grid of the runs of a sweep, and its shards.
+class Cells(ABC):
+    """The cells of a store, one for each run, and its shards.
 
     Attributes
     ----------
     cells : StoreGrid
-        The cells of the dataset, in chunks and shards.
+        The cells in chunks and shards.
     axes : dict
-        Coordinates along its dimensions, by name.
+        Coordinates along their dimensions that are known before the first run, by name.
+    is_open : bool
+        Whether the number of runs is known at the end only.
     """
+
+    cells: StoreGrid
+    axes: dict[str, xr.Variable]
+    is_open = False
+
+    @abstractmethod
+    def _shards(self) -> Iterator[Shard]:
+        """Yield the shards in run order; without a known end, those of the largest number of runs."""
+
+    @abstractmethod
+    def places(self, shard: Shard) -> NDArray[np.int64]:
+        """Return the place of each run of a shard among the cells of its block, the last dimension fastest."""
+
+    @cached_property
+    def shards(self) -> tuple[Shard, ...]:
+        """The shards, in run order."""
+        return tuple(self._shards())
+
+    def shard_with(self, first: int, stop: int) -> Shard | None:
+        """Return the shard with exactly these runs; None if they are none."""
+        shard = self.shard_around(first)
+        return shard if (shard.first, shard.stop) == (first, stop) else None
+
+    def sealed_shard(self, first: int, stop: int) -> Shard | None:
+        """Return the shard with exactly these runs, which may be the first runs of a shard if the end is open."""
+        shard = self.shard_around(first)
+        if self.is_open and shard.first == first < stop < shard.stop:
+            return replace(shard, stop=stop, block=(slice(first, stop),))
+        return self.shard_with(first, stop)
+
+    def shard_around(self, run: int) -> Shard:
+        """Return the shard of a run."""
+        return self.shards[bisect_right(self._firsts, run) - 1]
+
+    @cached_property
+    def _firsts(self) -> list[int]:
+        return [shard.first for shard in self.shards]
+
+
+class RunLine(Cells):
+    """Runs one after the other along the dimension `run`, in shards of equal length.
+
+    Parameters
+    ----------
+    runs : int
+        Number of runs; the largest one if the end is open.
+    branch : int
+        Number of runs of a branch; a shard has whole branches where they fit.
+    shard_points : int
+    is_open : bool
+    """
+
+    def __init__(self, runs: int, branch: int, shard_points: int, *, is_open: bool) -> None:
+        self.axes, self.is_open = {}, is_open
+        chunk = max(shard_points * CHUNK_POINTS // SHARD_POINTS, 1)
+        if branch <= shard_points:
+            chunk = max(chunk // branch, 1) * branch
+        chunk = min(chunk, runs)
+        length = min(max(shard_points // chunk, 1), -(-runs // chunk)) * chunk
+        self.cells = StoreGrid(("run",), (runs,), (chunk,), (length,))
+
+    def _shards(self) -> Iterator[Shard]:
+        for number, block in enumerate(self.cells.blocks()):
+            yield Shard(number, block[0].start, block[0].stop, block)
+
+    def places(self, shard: Shard) -> NDArray[np.int64]:
+        """Return the numbers of the runs from 0."""
+        return np.arange(shard.count)
+
+
+class SweepGrid(Cells):
+    """The grid of the runs of a sweep."""
 
     def __init__(
         self, dims: tuple[str, ...], axes: dict[str, xr.Variable], runs: list[_RunAxis], shard_points: int
@@ -101,25 +181,8 @@ class SweepGrid:
         cut = self._runs[self._cut]
         return cut.is_monotone or self._length == 1 or self._length >= cut.size
 
-    @cached_property
-    def shards(self) -> tuple[Shard, ...]:
-        """The shards, in run order."""
-        return tuple(self._shards())
-
-    def shard_with(self, first: int, stop: int) -> Shard | None:
-        """Return the shard with exactly these runs; None if they are none."""
-        shard = self.shard_around(first)
-        return shard if (shard.first, shard.stop) == (first, stop) else None
-
-    def shard_around(self, run: int) -> Shard:
-        """Return the shard of a run."""
-        return self.shards[bisect_right(self._firsts, run) - 1]
-
-    @cached_property
-    def _firsts(self) -> list[int]:
-        return [shard.first for shard in self.shards]
-
     def _shards(self) -> Iterator[Shard]:
+        """Yield the blocks of the grid."""
         before, at = self._runs[: self._cut], self._runs[self._cut]
         beside = math.prod(axis.size for axis in self._runs[self._cut + 1 :])
         for outer, places in enumerate(np.ndindex(*(axis.size for axis in before))):
@@ -197,11 +260,25 @@ class SweepGrid:
 
 
 @lru_cache(maxsize=2)
+def cells_of(scene: Scene, shard_points: int = SHARD_POINTS) -> Cells:
+    """Return the cells of the store of a scene's runs, with their shards: the grid of its sweep, or a line of runs."""
+    grid = grid_of(scene, shard_points)
+    if grid is not None:
+        return grid
+    carried = next((axis for axis in scene.sweep if axis.continuation), None)
+    branch = 1 if carried is None else len(carried.values)
+    most = most_points(scene.sweep)
+    if most is None:
+        return RunLine(run_count(scene.sweep), branch, shard_points, is_open=False)
+    most = max(most, run_count(scene.sweep))
+    return RunLine(most, branch, min(shard_points, ROUND_POINTS), is_open=True)
+
+
 def grid_of(scene: Scene, shard_points: int = SHARD_POINTS) -> SweepGrid | None:
     """Return the grid of a scene's sweep with its shards; None where the points of the sweep are no grid.
 
-    Points are no grid if a value of an axis occurs twice, if no key is swept, or if rounds add points. A grid whose
-    unordered axis is longer than a shard is no grid of shards, either.
+    Points are no grid if a point occurs twice, if no key is swept, or if rounds add points. A grid whose unordered axis
+    is longer than a shard is no grid of shards, either.
     """
     if not scene.sweep or any(axis.adaptive is not None for axis in scene.sweep):
         return None

@@ -62,7 +62,7 @@ def objects(below: str = "") -> list[str]:
     return [key for key in fsspec.filesystem("memory").store if key.startswith(f"/map/{below}")]
 
 
-@pytest.mark.parametrize("text", [MAP, BRANCHES])
+@pytest.mark.parametrize("text", [MAP, BRANCHES, ADAPTIVE, BODY.replace("[sweep]\n", "")])
 def test_a_campaign_at_an_address_has_the_dataset_of_a_folder(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,8 +126,6 @@ REFUSED: dict[str, tuple[str, formats.DatasetFormat | None, str]] = {
         "expected the scene that this campaign was started with",
     ),
     "a file": (MAP, "netcdf", "expected the format zarr for a campaign at an address, got netcdf"),
-    "rounds": (ADAPTIVE, None, "expected a sweep whose points are a grid"),
-    "one point": (BODY.replace("[sweep]\n", ""), None, "expected a sweep whose points are a grid"),
 }
 
 

@@ -6,7 +6,9 @@ import itertools
 import re
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +44,7 @@ from vibroimpact.analysis.dataset.stores import grid as store_grid
 from vibroimpact.analysis.dataset.stores.converting import convert, convert_dataset
 from vibroimpact.analysis.dataset.stores.grid import StoreGrid
 from vibroimpact.analysis.dataset.stores.store import LABELS, StoreWriter, create_store
+from vibroimpact.analysis.files import stores
 from vibroimpact.analysis.files.stores import system_of, zarr_package
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
@@ -297,6 +300,23 @@ def test_a_damaged_shard_is_one_error_and_is_written_again(made: Path) -> None:
     writer.finish()
     with open_dataset(made) as opened:
         np.testing.assert_array_equal(opened["displacement_max"], expected["displacement_max"])
+
+
+def test_a_thread_that_leaves_the_settings_of_zarr_takes_them_from_no_other() -> None:
+    entered, left = threading.Event(), threading.Event()
+
+    def other() -> bool:
+        with stores._settings():
+            entered.set()
+            left.wait(60)
+            return bool(zarr_package().config.get("array.write_empty_chunks"))
+
+    with ThreadPoolExecutor(1) as threads:
+        with stores._settings():
+            found = threads.submit(other)
+            entered.wait(0.2)
+        left.set()
+        assert found.result()
 
 
 @pytest.mark.parametrize("left", [0, 7, 40])

@@ -15,7 +15,7 @@ from support.campaign_scenes import axis, scene_of
 from support.store_scenes import BODY
 
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
-from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid, grid_of
+from vibroimpact.orchestrator.campaign.stores.shards import RunLine, Shard, SweepGrid, cells_of, grid_of
 from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, points_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names
 from vibroimpact.orchestrator.scene import Scene
@@ -37,6 +37,27 @@ def sweeps(draw: st.DrawFn) -> Scene:
         else:
             lines.append(axis(key, draw(st.one_of(st.just(values[::-1]), st.permutations(values)))))
     return scene_of(BODY + "\n".join(lines))
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 400), st.integers(1, 40), st.sampled_from([1, 2, 3, 8, 20, 64, 500]), st.booleans())
+def test_runs_in_a_line_are_cut_into_whole_chunks_and_branches(
+    runs: int, branch: int, size: int, is_open: bool
+) -> None:
+    line = RunLine(runs, branch, size, is_open=is_open)
+    (chunk,), (length,) = line.cells.chunk, line.cells.shard
+    assert length % chunk == 0
+    assert length <= max(size, chunk)
+    assert [shard.first for shard in line.shards] == list(range(0, runs, length))
+    assert line.shards[-1].stop == runs
+    assert branch > size or length % branch == 0 or length >= runs
+    for shard in line.shards:
+        assert line.sealed_shard(shard.first, shard.stop) == shard == line.shard_around(shard.stop - 1)
+        begun = line.sealed_shard(shard.first, shard.stop - 1)
+        assert (begun is None) == (not is_open or shard.count == 1)
+        assert begun is None or begun.block == (slice(shard.first, shard.stop - 1),)
+        assert line.sealed_shard(shard.first + 1, shard.stop) is None
+        assert line.sealed_shard(shard.first, shard.stop + 1) is None
 
 
 def on_block(grid: SweepGrid, shard: Shard, values: NDArray[Any]) -> NDArray[Any]:
@@ -73,10 +94,10 @@ def test_each_run_lies_in_one_cell_with_its_values(scene: Scene, size: int) -> N
 @settings(max_examples=40)
 @given(sweeps(), st.sampled_from([1, 2, 3, 5, 8, 20, 100]))
 def test_a_shard_is_made_of_whole_chunks_and_has_its_objects_alone(scene: Scene, size: int) -> None:
-    grid = grid_of(scene, size)
-    if grid is None:
-        return
+    grid = cells_of(scene, size)
     cells = grid.cells
+    assert [shard.first for shard in grid.shards] == [0, *(shard.stop for shard in grid.shards[:-1])]
+    assert grid.shards[-1].stop == run_count(scene.sweep)
     assert all(shard % chunk == 0 for shard, chunk in zip(cells.shard, cells.chunk, strict=True))
     for shard, (place, part) in itertools.product(grid.shards, enumerate(cells.shard)):
         along = shard.block[place]

@@ -269,6 +269,10 @@ GROWN = {
         BODY + axis(FREQUENCY, UP, "up-down"),
         BODY + axis(FREQUENCY, [*UP, 0.6, 0.7], "up-down"),
     ),
+    "no order": (
+        BODY + axis("forcing.amplitude", [*UP[::-1], 0.9, 0.7, 0.8, 0.6, 1.0]),
+        BODY + axis("forcing.amplitude", [0.95, *UP[::-1], 0.9, 0.7, 0.8, 0.6, 1.0, 0.65]),
+    ),
     "a sweep of a run": (KINDS["one point"], BODY + axis("forcing.amplitude", [0.4, 0.5])),
 }
 
