@@ -92,7 +92,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
 
 _NAMES = {
     "analysis.dataset": ("open_dataset",),
-    "analysis.dataset.converting": ("convert",),
+    "analysis.dataset.stores.converting": ("convert",),
     "analysis.dataset.reading": ("open_measured",),
     "analysis.dataset.results": ("write_results",),
     "analysis.decay": ("curve_of", "decay_samples", "estimate_decay", "fit_resonance", "frequency_response"),

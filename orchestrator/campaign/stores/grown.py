@@ -19,6 +19,7 @@ from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.schema import RULES, attributes_of
 from vibroimpact.analysis.dataset.stores.store import StoreWriter, create_store
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.files.stores import objects_below
@@ -69,7 +70,7 @@ def seal_parts(work: Work, complete: ShardParts) -> Seal:
         The shard cannot be written.
     """
     assert work.store is not None
-    shard, pieces = complete.shard, [read_flat(path) for path in complete.paths]
+    shard, pieces = complete.shard, done_at_once(read_flat, complete.paths, work.store.path)
     if complete.kept is not None:
         with FlatFile(complete.kept) as kept:
             index = kept.dataset.variables["run_index"].values
@@ -116,14 +117,18 @@ class GrownStore(Destination):
             made_again = Path(folder.name, STORE)
             self._create(made_again)
             there = set(objects_below(self.path))
-            # the root names the scene: a store that is cut off without it would be taken for one of another program
-            for key in sorted(objects_below(made_again), key=lambda key: (key != "zarr.json", key)):
+
+            def put(key: str) -> None:
                 place, content = self.path / key, (made_again / key).read_bytes()
                 if key in there and place.read_bytes() == content:
-                    continue
+                    return
                 if isinstance(place, Path):
                     place.parent.mkdir(parents=True, exist_ok=True)
                 place.write_bytes(content)
+
+            # the root names the scene: a store that is cut off without it would be taken for one of another program
+            put("zarr.json")
+            done_at_once(put, sorted(set(objects_below(made_again)) - {"zarr.json"}), self.path)
 
     def _create(self, place: Path) -> None:
         """Make the arrays of the store, without runs, at another place."""
@@ -231,8 +236,7 @@ class GrownStore(Destination):
         """Take note of a shard that is written, and remove its parts."""
         self._sealed[seal.shard] = seal
         self._missing.pop(seal.shard, None)
-        for part in self._files.pop(seal.shard, []):
-            part.path.unlink(missing_ok=True)
+        done_at_once(_remove, self._files.pop(seal.shard, []), self.path)
 
     def complete(self, work: Work, paths: Sequence[AnyPath], form: DatasetForm, attrs: Attributes) -> bool:
         """Write the shards whose runs are all in parts, then finish the store; return whether a run has a message."""
@@ -264,6 +268,10 @@ class GrownStore(Destination):
         writer.finish(attrs, sizes={"period": max(seal.periods for seal in seals)}, absent=absent)
         runs = sum(seal.stop - seal.first for seal in seals)
         seal_store(self.path, self._seals, runs, of_seal, {key for seal in seals for key in seal.objects})
+
+
+def _remove(part: StoredPart) -> None:
+    part.path.unlink(missing_ok=True)
 
 
 def _number(seal: AnyPath) -> int:
