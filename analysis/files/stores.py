@@ -185,11 +185,36 @@ def first_bytes(system: Any, path: str, most: int | None = None) -> bytes:
 
 def size_of(place: Place) -> tuple[int, int]:
     """Return the size of a store or a file, bytes, and the number of its objects."""
+    sizes = list(_sizes(place))
+    return sum(sizes), len(sizes)
+
+
+def size_up_to(place: Place, enough: int) -> int:
+    """Return the size of a store or a file, bytes; in a folder the listing ends when it reaches `enough`."""
+    found = 0
+    for size in _sizes(place):
+        found += size
+        if found >= enough:
+            break
+    return found
+
+
+def _sizes(place: Place) -> Iterator[int]:
+    """Yield the size of each object of a store or a file, bytes."""
     zarr_package()
     with one_store_error(place):
-        system, root = system_of(place)
-        sizes = system.du(root, total=False)
-        return sum(sizes.values()), len(sizes)
+        if is_address(place):
+            system, root = system_of(place)
+            yield from system.du(root, total=False).values()
+        elif os.path.isdir(place):
+            for folder, _, names in os.walk(place, onerror=_raised):
+                yield from (os.stat(os.path.join(folder, name)).st_size for name in names)
+        else:
+            yield os.stat(place).st_size
+
+
+def _raised(error: OSError) -> None:
+    raise error
 
 
 def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:

@@ -43,12 +43,12 @@ MANY_WORKERS = 1000
 MANY_PROCESSES = 4
 """Number of processes of many workers, each a thread there; this process has client and scheduler alone."""
 POINT_MILLISECONDS = (0.005, 1.0, 10.0, 100.0)
-SECONDS, MANY_SECONDS = 10.0, 60.0
+SECONDS, MANY_SECONDS = 10.0, 180.0
 """Duration of a measurement with ideal workers, and with many ideal workers, s."""
 POINT_BYTES = 78
 """Size of the results of a point, bytes, which bounds the points of a chunk."""
-AXIS_POINTS = 10_000
-"""Number of points along one of two axes."""
+MOST_ALONG_AN_AXIS = 10_000
+"""Largest number of points along one of two axes."""
 SATURATED = 0.8
 """Share of the ideal rate below which a campaign counts as saturated."""
 SCENE = """
@@ -111,8 +111,9 @@ def sleeping_workers(number: int) -> Iterator[Cluster]:
 
 def sweep_of(points: int) -> Sequence[Branch]:
     """Return at least this many independent points; a scene would have 10^9 at most."""
-    others = SweepAxis("forcing.amplitude", tuple(map(float, range(-(-points // AXIS_POINTS)))))
-    axis = axis_of_range("forcing.angular_frequency", 0.6, 1.6, AXIS_POINTS, "independent")
+    others = SweepAxis("forcing.amplitude", tuple(map(float, range(-(-points // MOST_ALONG_AN_AXIS)))))
+    along = min(points, MOST_ALONG_AN_AXIS)
+    axis = axis_of_range("forcing.angular_frequency", 0.6, 1.6, along, "independent")
     return expand(SimpleNamespace(sweep=(others, axis)))
 
 
@@ -163,7 +164,7 @@ def draw(rates: Sequence[Rate], path: Path) -> None:
         ideal = [1e3 / milliseconds * number for number, _ in of]
         axes.loglog([number for number, _ in of], ideal, ":", color=line.get_color())
     axes.set(xlabel="workers", ylabel="points per second", title="dotted: ideal")
-    axes.legend()
+    axes.legend(loc="lower right", fontsize="small")
     axes.grid(alpha=0.3)
     figure.tight_layout()
     figure.savefig(path, dpi=120)

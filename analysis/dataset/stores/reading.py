@@ -23,7 +23,7 @@ from vibroimpact.analysis.dataset.stores.store import LABELS, SHARD_ORDER, grid_
 from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
-from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_of
+from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_up_to
 from vibroimpact.fmus.errors import DatasetError
 
 _DERIVED = ("run_id", *(f"{dim}_run" for dim in RAGGED), "displacement_range")
@@ -259,7 +259,9 @@ class StoreContents:
             size = math.prod(self._arrays[name].shape) if ragged is None else int(self.rows[ragged].sum())
             promised += size * _kind(self._arrays[name]).itemsize
         if promised > SPARSE_BYTES:
-            most = max(SPARSE_BYTES, MOST_EXPANSION * size_of(self._place)[0])
+            # the folders of a large store would be listed for a second
+            size = size_up_to(self._place, -(-promised // MOST_EXPANSION))
+            most = max(SPARSE_BYTES, MOST_EXPANSION * size)
             if promised > most:
                 raise ValueError(f"values of {promised} bytes, at most {most} fit into its objects")
 
