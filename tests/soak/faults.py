@@ -263,7 +263,7 @@ def _damaged_shards(chance: random.Random, home: Home) -> Iterator[str]:
         place = home.path / "dataset.zarr" / chance.choice(sorted(objects))
         content = bytearray(place.read_bytes())
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
-        place.write_bytes(content)
+        place.write_bytes(bytes(content))
         yield seal.stem
 
 
