@@ -32,6 +32,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import (
     Direction,
     RunRecord,
+    accessor,
     dataset_place,
     open_dataset,
     read_flat,
@@ -330,6 +331,23 @@ def test_a_damaged_shard_is_one_error_and_is_written_again(made: Path) -> None:
     writer.finish()
     with open_dataset(made) as opened:
         np.testing.assert_array_equal(opened["displacement_max"], expected["displacement_max"])
+
+
+@pytest.mark.parametrize("name", DATASETS)
+@pytest.mark.usefixtures("small_shards")
+def test_columns_in_blocks_are_those_of_all_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_dataset(DATASETS[name](), tmp_path / "a.nc")
+    convert_dataset(tmp_path / "a.nc", tmp_path / "a.zarr")
+    with open_dataset(tmp_path / "a.zarr") as opened, open_dataset(tmp_path / "a.nc") as file:
+        names = [each for each in ("displacement_max", "outcome", "message") if each in opened]
+        for one, most in itertools.product((opened, file), (40, 1 << 22)):
+            monkeypatch.setattr(accessor, "BLOCK_VALUES", most)
+            blocks, runs = list(accessor.columns_of_runs(one, names)), one.vibroimpact.runs
+            for each in names:
+                expected = runs[each].values
+                np.testing.assert_array_equal(np.concatenate([block[each] for block in blocks]), expected)
 
 
 @pytest.mark.parametrize("left", [0, 7, 40])
