@@ -14,8 +14,8 @@ endif
 BIN := $(VENV)/bin
 NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' -o -name '*.md') \
 	$(wildcard fmus/packaging/description/*.py) fmus/packaging/build.py fmus/packaging/compiler.py
-# tests side by side: one more than there are cores, as many wait for processes of their own, and four at most for they
-# use cores as well; `make test PARALLEL=` runs them one by one
+# Tests side by side: one more than there are cores, as many tests wait for processes of their own. At most four,
+# since these processes use cores as well. `make test PARALLEL=` runs the tests one by one.
 WORKERS = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
 PARALLEL ?= --side-by-side $(WORKERS)
 SETUP := pyproject.toml hatch_build.py

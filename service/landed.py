@@ -16,6 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import RULES, dataset_place, read_runs
+from vibroimpact.analysis.dataset.derived import (
+    LARGEST_IMPACT,
+    MEAN_IMPACTS,
+    RANGE,
+    RANGE_ENDS,
+    largest_of_runs,
+    mean_of_periods,
+    range_over_periods,
+)
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import image_of
 from vibroimpact.analysis.files.open_files import netcdf_lock
@@ -26,13 +35,6 @@ from vibroimpact.service.run_classes import ClassColumns, can_be_classified
 
 READING = threading.Lock()
 """Lock for reading or drawing a file: neither the NetCDF library nor the page's style is safe for threads."""
-RANGE = "displacement_range"
-"""Derived variable: the largest displacement of a run minus the smallest."""
-RANGE_ENDS = ("displacement_max", "displacement_min")
-LARGEST_IMPACT = "largest_impact_velocity"
-"""Derived variable: the largest impact velocity of a run, NaN without an impact."""
-MEAN_IMPACTS = "mean_impacts_per_period"
-"""Derived variable: the mean number of impacts in a forcing period of a run, NaN without an impact."""
 CLASS = "class"
 """Derived variable: the class of a run, as `vibroimpact classify` names it."""
 ALONG = ("period", "impact", "stick", "comparison", "interface")
@@ -293,21 +295,12 @@ def _rows(
     """Return the run of each value of a variable, and the values."""
     places = np.arange(count, dtype=np.int64)
     if quantity.name == RANGE:
-        high, low = (file[name][:] for name in RANGE_ENDS)
-        empty = np.isnan(high).all(axis=1)
-        largest = np.where(empty, np.nan, np.max(high, axis=1, initial=-np.inf, where=~np.isnan(high)))
-        smallest = np.where(empty, np.nan, np.min(low, axis=1, initial=np.inf, where=~np.isnan(low)))
-        return places, largest - smallest
+        return places, range_over_periods(*(np.asarray(file[name][:]) for name in RANGE_ENDS))
     if quantity.name == LARGEST_IMPACT:
-        largest = np.full(count, -np.inf)
-        hit = np.repeat(places, file["impact_count"][:])
-        np.fmax.at(largest, hit, np.asarray(file["impact_velocity"][:], dtype=np.float64))
-        return places, np.where(np.isfinite(largest), largest, np.nan)
+        owner = np.repeat(places, file["impact_count"][:])
+        return places, largest_of_runs(owner, np.asarray(file["impact_velocity"][:]), count)
     if quantity.name == MEAN_IMPACTS:
-        each = np.asarray(file["impacts_per_period"][:], dtype=np.float64)
-        there = ~np.isnan(each)
-        mean = np.sum(each, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
-        return places, np.where(mean > 0.0, mean, np.nan)
+        return places, mean_of_periods(np.asarray(file["impacts_per_period"][:]))
     variable = file[quantity.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":

@@ -18,7 +18,8 @@ from vibroimpact.analysis.dataset import (
     read_flat,
     read_runs,
 )
-from vibroimpact.analysis.dataset.schema import attributes_of, known_unit, unit_in
+from vibroimpact.analysis.dataset.naming import known_unit
+from vibroimpact.analysis.dataset.schema import attributes_of, unit_in
 from vibroimpact.analysis.files.stores import is_store
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.manifest import read_manifest

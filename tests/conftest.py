@@ -24,7 +24,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # before a test imports numpy and pyarrow: this process is forked
 os.environ |= WITHOUT_THREADS
 
-pytest_plugins = ["harness.costs", "harness.side_by_side", "support.cluster"]
+pytest_plugins = ["harness.costs", "harness.side_by_side", "support.cluster", "support.object_store"]
 
 SEED = 4
 """Seed of every property test: a run can be repeated anywhere; `--hypothesis-seed=N` sets another."""

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.schema import file_name_of, scene_of, swept_names
+from vibroimpact.analysis.dataset.naming import file_name_of
+from vibroimpact.analysis.dataset.schema import scene_of, swept_names
 from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.operations.estimate_impacts import EstimateImpacts

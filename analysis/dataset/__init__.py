@@ -1,6 +1,7 @@
 """The door to the dataset: its schema, its writers and its readers.
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
+`naming` has the sampled variables and the names of quantities in files, `derived` the quantities of maps.
 `writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
 `stores` holds the same for Zarr stores, and the conversion of either form into the other.
 `accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from vibroimpact.analysis.dataset.checking import check, marked
     from vibroimpact.analysis.dataset.joining import join_files
     from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
+    from vibroimpact.analysis.dataset.naming import file_name_of, file_names
     from vibroimpact.analysis.dataset.places import dataset_place
     from vibroimpact.analysis.dataset.reading import (
         Part,
@@ -36,8 +38,6 @@ if TYPE_CHECKING:
         Outcome,
         RunRecord,
         constant_names,
-        file_name_of,
-        file_names,
     )
     from vibroimpact.analysis.dataset.stores.runs import read_runs
     from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
@@ -79,6 +79,7 @@ _HOMES = {
     "join_files": "joining",
     **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
     "dataset_place": "places",
+    **dict.fromkeys(("file_name_of", "file_names"), "naming"),
     "read_runs": "stores.runs",
     **dict.fromkeys(("Part", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"),
     **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),

@@ -15,6 +15,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.assembling import Named, new_axis, new_variable
+from vibroimpact.analysis.dataset.derived import RANGE, RANGE_ENDS, range_over_periods
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
     RULES,
@@ -25,8 +26,6 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 
-RANGE, RANGE_ENDS = "displacement_range", ("displacement_max", "displacement_min")
-"""Derived variable: the displacement range of a run, and the variables that it comes from."""
 BLOCK_RUNS = 1 << 20
 """Number of runs whose values are in memory together while their grid is found."""
 _Placed = Callable[[slice], NDArray[np.intp]]
@@ -155,13 +154,6 @@ def _displacement_range(flat: Flat, place: _Placing) -> xr.Variable:
     attributes = range_attributes(flat.variables[RANGE_ENDS[0]])
     array = _RunArray(read, place.run_id, flat.variables["final_displacement"])
     return place.laid_out(place.dims, array, attributes)
-
-
-def range_over_periods(largest: NDArray[np.float64], smallest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the range of each run, shape (run,), from the extremes of its periods, shape (run, period)."""
-    top = np.fmax.reduce(largest, axis=1, initial=-np.inf)
-    bottom = np.fmin.reduce(smallest, axis=1, initial=np.inf)
-    return np.where(top >= bottom, top - bottom, np.nan)
 
 
 def range_attributes(largest: xr.Variable) -> dict[str, str]:

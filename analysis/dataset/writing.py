@@ -22,6 +22,7 @@ from vibroimpact.analysis.dataset.columns import (
     columns_of,
     ragged,
 )
+from vibroimpact.analysis.dataset.naming import file_names, known_unit, quantity_unit, sample_rule
 from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
@@ -36,11 +37,7 @@ from vibroimpact.analysis.dataset.schema import (
     RunRecord,
     UnitSystem,
     attributes_of,
-    file_names,
-    known_unit,
     names_list,
-    quantity_unit,
-    sample_rule,
     unit_in,
 )
 from vibroimpact.analysis.dataset.stores.storing import Stored, stored_variables

@@ -21,7 +21,6 @@ from vibroimpact.analysis.figures.kinds import KINDS, Result, draw_view
 from vibroimpact.analysis.figures.measured.planned_drive import draw_planned_drive
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
 from vibroimpact.analysis.figures.study.ladder import convergence, work_precision
-from vibroimpact.analysis.figures.sweep.diagrams import largest_impact_velocity
 from vibroimpact.analysis.figures.window import View, Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
@@ -35,7 +34,6 @@ __all__ = [
     "draw_into",
     "draw_planned_drive",
     "label",
-    "largest_impact_velocity",
     "save",
     "work_precision",
 ]

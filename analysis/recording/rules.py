@@ -7,7 +7,7 @@ from math import isfinite
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.schema import file_name_of
+from vibroimpact.analysis.dataset.naming import file_name_of
 from vibroimpact.analysis.recording.channels import Channel, EventTrain, Recording, TimeAxis
 
 QUALITY_ENDING, EVENT_ENDING = "_quality", "_event"

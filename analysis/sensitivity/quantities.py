@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.derived import largest_impact_velocity
 from vibroimpact.analysis.dataset.schema import RULES, Outcome, swept_names
 
 Floats = NDArray[np.float64]
@@ -38,12 +39,12 @@ def _recorded(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
     elif "impact_count" in there:
         yield "impact_count", dataset["impact_count"]
     if "impact_velocity" in there:
-        largest = _by_run(dataset, "impact", dataset["impact_velocity"].values, np.maximum)
+        largest = largest_impact_velocity(dataset).fillna(0.0)
         yield "impact_velocity", _named(largest, _unit(dataset, "impact_velocity"), "largest impact velocity")
     if "event_count" in there:
         yield "event_count", dataset["event_count"]
     for name in _sampled(dataset):
-        squares = _by_run(dataset, "sample", dataset[name].values ** 2, np.add)
+        squares = _sums(dataset, dataset[name].values ** 2)
         root = (squares / dataset["sample_count"].where(dataset["sample_count"] > 0)) ** 0.5
         yield f"{name}_rms", _named(root, _unit(dataset, name), f"root mean square of {name}")
     if "variance_accounted_for" in there:
@@ -58,12 +59,11 @@ def _sampled(dataset: xr.Dataset) -> list[str]:
     return [str(n) for n, v in dataset.variables.items() if v.dims == ("sample",) and n not in coordinates]
 
 
-def _by_run(dataset: xr.Dataset, dimension: str, values: Floats, function: np.ufunc) -> xr.DataArray:
-    """Return the values of the rows of each run combined by a function; 0 for a run without rows."""
-    owner, run_id = dataset[f"{dimension}_run"].values, dataset["run_id"]
-    result = np.zeros(max([int(run_id.max()), *owner[-1:].tolist()], default=0) + 1)
-    function.at(result, owner, values)
-    return run_id.copy(data=result[run_id.values])
+def _sums(dataset: xr.Dataset, values: Floats) -> xr.DataArray:
+    """Return the sum of the samples of each run; 0 for a run without samples."""
+    owner, run_id = dataset["sample_run"].values, dataset["run_id"]
+    sums = np.bincount(owner, values, minlength=int(run_id.max()) + 1)
+    return run_id.copy(data=sums[run_id.values])
 
 
 def _unit(dataset: xr.Dataset, name: str) -> str:

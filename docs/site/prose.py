@@ -29,7 +29,7 @@ ABBREVIATIONS = re.compile(
 PYTHON = re.compile(
     r"""(\"{3}|'{3})(?:\\.|(?!\1).)*\1|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|#[^\n]*""", re.DOTALL
 )
-"""Strings and comments of Python, so that a mark within a string begins no comment."""
+"""Strings and comments of Python and TOML, so that a mark within a string begins no comment."""
 C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 #: A pragma is no prose.
 PRAGMA = re.compile(r"(noqa|type:|ruff:|mypy:|pragma:|fmt:|clang-format|!)")
@@ -169,6 +169,11 @@ def paragraphs_of_python(path: Path, text: str) -> Iterator[Paragraph]:
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield from paragraphs_of_comment(path, value.lineno, value.value)
+    yield from paragraphs_of_toml(path, text)
+
+
+def paragraphs_of_toml(path: Path, text: str) -> Iterator[Paragraph]:
+    """Yield the paragraphs of comments that begin with `#`."""
     found = ((each.start(), each.group()) for each in PYTHON.finditer(text))
     yield from _joined(path, _alone(text, ((at, said, "#:") for at, said in found if said[0] == "#")))
 
@@ -214,13 +219,14 @@ def paragraphs_of_c(path: Path, text: str) -> Iterator[Paragraph]:
 
 
 def paragraphs_of(path: Path) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a page, a Python file or a C file."""
+    """Yield the paragraphs of a page, or of the comments of a file in Python, C or TOML."""
     text = path.read_text(encoding="utf-8")
     kinds = {
         ".md": paragraphs_of_page,
         ".py": paragraphs_of_python,
         ".c": paragraphs_of_c,
         ".h": paragraphs_of_c,
+        ".toml": paragraphs_of_toml,
     }
     yield from kinds[path.suffix](path, text)
 
@@ -234,9 +240,8 @@ def files(paths: Iterable[Path] = ()) -> list[Path]:
         text=True,
         check=True,
     ).stdout.splitlines()
-    return [
-        ROOT / name for name in named if name.endswith((".md", ".py", ".c", ".h")) and (ROOT / name).exists()
-    ]
+    read = (".md", ".py", ".c", ".h", ".toml")
+    return [ROOT / name for name in named if name.endswith(read) and (ROOT / name).exists()]
 
 
 def mean_words(paths: Iterable[Path]) -> float:

@@ -18,7 +18,6 @@ from vibroimpact.fmus.errors import UsageError
 
 MOST_MODES = 8
 MOST_CONTACTS = 4
-MOST_CONTACTS_OF_ONE_MODE = 2
 IMPACT_WIDTH = 8
 PERIOD_WIDTH = 5
 """Numbers of columns of an impact and of a period, see `lanes/lane_points.h`."""
@@ -64,6 +63,7 @@ class LanesPlan(Structure):
         ),
         ("impact_limit", c_int64),
         ("yielding", c_int64),
+        ("sampled", c_int64),
         ("rate", c_double),
     ]
 
@@ -124,11 +124,6 @@ def instructions() -> Instructions:
     return Instructions(found)
 
 
-def most_contacts(modes: int) -> int:
-    """Return the largest number of contacts of a body with this number of modes."""
-    return MOST_CONTACTS_OF_ONE_MODE if modes == 1 else MOST_CONTACTS
-
-
 def lanes_memory(plan: LanesPlan) -> NDArray[np.uint8]:
     """Return memory for runs in progress between two calls, for points that have not begun.
 
@@ -140,7 +135,7 @@ def lanes_memory(plan: LanesPlan) -> NDArray[np.uint8]:
     size = _functions()[1](plan)
     if size == 0:
         raise UsageError(
-            f"lanes: expected 1 to {MOST_MODES} modes, 0 to {most_contacts(plan.modes)} contacts and instructions "
+            f"lanes: expected 1 to {MOST_MODES} modes, 0 to {MOST_CONTACTS} contacts and instructions "
             f"that this machine has, got {plan.modes}, {plan.contacts} and {plan.instructions}."
         )
     return np.zeros(size, dtype=np.uint8)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from vibroimpact.analysis.dataset.schema import file_name_of
+from vibroimpact.analysis.dataset.naming import file_name_of
 
 _RESERVED_ENDS = ("_quality", "_event")
 _LONGEST = 80

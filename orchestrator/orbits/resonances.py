@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.derived import largest_impact_velocity
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.orbits.energies import OrbitEnergies
 from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
@@ -189,11 +190,7 @@ def _curves(
     count = frequency.size
     if "displacement_range" in dataset:
         yield "displacement_range", dataset["displacement_range"].transpose(*order).values.reshape(-1, count)
-    run_id = dataset["run_id"].transpose(*order).values
-    largest = np.full(int(run_id.max()) + 1, np.nan)
-    np.fmax.at(largest, dataset["impact_run"].values, dataset["impact_velocity"].values)
-    # a point of the grid that no run covers has no run_id
-    yield "impact_velocity", np.where(run_id < 0, np.nan, largest[run_id]).reshape(-1, count)
+    yield "impact_velocity", largest_impact_velocity(dataset).transpose(*order).values.reshape(-1, count)
     kinetic = exchanged["mean_kinetic_energy"].transpose("mode", *order).values
     is_free = (exchanged["reason"].transpose(*order).values == NO_IMPACTS).reshape(-1, count)
     for mode, values in enumerate(kinetic):

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.schema import file_name_of, known_unit, sample_rule
+from vibroimpact.analysis.dataset.naming import file_name_of, known_unit, sample_rule
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.recording import Channel, Recording, open_signals
 from vibroimpact.analysis.recording.units import measured_unit

@@ -106,7 +106,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
         "measuring chain": scene.is_measured or scene.exciter is not None,
         "laws": any(stop.law != "restitution" for stop in scene.stops) and not _yields_in_lanes(scene),
         "time series": scene.record.time_series is not None and not _samples_in_lanes(scene),
-        "many contacts": len(scene.stops) > core.most_contacts(body.kept_modes),
+        "many contacts": len(scene.stops) > core.MOST_CONTACTS,
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),
         "residual vectors": body.has_residual_vectors,
@@ -115,9 +115,9 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
 
 
 def _samples_in_lanes(scene: Scene) -> bool:
-    """Return whether lanes can sample the time series: the motion of one mode, at the observed point and the stops."""
+    """Return whether lanes can sample the time series: the motion of the observed point and at the stops."""
     rigid = all(stop.law == "restitution" for stop in scene.stops)
-    return scene.body.kept_modes == 1 and all(
+    return all(
         name in OBSERVED
         or name.startswith(("contact_displacement[", "contact_velocity["))
         or (rigid and name.startswith("contact_force"))

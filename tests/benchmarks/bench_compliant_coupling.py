@@ -10,7 +10,6 @@ Run with `python tests/benchmarks/bench_compliant_coupling.py [FOLDER]`.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -21,9 +20,7 @@ import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.compliant_parts import coupled, plain_contact
-
-from vibroimpact.analysis.dataset.provenance import git_commit, versions
-from vibroimpact.analysis.landmarks import observed_order
+from support.energy_ladders import energy_ladder
 
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
@@ -66,7 +63,6 @@ def ladder(law: str) -> xr.Dataset:
     found = np.array([[measured(law, method, int(n)) for n in STEPS] for method in METHODS])
     energies = np.where(np.abs(found[:, :, 0]) > ROUNDING, found[:, :, 0], 0.0)
     speeds = np.where(np.abs(found[:, :, 0]) > ROUNDING, np.sqrt(1.0 + found[:, :, 0]) - 1.0, 0.0)
-    axes = ("exchange", "macro_step")
     words = {
         "error": (speeds, "m/s", "error of the speed after the contact"),
         "energy_drift": (energies, "1", "energy gained, relative"),
@@ -74,27 +70,9 @@ def ladder(law: str) -> xr.Dataset:
         "wall_time": (found[:, :, 2], "s", "wall time, residual included"),
         "steps_made": (found[:, :, 3], "1", "steps, with repeated ones"),
     }
-    dataset = xr.Dataset(
-        {name: (axes, values, {"units": u, "long_name": text}) for name, (values, u, text) in words.items()},
-        coords={
-            "exchange": ("exchange", list(METHODS), {"long_name": "exchange of values"}),
-            "macro_step": (
-                "macro_step",
-                1.0 / STEPS,
-                {"units": "1", "long_name": "macro step / contact time"},
-            ),
-        },
-        attrs={
-            "title": f"One elastic contact, {law}, mass and stop as two FMUs",
-            "Conventions": "CF-1.11",
-            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_compliant_coupling.py",
-            "versions": json.dumps(versions()),
-            "git_commit": git_commit(),
-        },
-    )
-    orders = [observed_order(1.0 / STEPS, dataset["energy_drift"].values[i]) for i in range(len(METHODS))]
-    dataset["energy_drift_order"] = ("exchange", orders, {"units": "1", "long_name": "observed order"})
-    return dataset
+    methods, steps = (METHODS, "exchange of values"), (STEPS, "macro step / contact time")
+    title = f"One elastic contact, {law}, mass and stop as two FMUs"
+    return energy_ladder(words, methods, steps, title, "bench_compliant_coupling.py")
 
 
 def table(law: str, dataset: xr.Dataset) -> None:

@@ -39,6 +39,7 @@ from support.coupled_parts import (
     P11,
     P11_PHASE,
     body,
+    bounce_times,
     contact,
     events_of,
     external,
@@ -232,11 +233,6 @@ def step_table() -> bool:
 # ---- a ball without events of its own ----
 
 
-def exact_bounces(count: int) -> np.ndarray:
-    first, n, r = math.sqrt(2.0 / 9.81), np.arange(count), 0.7
-    return np.asarray(first + 2.0 * first * r * (1.0 - r**n) / (1.0 - r))
-
-
 def fixed_step_bounces(importer: Importer, step: float, end: float) -> list[float]:
     """Return the times at which a plain loop sees the ball's velocity turn upwards."""
     importer.begin()
@@ -277,7 +273,7 @@ def fixed_steps(fmu: Path, step: float, end: float, found: dict[str, list[float]
 def ball_table(folder: Path) -> None:
     """Print bounce times and cost by step revision and by a plain loop."""
     fmu, end = bouncing_ball(folder), 2.0
-    exact = exact_bounces(4)
+    exact = bounce_times(4)
     print("\nblack-box ball (FMI 2.0), bounces up to 2 s      error of bounce 1  largest of 4  cost, ms")
     for step in (0.1, 0.001):
         found: dict[str, list[float]] = {}

@@ -15,7 +15,6 @@ Run with `python tests/benchmarks/bench_foreign_bodies.py [FOLDER]`.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import statistics
 import sys
@@ -30,12 +29,11 @@ import xarray as xr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.compliant_parts import FREE, contact_time, follows, yielding_contact, yielding_stop
 from support.coupled_parts import VERSIONS, body, events_of, link, part, values
+from support.energy_ladders import energy_ladder
 from support.fmu_factory import mass
 from support.held_parts import held
 from support.pair_parts import hit
 
-from vibroimpact.analysis.dataset.provenance import git_commit, versions
-from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
@@ -92,33 +90,14 @@ def ladder(law: str, folder: Path) -> xr.Dataset:
     """Measure all methods on the ladder of steps."""
     found = np.array([[error_and_residual(law, m, int(n), folder) for n in STEPS] for m in METHODS])
     energies = np.where(np.abs(found[:, :, 0]) > ROUNDING, found[:, :, 0], 0.0)
-    axes = ("exchange", "macro_step")
     words = {
         "error": (SPEED * (np.sqrt(1.0 + energies) - 1.0), "m/s", "error of the speed after the contact"),
         "energy_drift": (energies, "1", "energy gained, relative"),
         "interface_residual": (found[:, :, 1], "1", "energy residual as reported, relative"),
     }
-    dataset = xr.Dataset(
-        {name: (axes, data, {"units": u, "long_name": text}) for name, (data, u, text) in words.items()},
-        coords={
-            "exchange": ("exchange", list(METHODS), {"long_name": "body and how its force is given"}),
-            "macro_step": (
-                "macro_step",
-                1.0 / STEPS,
-                {"units": "1", "long_name": "step / contact time"},
-            ),
-        },
-        attrs={
-            "title": f"One elastic contact of a foreign mass, {law}",
-            "Conventions": "CF-1.11",
-            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_foreign_bodies.py",
-            "versions": json.dumps(versions()),
-            "git_commit": git_commit(),
-        },
-    )
-    orders = [observed_order(1.0 / STEPS, dataset["energy_drift"].values[i]) for i in range(len(METHODS))]
-    dataset["energy_drift_order"] = ("exchange", orders, {"units": "1", "long_name": "observed order"})
-    return dataset
+    methods, steps = (METHODS, "body and how its force is given"), (STEPS, "step / contact time")
+    title = f"One elastic contact of a foreign mass, {law}"
+    return energy_ladder(words, methods, steps, title, "bench_foreign_bodies.py")
 
 
 def table(law: str, dataset: xr.Dataset) -> None:

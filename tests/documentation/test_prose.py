@@ -77,6 +77,21 @@ def test_comments_of_python_are_read(prose: ModuleType, text: str, broken: list[
 @pytest.mark.parametrize(
     ("text", "count"),
     [
+        (f"# {LONG}\n[body]\n", 1),
+        (f"mass = 1.0 # {LONG}\n", 1),
+        (f'name = "# {LONG}"\n', 0),
+        (f"text = '''\n# {LONG}\n'''\n", 0),
+        ("# What is drawn\n", 1),
+        ("# A comment of one line.\n# What follows may begin so.\n", 0),
+    ],
+)
+def test_comments_of_toml_are_read(prose: ModuleType, text: str, count: int) -> None:
+    assert sum(1 for each in prose.paragraphs_of_toml(Path("a.toml"), text) for _ in each.faults()) == count
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
         (f"/* {LONG} */\n", 1),
         (f"int x;  // {LONG}\n", 1),
         (f'char *s = "/* {LONG} */";\n', 0),

@@ -11,6 +11,8 @@ from support.command_line import in_this_process
 from support.places import EXAMPLES, ROOT
 from support.still_clock import stop_the_clock
 
+from vibroimpact.orchestrator.hard_cases import CASES
+
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 COMMANDS = [
@@ -48,6 +50,22 @@ def test_the_commands_of_the_readme_run_and_leave_their_files(
         assert done.returncode == 0, done.stderr
         if "-o" in words:
             assert (folder / words[words.index("-o") + 1]).exists()
+
+
+def test_the_readme_counts_hard_cases_and_scenes_of_the_thesis() -> None:
+    assert f"\n- {len(CASES)} [hard cases](docs/hard_cases.md)" in TEXT
+    assert f"\n- {len(list((EXAMPLES / 'thesis').glob('*.toml')))} [scenes of a thesis]" in TEXT
+
+
+def test_every_command_in_the_tables_of_the_readme_has_a_help() -> None:
+    rows = [line.split("|")[2] for line in TEXT.splitlines() if line.startswith("|")]
+    commands = {name for row in rows for name in re.findall(r"`([a-z -]+)`", row)} - {"make help"}
+    assert len(commands) > 20
+    for command in commands:
+        name, _, option = command.partition(" --")
+        done = in_this_process(*name.split(), "--help")
+        assert done.returncode == 0, done.stderr
+        assert f"--{option.partition(' ')[0]}" in done.stdout
 
 
 def test_the_readme_is_a_screen_and_a_half() -> None:

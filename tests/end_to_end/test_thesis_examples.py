@@ -19,6 +19,7 @@ from support.reference_bodies import beam_shape, period_one_orbits, uniform_chai
 
 from vibroimpact import find_orbits
 from vibroimpact.analysis import figures, open_dataset
+from vibroimpact.analysis.dataset.derived import largest_impact_velocity
 from vibroimpact.orchestrator.run.dataset import tally
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import load_scene
@@ -189,7 +190,7 @@ def test_figure_6_11_sticks_below_a_frequency_just_above_point_3_and_loses_impac
     assert (np.diff(impacts) <= 0).all()
     assert w[up.impact_count.values == 2 * up.sizes["period"]].min() == pytest.approx(0.47, abs=0.005)
     # the two frequencies at which the impacts of the chatter are slow
-    largest = figures.largest_impact_velocity(dataset).sel(direction="up").values
+    largest = largest_impact_velocity(dataset).sel(direction="up").values
     for near in (0.138, 0.228):
         window = np.abs(w - near) < 0.025
         assert w[window][largest[window].argmin()] == pytest.approx(near, abs=0.004)

@@ -12,11 +12,8 @@ from pathlib import Path
 from vibroimpact.fmus.packaging.build import NATIVE
 
 ROOMS = ("core/body", "core/contact", "core/lanes", "core/modes", "core/motion", "bodies")
-HEADERS = (
-    *("cells.h", "extremes.h", "recording.h", "rounds.h"),
-    *("many_cells.h", "many_search.h", "many_extremes.h", "rounds_many.h"),
-)
-"""Headers that contain computations."""
+FUNCTION_END = re.compile(r"^}$", re.MULTILINE)
+"""End of a function; a header with one contains computations."""
 OF_INPUT = re.compile(r"vi_check|vi_complain|complaint|message|isfinite|isnan")
 """Lines that check arguments, or write messages about them."""
 COMMENT_OR_TEXT = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])'", re.DOTALL)
@@ -63,8 +60,8 @@ class Fault:
 @cache
 def places() -> tuple[Fault, ...]:
     """Return all possible faults of the kinds above, in the order of the C files."""
-    files = [path for room in ROOMS for path in sorted((NATIVE / room).rglob("*"))]
-    computing = [path for path in files if path.suffix == ".c" or path.name in HEADERS]
+    files = [path for room in ROOMS for path in sorted((NATIVE / room).rglob("*.[ch]"))]
+    computing = [path for path in files if FUNCTION_END.search(path.read_text(encoding="utf-8"))]
     return tuple(fault for path in computing for fault in _faults_of(path))
 
 

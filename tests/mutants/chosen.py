@@ -73,6 +73,11 @@ CHOSEN = {
         "vi_min(fourth * (square * square) / 384.0, ",
         "vi_min(fourth * (square * square) / 384000.0, ",
     ),
+    "samples of several modes in lanes are off by 1e-8": (
+        "core/lanes/many_samples.h",
+        "x[k] = m->term[k][0] + motion.added;",
+        "x[k] = (m->term[k][0] + motion.added) * (1.0 + 1e-8);",
+    ),
     "restitution that falls with speed is off by 1e-9 in lanes": (
         "core/lanes/rounds.h",
         "restitution / root(root(approach / yields))",

@@ -12,7 +12,7 @@
 
 enum { POINTS = 61, ROOM = VI_LANES_LEAST_ROOM, STATES = VI_LANES_MODES * POINTS };
 enum { MOST_PERIODS = 40, OF_PERIODS = POINTS * MOST_PERIODS }; /* room of a point, of a column */
-enum { MOST_SAMPLES = 128, OF_SAMPLES = POINTS * MOST_SAMPLES };
+enum { MOST_SAMPLES = 128, OF_SAMPLES = POINTS * MOST_SAMPLES, SAMPLED = VI_LANES_CONTACTS + 1 };
 
 /* Arrays of points. */
 typedef struct {
@@ -34,14 +34,15 @@ typedef struct {
     double sum_of_rows[POINTS]; /* sum of all numbers of a point's impacts, in their order */
     double periods[VI_PERIOD_WIDTH * OF_PERIODS];
     int64_t samples_of[POINTS];
-    double samples[2 * OF_SAMPLES];
+    double samples[2 * SAMPLED * OF_SAMPLES];
 } results;
 
 static const double TURN = 6.283185307179586;
 /* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
  * change. */
 static const uint64_t BITS = 0xf68c2759cf6a40dcu;
-static const uint64_t BITS_OF_YIELDING = 0xfac3ac8f059e9398u; /* Kelvin-Voigt stops, time series */
+static const uint64_t BITS_OF_YIELDING = 0xe2aa616ece9fd36cu; /* Kelvin-Voigt stops, time series */
+static const uint64_t BITS_OF_SAMPLES = 0x7e9f1dc1ec5bdeb5u; /* time series of several modes, and of one between three or four stops */
 
 static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
 {
@@ -224,7 +225,7 @@ static void compare(const results *a, const results *b, int i, const char *what)
                   "one column %d of the periods of %d by %s", column, i, what);
         }
         CHECK(a->samples_of[i] == b->samples_of[i], "the number of samples of %d by %s", i, what);
-        for (int column = 0; column < 2; ++column) {
+        for (int column = 0; column < 2 * SAMPLED; ++column) {
             const int place = column * OF_SAMPLES + i * MOST_SAMPLES;
             CHECK(memcmp(&a->samples[place], &b->samples[place], sizeof(double[MOST_SAMPLES])) == 0,
                   "the samples of %d by %s", i, what);
@@ -254,7 +255,7 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
         for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
             hash = hashed(hash, period_of(r, i, column), (size_t)r->periods_of[i] * sizeof(double));
         }
-        for (int column = 0; column < 2; ++column) {
+        for (int column = 0; column < 2 * SAMPLED; ++column) {
             hash = hashed(hash, &r->samples[column * OF_SAMPLES + i * MOST_SAMPLES],
                           (size_t)r->samples_of[i] * sizeof(double));
         }
@@ -266,12 +267,12 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
     return hash;
 }
 
-static void check_sizes(int modes, int contacts, int64_t yielding, uint64_t *seed, uint64_t *hash)
+static void check_sizes(int modes, int contacts, int64_t yielding, double rate, uint64_t *seed, uint64_t *hash)
 {
     static sample good, bad;
     static results whole, other;
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding,
-                          yielding ? 1.7 : 0.0};
+    const int64_t sampled = ((int64_t)1 << VI_LANES_CONTACTS) | (((int64_t)1 << contacts) - 1);
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding, sampled, rate};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;
@@ -337,15 +338,17 @@ static void check_functions(uint64_t *seed)
 
 int main(void)
 {
-    uint64_t seed = 18, hash = 14695981039346656037u, hash_of_yielding = hash;
+    uint64_t seed = 18, hash = 14695981039346656037u, hash_of_yielding = hash, hash_of_samples = hash;
     const vi_lanes_plan none[] = {{.modes = 0},
                                   {.modes = VI_LANES_MODES + 1},
                                   {.modes = 1, .contacts = -1},
-                                  {.modes = 1, .contacts = VI_ONE_MODE_CONTACTS + 1},
+                                  {.modes = 1, .contacts = VI_LANES_CONTACTS + 1},
+                                  {.modes = 1, .contacts = VI_ONE_MODE_CONTACTS + 1, .yielding = 1},
                                   {.modes = 2, .contacts = VI_LANES_CONTACTS + 1},
                                   {.modes = 1, .contacts = 1, .yielding = 2},
                                   {.modes = 2, .contacts = 1, .yielding = 1},
-                                  {.modes = 2, .rate = 1.0},
+                                  {.modes = 2, .contacts = 1, .sampled = 2, .rate = 1.0},
+                                  {.modes = 2, .sampled = -1, .rate = 1.0},
                                   {.modes = 1, .rate = -1.0},
                                   {.modes = 1, .rate = INFINITY},
                                   {.modes = 1, .instructions = 4}};
@@ -354,17 +357,24 @@ int main(void)
     }
     for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
         for (int contacts = 0; contacts <= (modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS); ++contacts) {
-            check_sizes(modes, contacts, 0, &seed, &hash);
+            check_sizes(modes, contacts, 0, 0.0, &seed, &hash);
         }
     }
     for (int contacts = 1; contacts <= VI_ONE_MODE_CONTACTS; ++contacts) {
         for (int64_t yielding = 1; yielding < 1 << contacts; ++yielding) {
-            check_sizes(1, contacts, yielding, &seed, &hash_of_yielding);
+            check_sizes(1, contacts, yielding, 1.7, &seed, &hash_of_yielding);
         }
+    }
+    for (int contacts = VI_ONE_MODE_CONTACTS + 1; contacts <= VI_LANES_CONTACTS; ++contacts) {
+        check_sizes(1, contacts, 0, 1.7, &seed, &hash_of_samples);
+    }
+    for (int modes = 2; modes <= VI_LANES_MODES; ++modes) {
+        check_sizes(modes, modes % (VI_LANES_CONTACTS + 1), 0, 1.7, &seed, &hash_of_samples);
     }
     check_functions(&seed);
     CHECK(hash == BITS, "the bits of every machine, got the hash %016" PRIx64, hash);
     CHECK(hash_of_yielding == BITS_OF_YIELDING, "the bits on stops that yield, got the hash %016" PRIx64,
           hash_of_yielding);
+    CHECK(hash_of_samples == BITS_OF_SAMPLES, "the bits of time series, got the hash %016" PRIx64, hash_of_samples);
     return 0;
 }

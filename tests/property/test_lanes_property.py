@@ -26,7 +26,7 @@ from support.tolerance import LONG_PHASE, ORBIT
 from vibroimpact.fmus.core.lanes import Instructions, LanesEnd, PointState, instructions
 from vibroimpact.fmus.errors import UsageError
 
-SIZES = [(1, 1), (1, 2), (2, 1), (3, 2), (8, 1), (2, 4), (5, 3)]
+SIZES = [(1, 1), (1, 2), (1, 4), (2, 1), (3, 2), (8, 1), (2, 4), (5, 3)]
 #: Largest difference of a point: a rounding after some dozen impacts, each of which may multiply it.
 FLIGHTS = 1e-9
 #: Largest difference after ten impacts of chaos, each of which multiplies a rounding by ten or so at most.
@@ -199,15 +199,21 @@ def test_the_first_impacts_between_many_stops_are_those_of_the_scalar_engine(
         assert np.abs(own[:FIRST, [1, 3]] - first[:, [1, 3]]).max(initial=0.0) <= NEAR
 
 
-@pytest.mark.parametrize("yields", [False, True])
-def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(*, yields: bool) -> None:
-    rate = 7.3
-    points = drawn_yielding(24, 2, seed=60) if yields else drawn(24, 1, 2, seed=60)
+SAMPLED = [(1, 2, True), (1, 1, False), (1, 4, False), (2, 1, False), (8, 1, False), (5, 3, False)]
+"""Numbers of modes and contacts; whether the stops yield."""
+
+
+@pytest.mark.parametrize(("modes", "contacts", "yields"), SAMPLED)
+@pytest.mark.parametrize("rate", [0.9, 7.3])
+def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(
+    modes: int, contacts: int, rate: float, *, yields: bool
+) -> None:
+    points = drawn_yielding(16, contacts, seed=60) if yields else drawn(16, modes, contacts, seed=60)
     points["begin"] = np.maximum(points["begin"], 1e-3)
     plain = run(points, impact_limit=MOST)
     found = run(points, impact_limit=MOST, rate=rate)
     assert all(one.tobytes() == other.tobytes() for one, other in zip(found.rows, plain.rows, strict=True))
-    backwards = np.arange(24)[::-1]
+    backwards = np.arange(16)[::-1]
     part = run(taken(points, backwards[:13]), impact_limit=MOST, rate=rate).columns["samples"]
     whole = found.columns["samples"][:, backwards[:13], : part.shape[2]]
     assert np.array_equal(part, whole, equal_nan=True)
@@ -215,14 +221,15 @@ def test_samples_are_those_of_the_scalar_engine_and_change_no_bit_of_the_motion(
         begin, end = float(points["begin"][place]), float(points["end"][place])
         count = math.floor((end - begin) * rate * (1.0 + 1e-12)) + 1
         assert found.columns["samples_of"][place] == count
+        shapes = np.concatenate([points["shape"][:, :, place], points["observed"][None, :, place]])
         with follow_alone({**points, "end": points["begin"]}, int(place)) as body:
             for n in range(count):
                 further = min(begin + n / rate, end) - body.time
                 if further > 0.0:
                     body.advance(further, held=points["held"][:, place])
-                q, p = found.columns["samples"][:, place, n]
-                assert abs(q - body.displacement[0]) <= FLIGHTS
-                assert abs(p - body.velocity[0]) <= 100.0 * FLIGHTS
+                values = found.columns["samples"][:, place, n]
+                assert np.abs(values[0::2] - shapes @ body.displacement).max() <= FLIGHTS
+                assert np.abs(values[1::2] - shapes @ body.velocity).max() <= 100.0 * FLIGHTS
 
 
 def test_rows_that_find_no_room_are_asked_for() -> None:
@@ -344,7 +351,7 @@ def test_an_instruction_set_that_is_none_is_refused(monkeypatch: pytest.MonkeyPa
         instructions()
 
 
-@pytest.mark.parametrize(("modes", "contacts"), [(0, 1), (9, 1), (1, 3)])
+@pytest.mark.parametrize(("modes", "contacts"), [(0, 1), (9, 1), (1, 5)])
 def test_more_modes_or_contacts_than_lanes_have_are_refused(modes: int, contacts: int) -> None:
     with pytest.raises(UsageError, match=f"got {modes}, {contacts} and 0"):
         run(drawn(1, modes, contacts, 0) if contacts < 3 and modes else _sized(modes, contacts))

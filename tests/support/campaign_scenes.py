@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -15,27 +16,50 @@ SCENE = """
 title = "{title}"
 units = "nondimensional"
 [body]
-mass = {milliseconds}
+mass = {mass}
 stiffness = 1.0
+damping_ratio = {damping_ratio}
 [forcing]
 amplitude = 0.5
 angular_frequency = 0.8
 [[stop]]
-position = 1.0
+position = {position}
 restitution = {restitution}
 [record]
-transient_periods = 10
-recorded_periods = 2
+transient_periods = {transient_periods}
+recorded_periods = {recorded_periods}
 [sweep]
-{sweep}
-"""
-FREQUENCIES = """
-"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}
 """
 AMPLITUDES = '"forcing.amplitude" = {{ start = {start}, stop = 0.9, points = {points} }}'
 
 TIMING = ("point_seconds",)
 """Variables that measure the computer, not the scene."""
+
+
+def swept_text(
+    *axes: str,
+    title: str = "a sweep",
+    mass: float = 1.0,
+    damping_ratio: float = 0.05,
+    position: float = 1.0,
+    restitution: float = 0.7,
+    transient_periods: int = 10,
+    recorded_periods: int = 2,
+) -> str:
+    """Return a scene of the impact oscillator with the lines of a sweep; without any, more lines may follow."""
+    numbers = {"mass": mass, "damping_ratio": damping_ratio, "position": position, "restitution": restitution}
+    periods = {"transient_periods": transient_periods, "recorded_periods": recorded_periods}
+    return SCENE.format(title=title, **numbers, **periods) + "\n".join(axes)
+
+
+def axis(key: str, values: Iterable[float], path: str = "independent") -> str:
+    """Return the line of a swept key."""
+    return f'"{key}" = {{ values = {list(values)}, path = "{path}" }}'
+
+
+def frequency(points: int, path: str = "independent") -> str:
+    """Return the line of a swept angular frequency."""
+    return f'"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}'
 
 
 def frequency_text(
@@ -46,21 +70,20 @@ def frequency_text(
     title: str = "busy",
 ) -> str:
     """Return a scene that sweeps the angular frequency."""
-    sweep = FREQUENCIES.format(points=points, path=path)
-    return SCENE.format(milliseconds=milliseconds, restitution=restitution, title=title, sweep=sweep)
+    axes = frequency(points, path)
+    return swept_text(axes, title=title, mass=milliseconds, damping_ratio=0.0, restitution=restitution)
 
 
 def amplitude_text(points: int, start: float, milliseconds: float = 0.1) -> str:
     """Return a scene that sweeps the forcing amplitude; a runner can be made to fail where it is negative."""
-    sweep = AMPLITUDES.format(points=points, start=start)
-    return SCENE.format(milliseconds=milliseconds, restitution=0.7, title="amplitudes", sweep=sweep)
+    amplitudes = AMPLITUDES.format(points=points, start=start)
+    return swept_text(amplitudes, title="amplitudes", mass=milliseconds, damping_ratio=0.0)
 
 
-def plane_text(frequencies: int, amplitudes: int, path: str = "up-down", milliseconds: float = 0.1) -> str:
+def plane_text(columns: int, amplitudes: int, path: str = "up-down", milliseconds: float = 0.1) -> str:
     """Return a scene that sweeps the angular frequency along branches, one pair for each amplitude."""
-    sweep = FREQUENCIES.format(points=frequencies, path=path) + "\n"
-    sweep += AMPLITUDES.format(points=amplitudes, start=0.1)
-    return SCENE.format(milliseconds=milliseconds, restitution=0.7, title="plane", sweep=sweep)
+    axes = frequency(columns, path), AMPLITUDES.format(points=amplitudes, start=0.1)
+    return swept_text(*axes, title="plane", mass=milliseconds, damping_ratio=0.0)
 
 
 def scene_of(text: str) -> Scene:

@@ -111,3 +111,11 @@ def largest_difference(one: Sequence[Impact], other: Sequence[Impact]) -> float:
     around = 2.0 * math.pi - difference[:, 1]
     difference[:, 1] = np.minimum(difference[:, 1], np.abs(around))
     return float(difference.max())
+
+
+def bounce_times(
+    count: int, restitution: float = 0.7, height: float = 1.0, gravity: float = 9.81
+) -> np.ndarray:
+    """Return the times of the bounces of a ball that is dropped at time 0, s, shape (count,)."""
+    first, n = math.sqrt(2.0 * height / gravity), np.arange(count)
+    return first + 2.0 * first * restitution * (1.0 - restitution**n) / (1.0 - restitution)

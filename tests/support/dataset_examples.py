@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
+import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
+from vibroimpact.analysis.dataset import (
+    Direction,
+    Outcome,
+    RunRecord,
+    build_dataset,
+    open_dataset,
+    with_constants,
+    write_dataset,
+)
 from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, MEASURED_COLUMNS, ORBIT_COLUMNS, RULES
 
 PERIODS = 3
+
+
+def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
+    """Write a dataset and return the path of its file."""
+    write_dataset(dataset, folder / name)
+    return folder / name
+
+
+def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
+    """Write a dataset and return it as it opens."""
+    return open_dataset(written(dataset, folder))
 
 
 def impact_rows(number: int, start: float) -> NDArray[np.float64]:
@@ -171,3 +192,12 @@ def everything(**changes: Any) -> xr.Dataset:
         **changes,
     )
     return with_constants(dataset, {"restitution": 0.7, "stop_position": 1e-3}, unit_of=UNITS)
+
+
+def grid_of_runs() -> xr.Dataset:
+    """Return 15 runs over two parameters in no order, with rows; the fifth failed."""
+    axes = itertools.product([2.0, 1.0, 4.0], [0.3, 0.1, 0.2, 0.4, 0.5])
+    points = np.array(list(axes))
+    runs = [record(float(k), impacts=k % 3, sticks=k % 2, samples=1) for k in range(len(points))]
+    runs[4] = failed("it broke: \u03c9 too large")
+    return dataset_of(runs, coordinates={"mass": points[:, 0], "restitution": points[:, 1]})

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from support.structure import Modes, Stop, Structure
 from vibroimpact.fmus.core.lanes import (
     IMPACT_WIDTH,
+    MOST_CONTACTS,
     PERIOD_WIDTH,
     Instructions,
     LanesEnd,
@@ -85,7 +86,7 @@ def run(
     points : dict of str to ndarray
         Arrays of `LanesPoints.GIVEN`, the last axis over the points.
     impacts, extrema, periods, each_period, impact_limit, rate, instructions
-        Fields of the plan.
+        Fields of the plan. All points are sampled: the contacts, then the observed point.
     room : int
         Number of rows that fit into one call.
     most_seconds : float
@@ -106,8 +107,19 @@ def run(
     }
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
     yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
+    sampled = 2**contacts - 1 + 2**MOST_CONTACTS
     plan = LanesPlan(
-        modes, contacts, impacts, extrema, periods, each_period, instructions, impact_limit, yields, rate
+        modes,
+        contacts,
+        impacts,
+        extrema,
+        periods,
+        each_period,
+        instructions,
+        impact_limit,
+        yields,
+        sampled,
+        rate,
     )
     most = _most_periods(points) if each_period else 1
     table = np.full((PERIOD_WIDTH, count, most), np.nan)
@@ -117,7 +129,8 @@ def run(
     if rate:
         longest = np.nanmax(points["end"] - points["begin"], initial=0.0)
         results["samples_of"] = np.zeros(count, np.int64)
-        results["samples"] = np.full((2, count, math.floor(longest * rate) + 2), np.nan)
+        values = 2 * contacts + 2
+        results["samples"] = np.full((values, count, math.floor(longest * rate) + 2), np.nan)
         state.most_samples = results["samples"].shape[2]
     given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
     for name, array in (given | results | block | {"periods": table}).items():

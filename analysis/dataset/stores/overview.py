@@ -14,34 +14,26 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.grid import RANGE, RANGE_ENDS, range_over_periods
+from vibroimpact.analysis.dataset.derived import (
+    LARGEST_IMPACT,
+    MEAN_IMPACTS,
+    RANGE,
+    RANGE_ENDS,
+    largest_of_runs,
+    mean_of_periods,
+    range_over_periods,
+)
 from vibroimpact.analysis.dataset.stores.grid import SHARD_POINTS, Block, StoreGrid
 
 OVERVIEW = "overview"
 """Group of the overview in a store."""
 MOST_BLOCKS = 512
 """Largest number of blocks along a dimension, up to a shard's end: a map of one column has 560 pixels on the page."""
-LARGEST_IMPACT, MEAN_IMPACTS = "largest_impact_velocity", "mean_impacts_per_period"
-"""Derived quantities of a map; see `quantities_of`."""
 PARTS = ("low", "high", "sample", "missing")
 CLASSES = ("class_kind", "class_impacts", "class_periods")
 """Variables that are a class together."""
 _FILLED = {"low": np.inf, "high": -np.inf, "sample": np.nan, "missing": 0.0}
 Floats = NDArray[np.float64]
-
-
-def largest_of_runs(counts: NDArray[Any], velocities: NDArray[Any]) -> Floats:
-    """Return the largest impact velocity of each run, shape (run,); NaN without an impact."""
-    largest = np.full(len(counts), -np.inf)
-    np.fmax.at(largest, np.repeat(np.arange(len(counts)), counts), velocities)
-    return np.where(np.isfinite(largest), largest, np.nan)
-
-
-def mean_of_periods(impacts: NDArray[Any]) -> Floats:
-    """Return the mean of the impacts of each run, shape (run,), from (run, period); NaN without an impact."""
-    there = ~np.isnan(impacts)
-    mean = np.sum(impacts, axis=1, where=there) / np.maximum(there.sum(axis=1), 1)
-    return np.where(mean > 0.0, mean, np.nan)
 
 
 def quantities_of(columns: Mapping[Any, xr.Variable]) -> dict[str, Floats]:
@@ -50,9 +42,9 @@ def quantities_of(columns: Mapping[Any, xr.Variable]) -> dict[str, Floats]:
     if all(name in columns for name in RANGE_ENDS):
         found[RANGE] = range_over_periods(*(columns[name].values for name in RANGE_ENDS))
     if "impact_velocity" in columns:
-        found[LARGEST_IMPACT] = largest_of_runs(
-            columns["impact_count"].values, columns["impact_velocity"].values
-        )
+        counts = columns["impact_count"].values
+        owner = np.repeat(np.arange(len(counts)), counts)
+        found[LARGEST_IMPACT] = largest_of_runs(owner, columns["impact_velocity"].values, len(counts))
     if "impacts_per_period" in columns:
         found[MEAN_IMPACTS] = mean_of_periods(columns["impacts_per_period"].values)
     return found

@@ -24,7 +24,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import Named, new_variable
-from vibroimpact.analysis.dataset.grid import RANGE, RANGE_ENDS, range_attributes, range_over_periods
+from vibroimpact.analysis.dataset.derived import RANGE, RANGE_ENDS, range_over_periods
+from vibroimpact.analysis.dataset.grid import range_attributes
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, constant_names, swept_names
 from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
 from vibroimpact.analysis.dataset.stores.overview import CLASSES, OVERVIEW, BlockGrid, names_of, quantities_of

@@ -16,9 +16,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.grid import RANGE
+from vibroimpact.analysis.dataset.derived import (
+    LARGEST_IMPACT,
+    MEAN_IMPACTS,
+    RANGE,
+    largest_impact_velocity,
+    mean_of_periods,
+)
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
-from vibroimpact.analysis.dataset.stores.overview import LARGEST_IMPACT, MEAN_IMPACTS
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.analysis.figures.sweep.map_overview import block_values, edges_of_blocks
@@ -333,12 +338,8 @@ def draw_impacts_per_period(dataset: xr.Dataset) -> Figure:
             "figure: expected the impacts of each period in the dataset, got none recorded. "
             "Set impacts = true in [record] of a forced scene."
         )
-
-    def whole() -> xr.DataArray:
-        mean = dataset["impacts_per_period"].mean("period")
-        return mean.where(mean > 0.0)
-
-    means = _Mapped.of(dataset, MEAN_IMPACTS, whole)
+    impacts = dataset["impacts_per_period"]
+    means = _Mapped.of(dataset, MEAN_IMPACTS, lambda: impacts.reduce(mean_of_periods, "period"))
     return _draw_maps(dataset, [replace(means, text="impacts per forcing period (-)", missing="no impact")])
 
 
@@ -413,16 +414,6 @@ def _nearest(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
         name: (name, axis, values[name].attrs) for name, axis in zip((along, across), grid, strict=True)
     }
     return xr.DataArray(values.values[place].reshape(_CELLS, _CELLS), coordinates, dims=(along, across))
-
-
-def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the largest impact velocity of each run (m/s); NaN where a run has no impact."""
-    largest = np.full(int(dataset["run_id"].values.max(initial=0)) + 1, -np.inf)
-    owner = dataset["impact_run"].values
-    inside = owner < largest.size
-    np.maximum.at(largest, owner[inside], dataset["impact_velocity"].values[inside])
-    values = np.where(dataset["run_id"].values >= 0, largest[dataset["run_id"].values], -np.inf)
-    return dataset["run_id"].copy(data=np.where(np.isfinite(values), values, np.nan))
 
 
 def _colours(

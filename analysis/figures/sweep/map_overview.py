@@ -11,14 +11,8 @@ import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.grid import RANGE
-from vibroimpact.analysis.dataset.stores.overview import (
-    CLASSES,
-    LARGEST_IMPACT,
-    MEAN_IMPACTS,
-    PARTS,
-    BlockGrid,
-)
+from vibroimpact.analysis.dataset.derived import LARGEST_IMPACT, MEAN_IMPACTS, RANGE
+from vibroimpact.analysis.dataset.stores.overview import CLASSES, PARTS, BlockGrid
 from vibroimpact.analysis.dataset.stores.reading import StoreContents
 from vibroimpact.analysis.files.stores import is_store
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ModalPoints
 from vibroimpact.fmus.core import lanes as core
+from vibroimpact.orchestrator.run.many_points.lanes_samples import sampled_bits
 from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
@@ -69,6 +70,7 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         instructions=core.instructions(),
         impact_limit=scene.execution.impact_limit,
         yielding=sum(2**number for number, stop in enumerate(stops) if not LAWS[stop.law].is_rigid),
+        sampled=sampled_bits(scene.sampled),
         rate=scene.sampling_rate,
     )
     return LanePoints(plan, modal, {name: np.ascontiguousarray(values) for name, values in given.items()})

@@ -82,7 +82,9 @@ def run_in_lanes(
     points that the loop leaves out, too.
     """
     prepared = loop.prepared(PointValues(points.values, points.begins_as_scene))
-    if prepared is not None and fits(prepared.begin, prepared.end, loop.scene.sampling_rate):
+    if prepared is not None and fits(
+        prepared.begin, prepared.end, loop.scene.sampling_rate, loop.scene.sampled
+    ):
         return _LaneRun(loop, points, prepared, alone).run(deadline)
     if prepared is None and len(points) == 1:
         given = points.starts.get(0)

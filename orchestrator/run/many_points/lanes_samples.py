@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.columns import Ragged
+from vibroimpact.fmus.core.lanes import MOST_CONTACTS
 from vibroimpact.orchestrator.run.limits import contact_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-VALUES = 2
-"""Number of values of a sample in C: displacement and velocity of the mode."""
+FORCE = "contact_force"
+"""Begin of the names of forces at stops. They are 0, since lanes have no body that rests."""
 ROUNDING = 1e-12
 """Relative excess over the last sample that counts as rounding, as in a fused run."""
 
@@ -30,9 +31,27 @@ def most_samples(begin: Floats, end: Floats, rate: float) -> int:
     return int(count[np.isfinite(count)].max(initial=0.0)) + 1
 
 
-def fits(begin: Floats, end: Floats, rate: float) -> bool:
+def sampled_points(names: Iterable[str]) -> list[int | None]:
+    """Return the points whose motion is sampled, in the order of C: contacts, from 1; None, the observed point.
+
+    Examples
+    --------
+    >>> sampled_points(["velocity", "contact_force", "contact_velocity[2]"])
+    [2, None]
+    """
+    points = {contact_of(name) for name in names if not name.startswith(FORCE)}
+    return sorted(points, key=lambda point: MOST_CONTACTS + 1 if point is None else point)
+
+
+def sampled_bits(names: Iterable[str]) -> int:
+    """Return the sampled points as the bits of `LanesPlan.sampled`."""
+    return sum(2 ** (MOST_CONTACTS if point is None else point - 1) for point in sampled_points(names))
+
+
+def fits(begin: Floats, end: Floats, rate: float, names: Iterable[str]) -> bool:
     """Return whether points are few enough for one call: a single point, or samples below `MOST_BYTES`."""
-    size = VALUES * np.dtype(np.float64).itemsize * len(begin) * most_samples(begin, end, rate)
+    values = 2 * len(sampled_points(names))
+    size = values * np.dtype(np.float64).itemsize * len(begin) * most_samples(begin, end, rate)
     return len(begin) == 1 or size <= MOST_BYTES
 
 
@@ -54,8 +73,10 @@ class LaneSamples:
         points = len(given["begin"])
         self.count = np.zeros(points, dtype=np.int64)
         """Number of samples of each point, filled by C."""
-        self.values = np.empty((VALUES, points, most_samples(given["begin"], given["end"], rate)))
-        """Samples, filled by C; shape (value, point, sample)."""
+        self._sampled = sampled_points(names)
+        most = most_samples(given["begin"], given["end"], rate)
+        self.values = np.empty((2 * len(self._sampled), points, most))
+        """Samples, filled by C: displacement and velocity of each sampled point; shape (value, point, sample)."""
 
     def rows(self, run: Ints) -> Ragged:
         """Return the samples of some points: time, s, then the variables."""
@@ -63,14 +84,10 @@ class LaneSamples:
         taken = np.arange(self.values.shape[2]) < count[:, None]
         begin, end = (self._given[name][run, None] for name in ("begin", "end"))
         times = np.minimum(begin + np.arange(self.values.shape[2]) / self._rate, end)
-        q, p = (each[run][taken] for each in self.values)
-        columns = [times[taken], *(self._variable(name, run, count, q, p) for name in self._names)]
-        return Ragged(count, np.column_stack(columns))
-
-    def _variable(self, name: str, run: Ints, count: Ints, q: Floats, p: Floats) -> Floats:
-        """Return a sampled variable at all samples, from the motion of the mode."""
-        if name.startswith("contact_force"):
-            return np.zeros(len(q))  # points that rest are left to the scalar engine
-        contact = contact_of(name)
-        shape = self._given["observed"][0] if contact is None else self._given["shape"][contact - 1, 0]
-        return np.repeat(shape[run], count) * (p if "velocity" in name else q)
+        rows = np.zeros((count.sum(), 1 + len(self._names)))
+        rows[:, 0] = times[taken]
+        for column, name in enumerate(self._names, start=1):
+            if not name.startswith(FORCE):
+                value = 2 * self._sampled.index(contact_of(name)) + ("velocity" in name)
+                rows[:, column] = self.values[value][run][taken]
+        return Ragged(count, rows)

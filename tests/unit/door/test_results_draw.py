@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib.text import Text
 from support.command_line import in_this_process
 from support.places import EXAMPLES
 from support.replay_scenes import BOARD, hit
@@ -57,48 +57,71 @@ def runs(scene: vi.Scene) -> dict[str, xr.Dataset]:
     return {name: vi.run(scene.with_sweep(sweep), progress=False) for name, sweep in sweeps.items()}
 
 
-def drawn(found: Any) -> Figure:
+def assert_shown(found: Any, *words: str) -> None:
+    """Assert that the figure of a result has data on its axes, and these texts."""
     figure = vi.draw(found)
     axes = [axis for axis in figure.axes if axis.get_xlabel() or axis.get_ylabel()]
-    assert axes
     assert any(axis.lines or axis.collections or axis.patches for axis in axes)
-    return figure
+    texts = {text.get_text() for text in figure.findobj(Text)}
+    assert set(words) <= texts, texts
 
 
-OF_RUNS: dict[str, tuple[Callable[[xr.Dataset], Any], tuple[str, ...]]] = {
-    "energies": (vi.energies, ("one", "swept")),
-    "lyapunov": (vi.lyapunov, ("one", "swept", "map")),
-    "classify": (vi.classify, ("one", "swept", "map")),
-    "resonances": (vi.resonances, ("swept",)),
-}
+RANGES = ("angular frequency (rad/s)", "displacement range (m)", "impact velocity (m/s)", "natural", "peaks")
+OVER_PLANE = ("angular frequency (rad/s)", "restitution (-)")
+OF_RUNS: tuple[tuple[Callable[[xr.Dataset], Any], str, tuple[str, ...]], ...] = (
+    (vi.energies, "one", ("energy over the orbit (J)", "force", "damping", "impacts")),
+    (vi.energies, "swept", ("angular frequency (rad/s)", "residual energy (J)", "mode 1")),
+    (vi.lyapunov, "one", ("exponent, the largest first", "exponent per impact (-)")),
+    (vi.lyapunov, "swept", ("angular frequency (rad/s)", "largest exponent per impact (-)")),
+    (vi.lyapunov, "map", (*OVER_PLANE, "largest exponent per impact (-)")),
+    (vi.classify, "one", ("impact velocity (m/s)", "strobe velocity (m/s)", "stop")),
+    (vi.classify, "swept", ("angular frequency (rad/s)", "P(1,1)", "P(1,2)", "P(2,2)")),
+    (vi.classify, "map", (*OVER_PLANE, "P(1,1)", "P(1,2)", "P(2,2)")),
+    (vi.resonances, "swept", RANGES),
+)
 
 
 @pytest.mark.parametrize(
-    ("name", "which"), [(name, which) for name, (_, all_runs) in OF_RUNS.items() for which in all_runs]
+    ("study", "which", "words"), OF_RUNS, ids=[f"{study.__name__}-{which}" for study, which, _ in OF_RUNS]
 )
-def test_what_is_found_of_runs_is_drawn(name: str, which: str, runs: dict[str, xr.Dataset]) -> None:
-    found = OF_RUNS[name][0](runs[which])
-    drawn(found)
-    drawn(getattr(found, "dataset", found))
+def test_what_is_found_of_runs_is_drawn(
+    study: Callable[[xr.Dataset], Any], which: str, words: tuple[str, ...], runs: dict[str, xr.Dataset]
+) -> None:
+    found = study(runs[which])
+    assert_shown(found, *words)
+    assert_shown(getattr(found, "dataset", found), *words)
+
+
+PHASE = "forcing phase of an impact (rad)"
+MAPS = {
+    "impact": (PHASE, "velocity (m/s)", "long run", "stable focus P(1,1)"),
+    "strobe": ("displacement (m)", "velocity (m/s)", "long run", "stable focus P(1,1)"),
+    "discontinuity": (PHASE, "velocity (m/s)", "S", "W"),
+    "nordmark": ("rho (-)", "X (-)", "forcing amplitude (N)"),
+    "square-root": ("d (-)", "x (-)", "lambda 0.5"),
+}
 
 
 @pytest.mark.parametrize("kind", maps.MAP_KINDS)
 def test_each_map_is_drawn(kind: str, scene: vi.Scene) -> None:
-    drawn(vi.maps(None if kind in NO_SCENE else scene, kind, **({} if kind in NO_SCENE else {"points": 60})))
+    found = vi.maps(None, kind) if kind in NO_SCENE else vi.maps(scene, kind, points=60)
+    assert_shown(found, *MAPS[kind])
 
 
 def test_basins_are_drawn_and_bear_their_kind(scene: vi.Scene, tmp_path: Path) -> None:
     found = vi.basins(scene, (-1.0, 1.0), (-1.0, 1.0), (6, 6))
-    drawn(found)
+    words = ("displacement start (m)", "velocity start (m/s)", "P(1,1): 100 %")
+    assert_shown(found, *words)
     vi.write_results(found, tmp_path / "basins.nc", kind=found.attrs["results_kind"])
     with vi.open_measured(tmp_path / "basins.nc") as opened:
         assert opened.attrs["results_kind"] == "basins"
-        drawn(opened)
+        assert_shown(opened, *words)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pythonfmu") is None, reason="the controller is in Python")
 def test_a_kept_orbit_is_drawn(scene: vi.Scene) -> None:
-    drawn(vi.control(scene, 1.0, 0.97, step=1e-2))
+    found = vi.control(scene, 1.0, 0.97, step=1e-2)
+    assert_shown(found, "angular frequency (rad/s)", "impact velocity (m/s)", "kept", "unstable orbit")
 
 
 def test_estimates_spikes_and_intervals_are_drawn() -> None:
@@ -106,17 +129,20 @@ def test_estimates_spikes_and_intervals_are_drawn() -> None:
     sampled = record | {"time_series": {"rate": 20, "variables": ["displacement"]}}
     run = vi.run(vi.Scene.from_dict(FORCED | {"record": sampled}), progress=False)
     tip = run.vibroimpact.samples().displacement
-    drawn(vi.estimate_impacts(tip, vi.Forcing(angular_frequency=1.0), methods=("trajectory",)))
-    drawn(vi.spike_report(tip))
-    drawn(vi.estimate_decay(tip.copy(data=np.exp(-0.02 * tip.time) * np.cos(3.0 * tip.time))))
-    drawn(vi.interval_report(np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 200))))
+    impacts = vi.estimate_impacts(tip, vi.Forcing(angular_frequency=1.0), methods=("trajectory",))
+    assert_shown(impacts, "restitution (-)", "damping ratio (-)", "trajectory", "fitted motion", "impacts")
+    assert_shown(vi.spike_report(tip), "robust score (-)", "spike ends below", "threshold")
+    decay = vi.estimate_decay(tip.copy(data=np.exp(-0.02 * tip.time) * np.cos(3.0 * tip.time)))
+    assert_shown(decay, "frequency (Hz)", "damping ratio (-)", "best law", "turning points")
+    intervals = vi.interval_report(np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 200)))
+    assert_shown(intervals, "interval (s)", "density (1/s)", "peaks: 1")
 
 
 def test_a_replay_is_drawn_before_it_is_written(tmp_path: Path) -> None:
     (tmp_path / "board.toml").write_text(BOARD)
     hit(tmp_path)
     found = vi.replay(tmp_path / "board.toml", tmp_path / "hit.nc")
-    drawn(found)
+    assert_shown(found, "time (ms)", "VAF (%)", "measured", "simulated", "hit.nc")
     assert found.attrs["results_kind"] == "replay"
 
 
@@ -128,17 +154,19 @@ def test_a_dataset_that_nobody_here_made_is_refused_by_what_it_lacks() -> None:
 
 
 def test_transients_are_drawn(scene: vi.Scene) -> None:
-    drawn(vi.transients(scene, starts=2))
+    found = vi.transients(scene, starts=2)
+    assert_shown(found, "periods of the force", "distance (-)", "body without impacts", "forgotten")
 
 
 def test_hard_cases_are_drawn() -> None:
-    drawn(vi.hard_cases("grazing-from-below"))
+    found = vi.hard_cases("grazing-from-below")
+    assert_shown(found, "grazing-from-below", "peak below the stop (-)", "impacts in 50 periods (-)")
 
 
 def test_orbits_are_a_list_with_a_dataset_and_both_are_drawn(scene: vi.Scene) -> None:
     orbits = vi.find_orbits(scene, 1, 1)
-    drawn(orbits)
-    drawn(orbits.dataset)
+    assert_shown(orbits, "displacement (m)", "velocity (m/s)", "P(1,1), stable")
+    assert_shown(orbits.dataset, "recorded forcing period (-)", "displacement (m)", "impact velocity (m/s)")
     assert orbits.dataset.sizes["run"] == len(orbits)
     assert orbits.dataset.impact_velocity.values[0] == orbits[0].velocities[0]
     assert len(repr(orbits[0])) < 100

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vibroimpact as vi
-from vibroimpact.analysis.figures import largest_impact_velocity
+from vibroimpact.analysis.dataset.derived import largest_impact_velocity
 from vibroimpact.analysis.orbits.classify import classify
 from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.running import run_scene

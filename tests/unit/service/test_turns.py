@@ -138,6 +138,7 @@ def test_a_busy_service_drops_no_connection_that_waits_to_be_taken() -> None:
         try:
             # a dropped connection is retried after 1 s
             waiting = [socket.create_connection(listening.getsockname(), 0.5) for _ in range(WAITING)]
+            assert {one.getpeername() for one in waiting} == {listening.getsockname()}
         finally:
             busy.set()
             server.should_exit = server.force_exit = True

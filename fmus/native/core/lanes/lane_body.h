@@ -27,6 +27,10 @@ typedef struct {
     void (*observe)(vi_lane_group *group, int lane, int modes, int contacts, double *displacement, double *velocity);
     /* Modal displacements and velocities. */
     void (*state)(const vi_lane_group *group, int lane, int modes, double q[], double p[]);
+    /* Keep the lane's state: the next samples are taken from here on. */
+    void (*sample_from)(vi_lane_group *group, int lane, int modes);
+    /* Take the samples up to the lane's instant, in the phase in which the motion since `sample_from` began. */
+    void (*take_samples)(vi_lane_group *group, const vi_lanes_plan *plan, vi_lanes_points *points, int lane);
 } vi_lane_body;
 
 extern const vi_lane_body vi_lane_one_mode, vi_lane_many_modes;

@@ -89,7 +89,8 @@ typedef struct {
      * and flat + n rise, for unit amplitudes of the modes, then for the force. */
     vi_lane_array wave[VI_LANES_MODES + 1], flat[VI_LANES_MODES + 1], rise[VI_LANES_MODES + 1];
     vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
-    vi_lane_array cosine[VI_POINTS], sine[VI_POINTS], offset[VI_POINTS]; /* steady response; level minus stop */
+    vi_lane_array cosine[VI_POINTS], sine[VI_POINTS]; /* steady response */
+    vi_lane_array rest_place[VI_POINTS], offset[VI_POINTS]; /* displacement under the held loads; the same minus stop */
     vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude <= |q| + |p + mix q| reach */
     vi_lane_array level, start_level, last;           /* level: present; in the last round; shortest */
     /* for the search */
@@ -108,6 +109,7 @@ typedef struct {
     vi_lane_array scale;                      /* m per unit of the group, of any sign */
     vi_lane_array unit[VI_LANES_CONTACTS];    /* m/s per unit of speed of the contact */
     vi_lane_array impulse[VI_LANES_CONTACTS]; /* N s for a change of the contact's speed by 1 m/s */
+    vi_lane_array number[VI_LANES_CONTACTS];  /* number in the scene, from 1; of one mode: nearest contacts come first */
     vi_lane_array origin, origin_low;         /* of the clock */
     vi_lane_array point;                      /* number of the point */
     vi_lane_array impacts;                    /* 1: each impact is recorded */
@@ -120,12 +122,12 @@ typedef struct {
     vi_lane_array doubtful;                   /* 1: `most` and `least` lack the last round, see `extremes` of the body */
 } vi_lane_record;
 
-/* The time series of the lanes, for bodies of one mode. */
+/* The time series of the lanes. */
 typedef struct {
     vi_lane_array next, count;                /* number of the next sample, from 0; of all samples of the point */
     vi_lane_array time;                       /* of the next sample, s */
-    /* state and instant from which the next samples are taken: the start of the last round */
-    vi_lane_array from_q, from_p, from_cosine, from_sine, from_periods, from_rest, from_rest_low, from_pressed;
+    /* instant from which the next samples are taken: the start of the last round; for one mode, the state there */
+    vi_lane_array from_periods, from_rest, from_rest_low, from_q, from_p, from_cosine, from_sine, from_pressed;
 } vi_lane_samples;
 
 typedef struct {

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* Most modes and contacts of a body, and most contacts of a body of one mode. */
+/* Most modes and contacts of a body, and most contacts that a body of one mode can meet: the nearest on each side. */
 enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
 /* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
@@ -32,13 +32,14 @@ enum { VI_INSTRUCTIONS_BEST = 0, VI_INSTRUCTIONS_BASELINE = 1, VI_INSTRUCTIONS_A
 /* Common parameters of all points. */
 typedef struct {
     int32_t modes;    /* 1 to VI_LANES_MODES */
-    int32_t contacts; /* 0 to VI_LANES_CONTACTS, of one mode to VI_ONE_MODE_CONTACTS */
+    int32_t contacts; /* 0 to VI_LANES_CONTACTS; with stops that yield to VI_ONE_MODE_CONTACTS */
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;
     int64_t impact_limit; /* of a run; 0: no limit */
     int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
-    double rate;          /* samples per s of the time series, of one mode; 0: none */
+    int64_t sampled;      /* sum of 2^c over the sampled contacts c, and 2^VI_LANES_CONTACTS for the observed point */
+    double rate;          /* samples per s of the time series; 0: none */
 } vi_lanes_plan;
 
 /* The points. Arrays are [point], [mode][point], [contact][point] or [contact][mode][point], in SI units.
@@ -71,9 +72,9 @@ typedef struct {
     double *periods;             /* [VI_PERIOD_WIDTH][point][most_periods] */
     int64_t *periods_of;         /* number of ended periods of each point; 0 again once it is left */
     int64_t most_periods;
-    /* Samples of each point from `begin` on, as far as it has run: q and q' of its mode. A point with more than
-     * most_samples is left. */
-    double *samples;             /* [2][point][most_samples] */
+    /* Samples of each point from `begin` on, as far as it has run. Rows: displacement (m) and velocity (m/s) of each
+     * sampled contact, then of the observed point. A point with more than most_samples is left. */
+    double *samples;             /* [2 * number of sampled points][point][most_samples] */
     int64_t *samples_of;         /* number of samples of each point; 0 again once it is left */
     int64_t most_samples;
     int64_t *rows_of;            /* number of impacts of each point; 0 again once it is left */

@@ -120,9 +120,13 @@ static void arrive(vi_lanes_work *w, int lane)
         if (w->plan->periods && g->rest[lane] == 0.0) {
             turn_period(w, lane, displacement, velocity);
         }
-        if (w->plan->rate > 0.0 && !vi_lane_begin_samples(g, w->plan, w->points, lane)) {
-            leave(w, lane);
-            return;
+        if (w->plan->rate > 0.0) {
+            if (!vi_lane_begin_samples(g, w->plan, w->points, lane)) {
+                leave(w, lane);
+                return;
+            }
+            w->body->sample_from(g, lane, w->plan->modes);
+            w->body->take_samples(g, w->plan, w->points, lane);
         }
     }
     if (vi_clock_elapsed(&run->clock, instant_of(g, lane), run->end) > 0.0) {
@@ -202,11 +206,11 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
     }
     if (event == VI_EVENT_CELL) {
         if (w->plan->rate > 0.0) {
-            vi_lane_sample_from(g, lane);
+            w->body->sample_from(g, lane, w->plan->modes);
         }
         event = search(w, lane);
         if (event != VI_EVENT_LEAVE && w->plan->rate > 0.0) {
-            vi_lane_take_samples(g, w->plan, w->points, lane);
+            w->body->take_samples(g, w->plan, w->points, lane);
         }
         if (event != VI_EVENT_LEAVE && g->record.extremes[lane] > 0.0) {
             w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
@@ -304,13 +308,14 @@ static void take_units(const vi_lanes_work *w, int lane, int64_t point)
     const vi_lanes_points *p = w->points;
     vi_lane_record *record = &w->group->record;
     for (int c = 0; c < w->plan->contacts; ++c) {
+        const int64_t contact = (int64_t)record->number[c][lane] - 1;
         double mobility = 0.0;
         for (int j = 0; j < w->plan->modes; ++j) {
-            const int64_t i = (c * w->plan->modes + j) * p->count + point;
+            const int64_t i = (contact * w->plan->modes + j) * p->count + point;
             mobility += p->shape[i] * p->impulse[i];
         }
         record->impulse[c][lane] = 1.0 / mobility;
-        record->unit[c][lane] = w->plan->modes == 1 ? fabs(p->shape[c * p->count + point]) : 1.0;
+        record->unit[c][lane] = w->plan->modes == 1 ? fabs(p->shape[contact * p->count + point]) : 1.0;
     }
 }
 
@@ -334,6 +339,9 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
     g->record.point[lane] = (double)point;
     g->record.scale[lane] = 1.0;
     g->most_impacts[lane] = w->plan->impact_limit > 0 ? (double)w->plan->impact_limit : HUGE_VAL;
+    for (int c = 0; c < w->plan->contacts; ++c) {
+        g->record.number[c][lane] = c + 1.0;
+    }
     if (!take_start(w, point, q, p) || !take_modes(w, point) || !take_time(w, lane, point)
         || !w->body->take(g, lane, w->plan, w->points, point, q, p)) {
         leave(w, lane);

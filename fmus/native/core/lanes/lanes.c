@@ -31,11 +31,14 @@ static kept_state *aligned(void *memory)
 
 static bool is_plan(const vi_lanes_plan *plan)
 {
-    const int most = plan->modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS;
-    return plan->modes >= 1 && plan->modes <= VI_LANES_MODES && plan->contacts >= 0 && plan->contacts <= most
-           && plan->yielding >= 0 && plan->yielding < (plan->modes == 1 ? 1 << plan->contacts : 1)
-           && (plan->rate == 0.0 || (plan->modes == 1 && plan->rate > 0.0 && isfinite(plan->rate)))
-           && vi_lanes_rounds_of(plan->instructions) != NULL;
+    const int most = plan->yielding ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS;
+    if (plan->modes < 1 || plan->modes > VI_LANES_MODES || plan->contacts < 0 || plan->contacts > most) {
+        return false;
+    }
+    const int64_t contacts = ((int64_t)1 << plan->contacts) - 1, observed = (int64_t)1 << VI_LANES_CONTACTS;
+    return plan->yielding >= 0 && plan->yielding <= (plan->modes == 1 ? contacts : 0)
+           && (plan->rate == 0.0 || (plan->rate > 0.0 && isfinite(plan->rate)))
+           && (plan->sampled & ~(contacts | observed)) == 0 && vi_lanes_rounds_of(plan->instructions) != NULL;
 }
 
 VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)

@@ -85,7 +85,8 @@ LANES_INLINE mask extend_by_crest(const vi_lane_group *g, int at, int modes, con
     start.sine = reached(ahead->sine, row);
     step_on(at, modes, many->half, many->half_cosine, many->half_sine, &start, &middle);
     expand_modes(g, at, modes, &middle, &d);
-    const vector third = expand_contact(g, at, modes, VI_LANES_CONTACTS, &middle, &d, term), second = 2.0 * term[2];
+    const vector third = expand_point(g, at, modes, VI_LANES_CONTACTS, many->offset, &middle, &d, term);
+    const vector second = 2.0 * term[2];
     const mask concave = -second > third, convex = second > third;
     const vector low = all(-1.0), high = length - 1.0;
     const vector first_slope = motion_by(term, VI_LANE_ORDER, low).slope;

@@ -5,6 +5,7 @@
 #include "body/landing.h"
 #include "lanes/lane_body.h"
 #include "lanes/lane_turn.h"
+#include "lanes/many_sampling.h"
 #include "lanes/many_tables.h"
 #include "motion/majorant.h"
 
@@ -279,4 +280,5 @@ static void state(const vi_lane_group *g, int lane, int modes, double q[], doubl
     }
 }
 
-const vi_lane_body vi_lane_many_modes = {vi_lane_take_many, search, rebound, extremes, observe, state};
+const vi_lane_body vi_lane_many_modes = {
+    vi_lane_take_many, search, rebound, extremes, observe, state, vi_lane_sample_many_from, vi_lane_take_samples_of_many};

@@ -1,4 +1,7 @@
 /* The search of bodies of several modes, in all lanes at once: the first contact in one shortest cell. */
+#ifndef VIBROIMPACT_MANY_SEARCH_H
+#define VIBROIMPACT_MANY_SEARCH_H
+
 #include "lanes/many_cells.h"
 
 /* Reciprocals of the factorials. */
@@ -90,9 +93,9 @@ LANES_INLINE void expand_modes(const vi_lane_group *g, int at, int modes, const 
     }
 }
 
-/* Set the Taylor terms of a contact's displacement; returns a bound of its third derivative over the cell. */
-LANES_INLINE vector expand_contact(const vi_lane_group *g, int at, int modes, int c, const modal_state *s,
-                                   const derivatives *d, vector term[])
+/* Set the Taylor terms of a point's displacement from `offset`; returns a bound of its third derivative over the cell. */
+LANES_INLINE vector expand_point(const vi_lane_group *g, int at, int modes, int c, const vi_lane_array offset[],
+                                 const modal_state *s, const derivatives *d, vector term[])
 {
     const vi_many_modes *many = &g->many;
     const vector a = load(many->cosine[c] + at), b = load(many->sine[c] + at), angle = load(many->turn + at);
@@ -103,7 +106,7 @@ LANES_INLINE vector expand_contact(const vi_lane_group *g, int at, int modes, in
     for (int n = 2; n <= VI_LANE_ORDER; ++n) {
         term[n] = square * term[n - 2];
     }
-    term[0] += load(many->offset[c] + at);
+    term[0] += load(offset[c] + at);
     for (int j = 0; j < modes; ++j) {
         const vector shape = load(many->shape[c][j] + at);
 #pragma GCC unroll 16
@@ -210,7 +213,7 @@ LANES_INLINE void meet(const vi_lane_group *g, int at, int modes, int c, mask me
 {
     const vi_many_modes *many = &g->many;
     vector term[VI_LANE_ORDER + 1], size = load(many->size[c] + at), pull = load(many->steady_pull[c] + at);
-    const vector third = expand_contact(g, at, modes, c, &cell->start, d, term), length = first->share;
+    const vector third = expand_point(g, at, modes, c, many->offset, &cell->start, d, term), length = first->share;
     for (int j = 0; j < modes; ++j) {
         const vector reach = size_of(load(many->shape[c][j] + at)) * cell->amplitude[j];
         size += reach;
@@ -265,3 +268,5 @@ LANES_INLINE void state_at(const vi_lane_group *g, int at, int modes, const deri
         p[j] = v * rate;
     }
 }
+
+#endif

@@ -94,12 +94,14 @@ static void take_point(vi_lane_group *g, int lane, int point, int modes, double 
 {
     vi_many_modes *many = &g->many;
     many->cosine[point][lane] = many->sine[point][lane] = 0.0;
+    many->rest_place[point][lane] = 0.0;
     many->offset[point][lane] = -direction * position;
     for (int j = 0; j < modes; ++j) {
         const double s = direction * shape[j];
         many->shape[point][j][lane] = s;
         many->cosine[point][lane] += s * many->steady_cosine[j][lane];
         many->sine[point][lane] += s * many->steady_sine[j][lane];
+        many->rest_place[point][lane] += s * many->rest[j][lane];
         many->offset[point][lane] += s * many->rest[j][lane];
     }
 }

@@ -6,6 +6,7 @@
 #include "lanes/lane_body.h"
 #include "lanes/lane_tables.h"
 #include "lanes/lane_turn.h"
+#include "lanes/sampling.h"
 #include "motion/majorant.h"
 
 /* Largest steady response that counts in the resolution, in units of the force's effect within one radian. */
@@ -204,27 +205,70 @@ static void state(const vi_lane_group *g, int lane, int modes, double q[], doubl
 
 /* ---- the start ---- */
 
+/* A contact of a point in units of the mode: it is free while sign q < limit. */
+typedef struct {
+    double number, sign, limit; /* number: from 1 */
+} limited;
+
+/* Put the nearest contact of each side first: a body of one mode meets no other. False where rounding decides which one
+ * is the nearest. */
+static bool order_contacts(int contacts, limited of[])
+{
+    for (int c = 1; c < contacts; ++c) {
+        const limited moved = of[c];
+        int place = c;
+        for (; place > 0 && moved.limit < of[place - 1].limit; --place) {
+            of[place] = of[place - 1];
+        }
+        of[place] = moved;
+    }
+    int other = 1;
+    while (other < contacts - 1 && of[other].sign == of[0].sign) {
+        other += 1;
+    }
+    const limited second = of[other];
+    for (; other > 1; --other) {
+        of[other] = of[other - 1];
+    }
+    of[1] = second;
+    for (int c = 1; c < contacts; ++c) {
+        const limited *nearest = &of[of[c].sign == of[0].sign ? 0 : 1];
+        if (nearest != &of[c]
+            && !(of[c].limit - nearest->limit > VI_ROUNDING * (fabs(of[c].limit) + fabs(nearest->limit)))) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Set the contacts of a point; false where one is invalid, the start is not clear of it, or the stops leave no room. */
 static bool take_contacts(vi_lane_group *g, int lane, int contacts, const vi_lanes_points *p, int64_t point, double size)
 {
-    double room = 0.0;
+    limited of[VI_LANES_CONTACTS] = {{0.0, 0.0, 0.0}};
     for (int c = 0; c < contacts; ++c) {
         const int64_t i = c * p->count + point;
-        const double unit = fabs(p->shape[i]), sign = p->shape[i] * p->direction[i] > 0.0 ? 1.0 : -1.0;
-        const double limit = p->direction[i] * p->position[i] / unit, q = g->q[0][lane];
+        of[c] = (limited){c + 1.0, p->shape[i] * p->direction[i] > 0.0 ? 1.0 : -1.0,
+                          p->direction[i] * p->position[i] / fabs(p->shape[i])};
+    }
+    if (contacts > VI_ONE_MODE_CONTACTS && !order_contacts(contacts, of)) {
+        return false;
+    }
+    for (int c = 0; c < contacts; ++c) {
+        const int64_t i = ((int64_t)of[c].number - 1) * p->count + point;
+        const double unit = fabs(p->shape[i]), sign = of[c].sign, limit = of[c].limit, q = g->q[0][lane];
         const double pressure = g->one.load[lane] + g->one.stiffness[lane] * fabs(limit);
         const bool is_free = limit - sign * q > VI_ROUNDING * (fabs(limit) + fabs(q));
         if (!vi_lane_is_contact(p, i) || !(p->shape[i] * p->impulse[i] > 0.0) || !isfinite(limit) || !is_free) {
             return false;
         }
-        room += c == 0 || sign != g->sign[0][lane] ? limit : HUGE_VAL;
+        g->record.number[c][lane] = of[c].number;
         g->sign[c][lane] = sign;
         g->limit[c][lane] = limit;
         g->restitution[c][lane] = p->restitution[i];
         g->yield_velocity[c][lane] = p->yield_velocity[i] / unit;
         g->resolution[c][lane] = 2.0 * pressure * DBL_EPSILON * (fabs(limit) + size);
     }
-    return contacts < 2 || room > 0.0;
+    return contacts < 2 || of[0].sign == of[1].sign || of[0].limit + of[1].limit > 0.0;
 }
 
 static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points, int64_t point,
@@ -249,4 +293,5 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     return take_contacts(g, lane, plan->contacts, points, point, steady);
 }
 
-const vi_lane_body vi_lane_one_mode = {take, search, rebound, extremes, observe, state};
+const vi_lane_body vi_lane_one_mode = {take,    search, rebound,             extremes,
+                                            observe, state,  vi_lane_sample_from, vi_lane_take_samples};

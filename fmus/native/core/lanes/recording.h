@@ -17,17 +17,25 @@ LANES_INLINE vector error_of_product(vector a, vector b, vector product)
     return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
 
+/* Time of some instants, s, in two parts: vi_clock_elapsed_twofold from time 0. */
+LANES_INLINE vector twofold_time_of(const vi_lane_group *g, int at, vector count, vector rest, vector rest_low,
+                                    vector *low)
+{
+    const vector period = load(g->period + at), origin = load(g->record.origin + at), whole = count * period;
+    *low = error_of_product(count, period, whole) + count * load(g->period_low + at)
+           - load(g->record.origin_low + at) + rest_low;
+    const vector sum = whole + rest, shifted = sum - origin;
+    *low += error_of_sum(whole, rest, sum);
+    *low += error_of_sum(sum, -origin, shifted);
+    return shifted;
+}
+
 /* Time of the present instants, s: vi_clock_time. */
 LANES_INLINE vector time_of(const vi_lane_group *g, int at)
 {
-    const vector count = load(g->periods + at), period = load(g->period + at), rest = load(g->rest + at);
-    const vector origin = load(g->record.origin + at), whole = count * period;
-    vector low = error_of_product(count, period, whole) + count * load(g->period_low + at)
-                 - load(g->record.origin_low + at) + load(g->rest_low + at);
-    const vector sum = whole + rest, shifted = sum - origin;
-    low += error_of_sum(whole, rest, sum);
-    low += error_of_sum(sum, -origin, shifted);
-    return shifted + low;
+    vector low;
+    const vector high = twofold_time_of(g, at, load(g->periods + at), load(g->rest + at), load(g->rest_low + at), &low);
+    return high + low;
 }
 
 /* Phase of the force at the present instants, rad: vi_clock_phase. */
@@ -41,13 +49,14 @@ LANES_INLINE vector phase_of(const vi_lane_group *g, int at)
 LANES_INLINE void write_impacts(const vi_lane_group *g, vi_lanes_points *points, int at, int contacts, mask hits)
 {
     const vector number = load(g->hit + at);
-    vector unit = all(1.0), impulse = unit, restitution = all(0.0), yields = restitution;
+    vector unit = all(1.0), impulse = unit, restitution = all(0.0), yields = restitution, contact = restitution;
     for (int c = 0; c < contacts; ++c) {
         const mask here = number == (double)(c + 1);
         unit = choose(here, load(g->record.unit[c] + at), unit);
         impulse = choose(here, load(g->record.impulse[c] + at), impulse);
         restitution = choose(here, load(g->restitution[c] + at), restitution);
         yields = choose(here, load(g->yield_velocity[c] + at), yields);
+        contact = choose(here, load(g->record.number[c] + at), contact);
     }
     const vector speed = load(g->approach + at) * unit;
     yields = yields * unit;
@@ -56,7 +65,7 @@ LANES_INLINE void write_impacts(const vi_lane_group *g, vi_lanes_points *points,
         restitution = choose(softer, restitution / root(root(speed / yields)), restitution);
     }
     const vector row[VI_IMPACT_WIDTH] = {time_of(g, at), phase_of(g, at), speed, (1.0 + restitution) * speed * impulse,
-                                         number, restitution, all(0.0), all((double)NAN)};
+                                         contact, restitution, all(0.0), all((double)NAN)};
     double *rows = points->rows + points->rows_used * VI_IMPACT_WIDTH;
     for (int i = 0; i < VI_WIDTH; ++i) {
         if (hits[i]) {

@@ -1,6 +1,7 @@
 /* The lockstep of bodies of several modes: certified cells, ever shorter up to a contact, which the search finds.
  * Included by one C file for each instruction set; it names VI_ROUNDS, the lockstep for all bodies. */
 #include "lanes/many_extremes.h"
+#include "lanes/many_samples.h"
 #include "lanes/many_tables.h"
 #include "lanes/rounds_yielding.h"
 
@@ -153,6 +154,9 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
     certified_flight s;
     vector amplitude[VI_LANES_MODES];
     begin_round_many(g, at, modes, &ahead, amplitude);
+    if (plan->rate > 0.0) {
+        sample_instants_from(g, at);
+    }
     const vector to_goal = seconds_to_goal(g, at) * load(g->many.present.rate + at), none = all(0.0);
     const vector most = whole_part(smaller(larger(to_goal, none), all((double)VI_CELLS)));
     fly(g, at, modes, contacts, amplitude, most, &ahead, &s);
@@ -163,6 +167,9 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
         r = search_many(g, at, modes, contacts, amplitude, searched, &s);
     }
     move_clock(g, at, s.passed * load(g->many.present.cells + at) + r.half, r.first.share, r.arrives);
+    if (plan->rate > 0.0 && any(may_have_samples(g, at))) {
+        take_samples_of_many(g, plan, points, at);
+    }
     mask doubtful = never;
     if (any(load(g->record.extremes + at) > 0.0)) {
         doubtful = extend_range(g, at, modes, amplitude, &ahead, &s.now, s.passed, r.half + r.first.share);

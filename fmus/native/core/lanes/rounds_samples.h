@@ -19,12 +19,21 @@ LANES_INLINE void sample_from(vi_lane_group *g, int at, vector q, vector p, vect
     store(samples->from_pressed + at, load(g->yielding.pressed_stop + at));
 }
 
+/* Lanes that may have a sample up to the present instants. */
+LANES_INLINE mask may_have_samples(const vi_lane_group *g, int at)
+{
+    const mask sampled = load(g->samples.next + at) < load(g->samples.count + at);
+    if (!any(sampled)) {
+        return sampled;
+    }
+    /* a sample at the end of the round may be after it by rounding */
+    return sampled & (load(g->samples.time + at) <= time_of(g, at) * (1.0 + 16.0 * 2.220446049250313e-16));
+}
+
 /* Take the samples of some lanes since the start of the round, after their clocks have moved. */
 LANES_INLINE void take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, mask where)
 {
-    /* a sample at the end of the round may be after it by rounding */
-    const vector now = time_of(g, at) * (1.0 + 16.0 * 2.220446049250313e-16);
-    const mask samples = (load(g->samples.next + at) < load(g->samples.count + at)) & (load(g->samples.time + at) <= now);
+    const mask samples = may_have_samples(g, at);
     for (int i = 0; i < VI_WIDTH; ++i) {
         if (samples[i] & where[i]) {
             vi_lane_take_samples(g, plan, points, at + i);

@@ -1,6 +1,5 @@
 #include "lanes/sampling.h"
 
-#include <float.h>
 #include <math.h>
 
 #include "lanes/lane_state.h"
@@ -10,8 +9,6 @@
 
 /* Relative excess over the last sample that counts as rounding of the recording's length. */
 static const double LAST = 1e-12;
-/* Rounding of a time, relative to its size: a sample so close after an event is taken before it. */
-static const double ROUNDING_OF_TIME = 4.0 * DBL_EPSILON;
 
 static vi_clock clock_of(const vi_lane_group *g, int lane)
 {
@@ -27,7 +24,18 @@ static void set_next(vi_lane_group *g, const vi_lanes_plan *plan, const vi_lanes
     g->samples.time[lane] = vi_min(points->begin[point] + number / plan->rate, points->end[point]);
 }
 
-bool vi_lane_begin_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
+int vi_lane_sampled(const vi_lanes_plan *plan, int sampled[VI_POINTS])
+{
+    int count = 0;
+    for (int point = 0; point < VI_POINTS; ++point) {
+        if ((plan->sampled >> point) & 1) {
+            sampled[count++] = point;
+        }
+    }
+    return count;
+}
+
+bool vi_lane_begin_samples(vi_lane_group *g, const vi_lanes_plan *plan, const vi_lanes_points *points, int lane)
 {
     const int64_t point = (int64_t)g->record.point[lane];
     const double count = floor((points->end[point] - points->begin[point]) * plan->rate * (1.0 + LAST)) + 1.0;
@@ -36,13 +44,31 @@ bool vi_lane_begin_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes
     }
     g->samples.count[lane] = count;
     set_next(g, plan, points, lane, 0.0);
-    vi_lane_sample_from(g, lane);
-    vi_lane_take_samples(g, plan, points, lane);
     return true;
 }
 
-void vi_lane_sample_from(vi_lane_group *g, int lane)
+void vi_lane_write_sample(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane,
+                          const double displacement[], const double velocity[])
 {
+    const int64_t point = (int64_t)g->record.point[lane], n = (int64_t)g->samples.next[lane];
+    const int64_t row = points->count * points->most_samples;
+    double *sample = points->samples + point * points->most_samples + n;
+    for (int64_t left = plan->sampled, k = 0; left > 0; left >>= 1) {
+        if (left & 1) {
+            sample[2 * k * row] = displacement[k];
+            sample[(2 * k + 1) * row] = velocity[k];
+            k += 1;
+        }
+    }
+    points->samples_of[point] = n + 1;
+    set_next(g, plan, points, lane, g->samples.next[lane] + 1.0);
+}
+
+/* ---- bodies of one mode ---- */
+
+void vi_lane_sample_from(vi_lane_group *g, int lane, int modes)
+{
+    (void)modes;
     vi_lane_samples *samples = &g->samples;
     samples->from_q[lane] = g->q[0][lane];
     samples->from_p[lane] = g->p[0][lane];
@@ -59,12 +85,23 @@ typedef struct {
     double cell, rate;        /* length of a cell, s, and its reciprocal */
     double sign, level;       /* q = sign * (level + state) */
     double most, least;       /* of q, between rigid stops */
+    double shape[VI_POINTS];  /* of the sampled points */
+    int sampled;
 } sampled_phase;
 
-static sampled_phase phase_of_lane(const vi_lane_group *g, const vi_lanes_plan *plan, int lane)
+static sampled_phase phase_of_lane(const vi_lane_group *g, const vi_lanes_plan *plan, const vi_lanes_points *points,
+                                   int lane)
 {
+    const int64_t point = (int64_t)g->record.point[lane];
     const int pressed = (int)g->samples.from_pressed[lane];
-    sampled_phase phase = {&g->one, g->one.span[lane] / VI_CELLS, VI_CELLS / g->one.span[lane], 1.0, 0.0, HUGE_VAL, -HUGE_VAL};
+    sampled_phase phase = {&g->one, g->one.span[lane] / VI_CELLS, VI_CELLS / g->one.span[lane], 1.0, 0.0,
+                           HUGE_VAL, -HUGE_VAL, {0.0}, 0};
+    int sampled[VI_POINTS];
+    phase.sampled = vi_lane_sampled(plan, sampled);
+    for (int k = 0; k < phase.sampled; ++k) {
+        phase.shape[k] = sampled[k] == VI_LANES_CONTACTS ? points->observed[point]
+                                                         : points->shape[sampled[k] * points->count + point];
+    }
     if (pressed > 0) {
         const int c = pressed - 1;
         phase.tables = &g->yielding.pressed[c];
@@ -74,7 +111,7 @@ static sampled_phase phase_of_lane(const vi_lane_group *g, const vi_lanes_plan *
         phase.level = g->limit[c][lane];
         return phase;
     }
-    for (int c = 0; c < plan->contacts; ++c) {
+    for (int c = 0; c < plan->contacts && c < VI_ONE_MODE_CONTACTS; ++c) { /* nearest contacts come first */
         if (g->yielding.yields[c][lane] == 0.0 && g->sign[c][lane] > 0.0) {
             phase.most = vi_min(phase.most, g->limit[c][lane]);
         } else if (g->yielding.yields[c][lane] == 0.0) {
@@ -84,14 +121,16 @@ static sampled_phase phase_of_lane(const vi_lane_group *g, const vi_lanes_plan *
     return phase;
 }
 
-static void write_sample(vi_lane_group *g, vi_lanes_points *points, int lane, const sampled_phase *phase, double state,
-                         double rate)
+static void write_sample(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane,
+                         const sampled_phase *phase, double state, double rate)
 {
-    const int64_t point = (int64_t)g->record.point[lane], n = (int64_t)g->samples.next[lane];
-    double *sample = points->samples + point * points->most_samples + n;
-    sample[0] = vi_max(phase->least, vi_min(phase->most, phase->sign * (phase->level + state)));
-    sample[points->count * points->most_samples] = phase->sign * rate;
-    points->samples_of[point] = n + 1;
+    const double q = vi_max(phase->least, vi_min(phase->most, phase->sign * (phase->level + state)));
+    double displacement[VI_POINTS], velocity[VI_POINTS];
+    for (int k = 0; k < phase->sampled; ++k) {
+        displacement[k] = phase->shape[k] * q;
+        velocity[k] = phase->shape[k] * (phase->sign * rate);
+    }
+    vi_lane_write_sample(g, plan, points, lane, displacement, velocity);
 }
 
 void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int lane)
@@ -103,8 +142,8 @@ void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_
     const vi_instant now = {(int64_t)g->periods[lane], g->rest[lane], g->rest_low[lane]};
     double low;
     const double high = vi_clock_elapsed_twofold(&clock, zero, from, &low), length = vi_clock_elapsed(&clock, from, now);
-    const double slack = ROUNDING_OF_TIME * (fabs(high) + length);
-    const sampled_phase phase = phase_of_lane(g, plan, lane);
+    const double slack = VI_ROUNDING_OF_TIME * (fabs(high) + length);
+    const sampled_phase phase = phase_of_lane(g, plan, points, lane);
     vi_lane_state state = {samples->from_q[lane], samples->from_p[lane], samples->from_cosine[lane],
                            samples->from_sine[lane]};
     vi_lane_cell cell = {{0.0}};
@@ -126,7 +165,6 @@ void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_
             expanded = whole;
         }
         vi_lane_cell_at(&cell, cells - (double)whole, &value, &slope);
-        write_sample(g, points, lane, &phase, value, slope * phase.rate);
-        set_next(g, plan, points, lane, samples->next[lane] + 1.0);
+        write_sample(g, plan, points, lane, &phase, value, slope * phase.rate);
     }
 }

@@ -8,6 +8,7 @@
 #include "lanes/lane_state.h"
 #include "lanes/lane_tables.h"
 #include "lanes/lane_turn.h"
+#include "lanes/sampling.h"
 #include "motion/majorant.h"
 
 #define VI_WIDTH 1
@@ -433,4 +434,5 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
     return true;
 }
 
-const vi_lane_body vi_lane_yielding = {take, search, rebound, extremes, observe, state};
+const vi_lane_body vi_lane_yielding = {take,    search, rebound,             extremes,
+                                            observe, state,  vi_lane_sample_from, vi_lane_take_samples};

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import typer
 import xarray as xr
-from support.dataset_examples import dataset_of, record, up_down
+from support.dataset_examples import dataset_of, opened, record, up_down
 from support.replay_signals import HIT, channel, clock, ring
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.figures.families import FAMILIES
@@ -25,11 +25,6 @@ from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_r
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.commands.typer_form import add_commands
-
-
-def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
-    write_dataset(dataset, folder / "runs.nc")
-    return open_dataset(folder / "runs.nc")
 
 
 def grid(impacts: list[float], folder: Path) -> xr.Dataset:

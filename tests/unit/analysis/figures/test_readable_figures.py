@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
-from support.dataset_examples import dataset_of, record
+from support.dataset_examples import dataset_of, opened, record
 from support.impact_sweep import SCENE
 
-from vibroimpact.analysis import figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, OrbitClass
 from vibroimpact.analysis.figures.sweep.classes import OTHER_COLOUR, OWN_COLOURS
@@ -20,11 +20,6 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 
 TWO_STOPS = SCENE + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.7\n'
 NONDIMENSIONAL = {"units": "nondimensional"}
-
-
-def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
-    write_dataset(dataset, folder / "runs.nc")
-    return open_dataset(folder / "runs.nc")
 
 
 def long_run(turns: int, start: float = 0.0) -> xr.Dataset:

@@ -6,29 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.typing import NDArray
+from support.campaign_scenes import swept_text
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.jumps import RunClasses, classes_of, jumps_of
 
-SCENE = """
-[scene]
-units = "nondimensional"
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.05
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 1.0
-restitution = 0.7
-[record]
-transient_periods = 200
-recorded_periods = 10
-[sweep]
-"""
+SCENE = swept_text(transient_periods=200, recorded_periods=10)
 
 
 def swept(line: str) -> xr.Dataset:

@@ -118,7 +118,7 @@ def test_a_call_that_lets_no_thread_run_ends_though_its_caller_is_gone(tmp_path:
     wait_until((tmp_path / "begun").exists)
     (below,) = psutil.Process(caller.pid).children()
     caller.kill()
-    caller.wait()
+    assert caller.wait() == -signal.SIGKILL
     wait_until(lambda: ended(below.pid))
 
 

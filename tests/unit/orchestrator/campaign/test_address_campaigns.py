@@ -12,11 +12,11 @@ from pathlib import Path
 import fsspec
 import pytest
 import s3fs
-from support.campaign_scenes import assert_same_datasets
+from support.campaign_scenes import assert_same_datasets, axis
 from support.command_line import in_this_process
-from support.object_store import bucket_of, close_all, served
+from support.object_store import close_all
 from support.serial_pool import Notes, campaign_here
-from support.store_scenes import BODY, axis
+from support.store_scenes import BODY
 
 import vibroimpact.analysis.files.object_lock as object_lock
 import vibroimpact.orchestrator.campaign.formats as formats
@@ -47,18 +47,6 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(object_lock, "LEASE_SECONDS", 0.4)
     yield
     fsspec.filesystem("memory").store.clear()
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with served() as url:
-        yield url
-
-
-@pytest.fixture
-def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
-    with bucket_of(endpoint, monkeypatch) as system:
-        yield system
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 import xarray as xr
-from support.campaign_scenes import TIMING, assert_same_rows
+from support.campaign_scenes import TIMING, assert_same_rows, axis, frequency, swept_text
 from support.serial_pool import Notes, campaign_here
 
 import vibroimpact.analysis.dataset.flat_file as flat_file
@@ -21,46 +21,19 @@ from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
 
-BODY = """
-[scene]
-title = "{title}"
-units = "nondimensional"
-[body]
-mass = 0.001
-stiffness = 1.0
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 1.0
-restitution = {restitution}
-[record]
-transient_periods = 10
-recorded_periods = 2
-[sweep]
-"""
+
+def sweep(*axes: str, **options: Any) -> str:
+    return swept_text(*axes, mass=0.001, damping_ratio=0.0, **options)
 
 
-def sweep(*axes: str, title: str = "a sweep", restitution: float = 0.7) -> str:
-    return BODY.format(title=title, restitution=restitution) + "\n".join(axes)
-
-
-def frequency(points: int, path: str = "independent") -> str:
-    return f'"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}'
-
-
-def values(key: str, *numbers: float, path: str = "independent") -> str:
-    return f'"{key}" = {{ values = {list(numbers)}, path = "{path}" }}'
-
-
-ONE, THREE = values("forcing.amplitude", 0.5), values("forcing.amplitude", 0.5, 0.4, 0.6)
+ONE, THREE = axis("forcing.amplitude", [0.5]), axis("forcing.amplitude", [0.5, 0.4, 0.6])
 
 
 def test_the_files_of_a_cut_off_extension_go_with_the_next_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = sweep(values("forcing.amplitude", 0.1, 0.2))
-    for text in (small, small, sweep(values("forcing.amplitude", 0.1, 0.2, 0.3))):
+    small = sweep(axis("forcing.amplitude", [0.1, 0.2]))
+    for text in (small, small, sweep(axis("forcing.amplitude", [0.1, 0.2, 0.3]))):
         left = tmp_path / "campaign" / ".earlier-rows"
         left.mkdir(parents=True, exist_ok=True)
         (left / "000000.nc").write_bytes(b"half a file")
@@ -71,8 +44,8 @@ def test_the_files_of_a_cut_off_extension_go_with_the_next_command(
 GROWN = {
     "twice as fine": (sweep(frequency(101)), sweep(frequency(201)), 101),
     "an appended value": (
-        sweep(values("forcing.amplitude", 0.1, 0.2, 0.3)),
-        sweep(values("forcing.amplitude", 0.1, 0.2, 0.3, 0.25)),
+        sweep(axis("forcing.amplitude", [0.1, 0.2, 0.3])),
+        sweep(axis("forcing.amplitude", [0.1, 0.2, 0.3, 0.25])),
         3,
     ),
     "another axis": (sweep(frequency(11)), sweep(THREE, frequency(11)), 11),
@@ -80,13 +53,13 @@ GROWN = {
     "an axis taken away": (sweep(THREE, frequency(11)), sweep(frequency(11)), 11),
     "axes the other way round": (sweep(THREE, frequency(5)), sweep(frequency(5), THREE), 15),
     "a path up to the first other value": (
-        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.005, path="up")),
-        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.004, 0.005, 0.006, path="up")),
+        sweep(axis("body.mass", [0.001, 0.002, 0.003, 0.005], path="up")),
+        sweep(axis("body.mass", [0.001, 0.002, 0.003, 0.004, 0.005, 0.006], path="up")),
         3,
     ),
     "a path that goes further": (
-        sweep(values("body.mass", 0.001, 0.002, 0.003, path="up")),
-        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.004, path="up")),
+        sweep(axis("body.mass", [0.001, 0.002, 0.003], path="up")),
+        sweep(axis("body.mass", [0.001, 0.002, 0.003, 0.004], path="up")),
         3,
     ),
     "a path down as well": (sweep(frequency(9, "up")), sweep(frequency(9, "up-down")), 9),
@@ -188,11 +161,11 @@ def test_points_that_the_new_sweep_does_not_have_are_not_thrown_away(
     [
         (sweep(frequency(21), restitution=0.8), "stop[1].restitution was 0.7, is 0.8"),
         (
-            sweep(values("forcing.amplitude", 0.4, 0.6), frequency(11)),
+            sweep(axis("forcing.amplitude", [0.4, 0.6]), frequency(11)),
             "sweep.forcing.amplitude.path was absent",
         ),
         (sweep(frequency(11, "down")), 'path was "independent", is "down"'),
-        (sweep(values("forcing.phase", 0.5, 1.0)), "sweep.forcing.angular_frequency.path"),
+        (sweep(axis("forcing.phase", [0.5, 1.0])), "sweep.forcing.angular_frequency.path"),
     ],
 )
 def test_what_has_no_equal_point_is_refused_and_nothing_is_touched(

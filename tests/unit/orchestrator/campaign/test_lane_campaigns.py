@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.campaign_process import CampaignProcess
-from support.campaign_scenes import assert_same_rows, scene_of
+from support.campaign_scenes import assert_same_rows, axis, frequency, scene_of, swept_text
 from support.serial_pool import campaign_here
 
 import vibroimpact.orchestrator.campaign.schedule as schedule
@@ -20,34 +20,11 @@ from vibroimpact.orchestrator.campaign.manifest import read_manifest, write_mani
 from vibroimpact.orchestrator.run.point import ENGINE
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 
-BODY = """
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.05
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 0.3
-restitution = 0.7
-[record]
-transient_periods = 10
-recorded_periods = 2
-[sweep]
-"""
-RESTITUTION = '"stop[1].restitution" = { values = [0.0, 0.4, 0.8] }\n'
-
-
-def frequency(path: str, points: int = 9) -> str:
-    return (
-        f'"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}\n'
-    )
-
-
-MAP = BODY + RESTITUTION + frequency("independent")
-BRANCHES = BODY + RESTITUTION + frequency("up-down")
-PATH = BODY + frequency("up-down")
+BODY = swept_text(position=0.3)
+RESTITUTION = axis("stop[1].restitution", [0.0, 0.4, 0.8]) + "\n"
+MAP = BODY + RESTITUTION + frequency(9, "independent")
+BRANCHES = BODY + RESTITUTION + frequency(9, "up-down")
+PATH = BODY + frequency(9, "up-down")
 
 
 @pytest.mark.parametrize("text", [MAP, BRANCHES], ids=["map", "branches"])
@@ -77,7 +54,7 @@ def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lane
     path: str, points: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     restitution = '"stop[1].restitution" = { start = 0.0, stop = 0.9, points = 40 }\n'
-    text = BODY + restitution + frequency(path, points)
+    text = BODY + restitution + frequency(points, path)
     whole = campaign_here(monkeypatch, text, tmp_path / "whole", runner=DEFAULT_RUNNER)
     rests = read_flat(whole.dataset).stick_count.values > 0
     assert 0 < np.count_nonzero(rests) < rests.size  # lanes leave out points that rest
@@ -100,11 +77,11 @@ def test_kill_9_of_a_worker_and_of_the_campaign_changes_no_bit_of_points_in_lane
 def test_a_path_that_is_extended_by_another_key_goes_on_fused_as_it_began(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    wider = BODY + RESTITUTION.replace("0.8", "0.7") + frequency("up-down")
+    wider = BODY + RESTITUTION.replace("0.8", "0.7") + frequency(9, "up-down")
     campaign_here(monkeypatch, PATH, tmp_path / "path", runner=DEFAULT_RUNNER)
     report = campaign_here(monkeypatch, wider, tmp_path / "path", runner=DEFAULT_RUNNER)
     assert report.resumed == 18
-    fused = wider + '[execution]\nhow = "fused"\n'
+    fused = wider + '\n[execution]\nhow = "fused"\n'
     alone = campaign_here(monkeypatch, fused, tmp_path / "fused", runner=DEFAULT_RUNNER)
     assert_same_rows(report.dataset, alone.dataset)
     assert read_flat(report.dataset).attrs["execution"] == "fused"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.campaign_scenes import assert_same_rows
+from support.campaign_scenes import assert_same_rows, swept_text
 from support.serial_pool import campaign_here
 
 from vibroimpact.analysis import open_dataset
@@ -19,25 +19,7 @@ from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import parse_scene
 
-BODY = """
-[scene]
-units = "nondimensional"
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.05
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 1.0
-restitution = 0.7
-[record]
-transient_periods = 100
-recorded_periods = 10
-strobe = true
-[sweep]
-"""
+BODY = swept_text(transient_periods=100, recorded_periods=10)
 PATH = BODY + (
     '"forcing.angular_frequency" = { start = 1.2, stop = 1.6, points = 9, path = "up-down", '
     "adaptive = { tolerance = 5e-3, at_most = 200 } }\n"

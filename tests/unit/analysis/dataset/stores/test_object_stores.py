@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ import s3fs
 import xarray as xr
 from support.command_line import in_this_process
 from support.dataset_examples import dataset_of, record
-from support.object_store import bucket_of, close_all, served
+from support.object_store import close_all
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import dataset_place, write_dataset
@@ -18,18 +17,6 @@ from vibroimpact.fmus.errors import DatasetError
 
 pytestmark = pytest.mark.long
 """The server alone takes seconds; stores in memory have the same path through fsspec."""
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with served() as url:
-        yield url
-
-
-@pytest.fixture
-def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
-    with bucket_of(endpoint, monkeypatch) as system:
-        yield system
 
 
 @pytest.fixture

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -24,6 +22,7 @@ from support.dataset_examples import (
     dataset_of,
     everything,
     failed,
+    grid_of_runs,
     record,
     up_down,
 )
@@ -45,7 +44,6 @@ from vibroimpact.analysis.dataset.stores import grid as store_grid
 from vibroimpact.analysis.dataset.stores.converting import convert, convert_dataset
 from vibroimpact.analysis.dataset.stores.grid import StoreGrid
 from vibroimpact.analysis.dataset.stores.store import LABELS, StoreWriter, create_store
-from vibroimpact.analysis.files import stores
 from vibroimpact.analysis.files.stores import system_of, zarr_package
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
@@ -92,14 +90,6 @@ def small_shards(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cut stores into chunks of 2 and shards of about 6 points."""
     monkeypatch.setattr(store_grid, "CHUNK_POINTS", 2)
     monkeypatch.setattr(store_grid, "SHARD_POINTS", 6)
-
-
-def grid_of_runs() -> xr.Dataset:
-    axes = itertools.product([2.0, 1.0, 4.0], [0.3, 0.1, 0.2, 0.4, 0.5])
-    points = np.array(list(axes))
-    runs = [record(float(k), impacts=k % 3, sticks=k % 2, samples=1) for k in range(len(points))]
-    runs[4] = failed("it broke: \u03c9 too large")
-    return dataset_of(runs, coordinates={"mass": points[:, 0], "restitution": points[:, 1]})
 
 
 def along_one_dimension() -> xr.Dataset:
@@ -247,30 +237,11 @@ def test_xarray_alone_opens_a_store_with_its_coordinates(tmp_path: Path) -> None
         assert plain["outcome"].attrs["flag_meanings"] == ours["outcome"].attrs["flag_meanings"]
 
 
-# ---- writing ----
-
-
-@pytest.fixture(scope="module")
-def cut_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("cut")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(store_grid, "CHUNK_POINTS", 2)
-        patch.setattr(store_grid, "SHARD_POINTS", 4)
-        write_dataset(grid_of_runs(), folder / "a.nc")
-        convert_dataset(folder / "a.nc", folder / "a.zarr")
-    return folder
-
-
-@pytest.fixture
-def made(cut_store: Path, tmp_path: Path) -> Path:
-    """A finished store of several shards, and the file that it was made of."""
-    for name in ("a.nc", "a.zarr"):
-        (shutil.copytree if name == "a.zarr" else shutil.copy)(cut_store / name, tmp_path / name)
-    return tmp_path / "a.zarr"
-
-
 def first_object(made: Path, name: str) -> Path:
     return sorted(path for path in (made / name / "c").rglob("*") if path.is_file())[0]
+
+
+# ---- writing ----
 
 
 def test_a_store_is_no_dataset_until_it_is_finished(small_shards: None, tmp_path: Path) -> None:
@@ -370,142 +341,6 @@ def test_runs_with_a_variable_that_the_store_lacks_are_refused(made: Path) -> No
 
 def test_the_runs_of_a_store_are_those_of_its_file(made: Path) -> None:
     assert_same_runs(read_runs(made), read_flat(made.parent / "a.nc"))
-
-
-# ---- what strangers may write ----
-
-
-def edited(made: Path, change: object) -> Path:
-    """Change the metadata of a store as someone else might."""
-    head = json.loads((made / "zarr.json").read_text())
-    change(head, head["consolidated_metadata"]["metadata"])  # type: ignore[operator]
-    (made / "zarr.json").write_text(json.dumps(head))
-    return made
-
-
-def _codec(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["mass"]["codecs"].append({"name": "numcodecs.pickle"})
-
-
-def _name(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["../../mass"] = nodes["mass"]
-
-
-def _kind(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["mass"]["data_type"] = "complex128"
-
-
-def _shape(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["mass"]["shape"] = [2**41]
-
-
-def _sizes(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["final_phase"]["shape"] = [3, 6]
-
-
-def _huge(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    for node in nodes.values():
-        for axis, dim in enumerate(node.get("dimension_names") or []):
-            if dim == "restitution":
-                node["shape"][axis] = 2**33
-
-
-def _chunk(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["mass"]["chunk_grid"]["configuration"]["chunk_shape"] = [2**30]
-
-
-def _rows(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["impact_time"]["shape"] = [1, 1]
-
-
-def _format(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    head["zarr_format"] = 2
-
-
-def _table(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    head["consolidated_metadata"]["metadata"] = [1, 2]
-
-
-def _types(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    nodes["outcome"]["attributes"]["attribute_types"]["flag_values"] = "O"
-
-
-def _missing(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    del nodes["displacement_min"]
-
-
-def _unit(head: dict, nodes: dict) -> None:  # type: ignore[type-arg]
-    del nodes["final_phase"]["attributes"]["units"]
-
-
-CHANGES = [
-    _codec,
-    _name,
-    _kind,
-    _shape,
-    _sizes,
-    _huge,
-    _chunk,
-    _rows,
-    _format,
-    _table,
-    _types,
-    _missing,
-    _unit,
-]
-
-
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_store_that_a_stranger_made_is_refused_in_one_line(made: Path, change: object) -> None:
-    with pytest.raises(DatasetError, match=r"a\.zarr: ") as problem:
-        open_dataset(edited(made, change))
-    assert "\n" not in str(problem.value)
-    assert len(str(problem.value)) < 700
-
-
-def test_a_chunk_that_holds_more_than_it_should_is_refused_before_it_is_expanded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write_dataset(grid_of_runs(), tmp_path / "a.nc")
-    convert_dataset(tmp_path / "a.nc", tmp_path / "a.zarr")
-    for name, fill in (("final_velocity", 0.0), ("message", "x" * 100)):
-        zarr = zarr_package()
-        array = zarr.open_group(tmp_path / "a.zarr", mode="r")[name]
-        large = zarr.create_array(
-            tmp_path / f"{name}.zarr",
-            shape=(10**6,),
-            chunks=(10**6,),
-            dtype=array.dtype,
-            compressors=array.compressors,
-            fill_value=array.fill_value,
-        )
-        large[...] = np.full(10**6, fill, dtype=object if name == "message" else float)
-        first_object(tmp_path / "a.zarr", name).write_bytes((tmp_path / f"{name}.zarr/c/0").read_bytes())
-        with open_dataset(tmp_path / "a.zarr") as opened, pytest.raises(DatasetError, match="does not hold"):
-            opened[name].load()
-
-
-def test_an_object_above_its_bound_is_refused(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from vibroimpact.analysis.files import bounded_stores
-
-    monkeypatch.setattr(bounded_stores, "MOST_OBJECT_BYTES", 10)
-    with open_dataset(made.parent / "a.nc"), pytest.raises(DatasetError, match="above 10 bytes"):
-        open_dataset(made).load()
-    monkeypatch.setattr(stores, "MOST_METADATA_BYTES", 10)
-    with pytest.raises(DatasetError, match="metadata above 10 bytes"):
-        open_dataset(made)
-
-
-def test_a_store_of_another_program_is_refused(tmp_path: Path) -> None:
-    xr.Dataset({"x": ("y", [1.0])}).to_zarr(tmp_path / "a.zarr", zarr_format=3, consolidated=False)
-    with pytest.raises(DatasetError, match="expected a finished store"):
-        open_dataset(tmp_path / "a.zarr")
-    stores.consolidate(tmp_path / "a.zarr")
-    with pytest.raises(DatasetError, match="expected a dataset written by vibroimpact, got other contents"):
-        open_dataset(tmp_path / "a.zarr")
-    (tmp_path / "a.zarr" / "zarr.json").write_text("no JSON")
-    with pytest.raises(DatasetError, match=r"a\.zarr: expected a Zarr store"):
-        open_dataset(tmp_path / "a.zarr")
 
 
 def test_the_package_that_is_missing_is_named_with_its_extra(

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from support.campaign_scenes import scene_of
-from support.store_scenes import BODY, axis
+from support.campaign_scenes import axis, scene_of
+from support.store_scenes import BODY
 
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.stores.shards import Shard, SweepGrid, grid_of

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.campaign_scenes import assert_same_datasets, scene_of
+from support.campaign_scenes import assert_same_datasets, axis, scene_of
 from support.serial_pool import Notes, campaign_here
-from support.store_scenes import BODY, axis
+from support.store_scenes import BODY
 
 import vibroimpact.orchestrator.campaign.formats as formats
 import vibroimpact.orchestrator.campaign.schedule as schedule

@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from support.campaign_scenes import scene_of
+from support.campaign_scenes import axis, frequency, scene_of, swept_text
 
 import vibroimpact.orchestrator.campaign.workers.pieces as pieces
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns
@@ -17,29 +17,13 @@ from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
-SCENE = """
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.05
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 0.3
-restitution = 0.7
-[record]
-transient_periods = 5
-recorded_periods = 2
-each_period = EACH
-[sweep]
-"stop[1].restitution" = { values = [0.2, 0.4, 0.8] }
-"forcing.angular_frequency" = { start = 0.6, stop = 1.6, points = 5, path = "PATH" }
-"""
+RESTITUTION = axis("stop[1].restitution", [0.2, 0.4, 0.8])
+PERIODS = "recorded_periods = 2\n"
 
 
 def opened(path: str, each_period: bool = True) -> tuple[Scene, PointColumns]:
-    scene = scene_of(SCENE.replace("PATH", path).replace("EACH", str(each_period).lower()))
+    text = swept_text(RESTITUTION, frequency(5, path), position=0.3, transient_periods=5)
+    scene = scene_of(text.replace(PERIODS, f"{PERIODS}each_period = {str(each_period).lower()}\n"))
     return scene, columns_of_points(expand(scene), 0, scene.runs)
 
 
@@ -77,8 +61,8 @@ def test_one_value_for_all_periods_is_that_of_the_dataset(monkeypatch: pytest.Mo
 
 
 def test_results_of_a_chunk_have_a_largest_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = SCENE.replace("PATH", "independent").replace("each_period = EACH", "impacts = false")
-    scene = scene_of(text)
+    text = swept_text(RESTITUTION, frequency(5), position=0.3, transient_periods=5)
+    scene = scene_of(text.replace(PERIODS, PERIODS + "impacts = false\n"))
     points = columns_of_points(expand(scene), 0, scene.runs)
     monkeypatch.setattr(pieces, "PIECE_POINTS", 2)
     with open_scene(scene) as runner:

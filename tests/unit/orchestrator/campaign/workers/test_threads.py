@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.campaign_scenes import assert_same_rows, scene_of
+from support.campaign_scenes import assert_same_rows, axis, frequency, scene_of, swept_text
 
 import vibroimpact.orchestrator.campaign.campaign as campaign
 import vibroimpact.orchestrator.campaign.schedule as schedule
@@ -18,28 +18,11 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
 from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.scene import Scene
 
-SCENE = """
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.05
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.8
-[[stop]]
-position = 0.3
-restitution = 0.7
-[record]
-transient_periods = 10
-recorded_periods = 2
-[sweep]
-"stop[1].restitution" = { values = [0.0, 0.4, 0.8] }
-"forcing.angular_frequency" = { start = 0.6, stop = 1.6, points = 19, path = "PATH" }
-"""
+RESTITUTION = axis("stop[1].restitution", [0.0, 0.4, 0.8])
 
 
 def scene(path: str = "independent") -> Scene:
-    return scene_of(SCENE.replace("PATH", path))
+    return scene_of(swept_text(RESTITUTION, frequency(19, path), position=0.3))
 
 
 @pytest.fixture(autouse=True)
