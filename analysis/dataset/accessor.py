@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ _RECORD_KEYS = {
     "event": "events = true",
 }
 
+BLOCK_VALUES = 1 << 22
+"""Number of values of neighbouring runs that are in memory together: 32 MiB."""
 # Relative distance from the only value of a parameter within which a selection means that value.
 _SAME_VALUE = 1e-6
 
@@ -188,6 +191,31 @@ def run_ids(dataset: xr.Dataset) -> xr.DataArray:
     if "run_id" in dataset.variables:
         return dataset["run_id"]
     return xr.DataArray(np.arange(dataset.sizes["run"], dtype=np.int32), dims="run")
+
+
+def columns_of_runs(dataset: xr.Dataset, names: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the values of variables of neighbouring runs, shape (run, ...), in file order, block by block.
+
+    Each block is read from the smallest box of cells around its runs.
+    """
+    run_id, own = run_ids(dataset), dataset[list(names)]
+    dims, shape = run_id.dims, run_id.shape
+    numbers = run_id.values.reshape(-1)
+    if (np.diff(numbers, prepend=np.int32(-1)) == 1).all():
+        cells: Any = range(numbers.size)
+    else:
+        cells = np.argsort(numbers, kind="stable")[np.count_nonzero(numbers < 0) :]
+    values = sum(own[name].size for name in names) // max(numbers.size, 1)
+    most = max(BLOCK_VALUES // max(values, 1), 1)
+    for first in range(0, len(cells), most):
+        at = np.unravel_index(np.asarray(cells[first : first + most]), shape) if shape else ()
+        box = {dim: slice(int(one.min()), int(one.max()) + 1) for dim, one in zip(dims, at, strict=True)}
+        sizes = tuple(cut.stop - cut.start for cut in box.values())
+        inside = [one - cut.start for one, cut in zip(at, box.values(), strict=True)]
+        places = np.ravel_multi_index(inside, sizes) if shape else np.zeros(1, dtype=np.intp)
+        some = own.isel(box)
+        found = {name: some[name].transpose(*dims, ...).values for name in names}
+        yield {name: one.reshape(-1, *one.shape[len(dims) :])[places] for name, one in found.items()}
 
 
 def _owners(dataset: xr.Dataset, dimension: str) -> NDArray[Any]:

@@ -51,7 +51,7 @@ class FlatFile:
         try:
             with one_error(path):
                 self.dataset = _in_order_of_the_scene(fitting(path, opened))
-                if (np.diff(self.dataset.variables["run_index"].values) <= 0).any():
+                if not _ascends(self.dataset.variables["run_index"]):
                     raise DatasetError(f"{os.fspath(path)}: expected runs in the order of their run_index.")
         except DatasetError:
             opened.close()
@@ -99,12 +99,19 @@ class FlatFile:
     def _rows_before(self, count: str, run: int) -> int:
         """Return the number of rows of all runs before a run; sums at every `_FAR` runs are kept."""
         if count not in self._sums:
-            counts = self.dataset.variables[count].values
-            sums = [counts[first : first + _FAR].sum(dtype=np.int64) for first in range(0, counts.size, _FAR)]
+            counts = self.dataset.variables[count]
+            parts = (counts[first : first + _FAR].values for first in range(0, counts.size, _FAR))
+            sums = [part.sum(dtype=np.int64) for part in parts]
             self._sums[count] = np.cumsum([0, *sums])
         block = run // _FAR
         rest = self.dataset.variables[count][block * _FAR : run].values.sum(dtype=np.int64)
         return int(self._sums[count][block] + rest)
+
+
+def _ascends(index: xr.Variable) -> bool:
+    """Return whether numbers ascend; they are read block by block, each with the last number before it."""
+    parts = (index[max(first - 1, 0) : first + _FAR].values for first in range(0, index.size, _FAR))
+    return all((np.diff(part) > 0).all() for part in parts)
 
 
 def is_large(path: str | os.PathLike[str]) -> bool:

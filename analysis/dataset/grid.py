@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -26,6 +26,10 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 
+BLOCK_RUNS = 1 << 20
+"""Number of runs whose values are in memory together while their grid is found."""
+_Placed = Callable[[slice], NDArray[np.intp]]
+"""Function that returns the places of runs along a dimension."""
 # Grid points per run above which a sweep (scattered points) would waste memory on a grid; `run` stays its dimension.
 _LARGEST_GRID_PER_RUN = 10
 
@@ -173,6 +177,17 @@ def _row_owners(flat: Flat) -> dict[str, xr.Variable]:
     }
 
 
+def cells_of(
+    flat: Flat,
+) -> tuple[tuple[str, ...], dict[str, xr.Variable], NDArray[np.int32]]:
+    """Return the dimensions of a sweep, its coordinates with the scalar `direction`, and the run at each point.
+
+    The values of runs are read block by block. Runs without a grid are in a row, without coordinates.
+    """
+    dims, axes, scalars, run_id = _grid(flat)
+    return dims, axes | scalars, run_id
+
+
 def _grid(
     flat: Flat,
 ) -> tuple[tuple[str, ...], dict[str, xr.Variable], dict[str, xr.Variable], NDArray[np.int32]]:
@@ -180,20 +195,18 @@ def _grid(
     axes: dict[str, xr.Variable] = {}
     sizes: dict[str, int] = {}
     scalars: dict[str, xr.Variable] = {}
-    places: list[NDArray[np.intp]] = []
-    directions = flat.variables["direction"].values
-    if directions.size and (directions != Direction.independent).any():
-        present, place = _distinct(directions)
+    places: list[_Placed] = []
+    directions = flat.variables["direction"]
+    present, place = _distinct(directions)
+    if directions.size and (present != Direction.independent).any():
         labels = [Direction(int(value)).name for value in present]
-        axes["direction"] = direction_axis(labels, _plain(flat.variables["direction"]))
+        axes["direction"] = direction_axis(labels, _plain(directions))
         sizes["direction"] = len(labels)
         places.append(place)
     elif directions.size:
-        scalars["direction"] = new_variable(
-            (), np.asarray(Direction.independent.name), _plain(flat.variables["direction"])
-        )
+        scalars["direction"] = new_variable((), np.asarray(Direction.independent.name), _plain(directions))
     for dimension, names_along in _swept_along(flat).items():
-        own, place = axis_of(dimension, {name: flat.variables[name] for name in names_along})
+        own, place = _axis(dimension, {name: flat.variables[name] for name in names_along})
         axes |= own
         sizes[dimension] = next(iter(own.values())).size
         places.append(place)
@@ -220,6 +233,12 @@ def axis_of(
     columns : mapping of str to xarray.Variable, shape (run,)
         Values of each parameter that moves along the dimension.
     """
+    axes, place = _axis(dimension, columns)
+    return axes, place(slice(None))
+
+
+def _axis(dimension: str, columns: Mapping[str, xr.Variable]) -> tuple[dict[str, xr.Variable], _Placed]:
+    """Return the coordinates of parameters along their dimension, and the place of runs along it."""
     values, place = _distinct_points(list(columns.values()))
     axes: dict[str, xr.Variable] = {}
     for (name, variable), column in zip(columns.items(), values.T, strict=True):
@@ -255,29 +274,45 @@ def _swept_along(flat: Flat) -> dict[str, list[str]]:
     return found
 
 
-def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the distinct points of runs along a dimension, shape (point, parameter), and the point of each run.
+def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], _Placed]:
+    """Return the distinct points of runs along a dimension, shape (point, parameter), and the points of runs.
 
     One parameter ascends; several parameters that move together keep the order of the runs.
     """
     if len(columns) == 1 and SWEPT_ALONG not in columns[0].attrs:
-        values, place = _distinct(columns[0].values)
-        return values[:, None], place
+        values, placed = _distinct(columns[0])
+        return values[:, None], placed
     rows = np.stack([column.values for column in columns], axis=1)
     values, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(order.size)
-    return values[order], rank[place.reshape(-1)]
+    ranks = rank[place.reshape(-1)]
+    return values[order], lambda part: ranks[part]
 
 
-def _distinct(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    """Return the values that occur, ascending, and the place of each element among them.
+def _distinct(column: xr.Variable) -> tuple[NDArray[Any], _Placed]:
+    """Return the values that occur, ascending, and the places of runs among them; values are read block by block.
 
-    It uses a table of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
+    It uses tables of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
     """
-    place, present = pd.factorize(values, sort=True, use_na_sentinel=False)
-    return np.asarray(present), place
+    present = np.empty(0, dtype=column.dtype)
+    for part in _blocks(column.size):
+        present = pd.unique(np.concatenate([present, pd.unique(column[part].values)]))
+    present = np.sort(present)
+
+    def placed(part: slice) -> NDArray[np.intp]:
+        place, own = pd.factorize(column[part].values, use_na_sentinel=False)
+        found: NDArray[np.intp] = np.searchsorted(present, own)[place]
+        return found
+
+    return present, placed
+
+
+def _blocks(runs: int) -> Iterator[slice]:
+    """Yield neighbouring runs whose values are in memory together."""
+    for first in range(0, runs, BLOCK_RUNS):
+        yield slice(first, min(first + BLOCK_RUNS, runs))
 
 
 def _in_order_of_the_scene(flat: Flat) -> list[str]:
@@ -286,16 +321,20 @@ def _in_order_of_the_scene(flat: Flat) -> list[str]:
     return sorted(swept_names(flat), key=lambda name: linked.index(name) if name in linked else len(linked))
 
 
-def _run_grid(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
+def _run_grid(shape: tuple[int, ...], places: list[_Placed], runs: int) -> NDArray[np.int32] | None:
     """Return the run at each grid point, or None when the runs form no grid."""
     size = int(np.prod(shape, dtype=np.int64))
     if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:
         return None
-    where = np.ravel_multi_index(tuple(places), shape) if shape else np.zeros(runs, dtype=np.intp)
-    if np.bincount(where, minlength=1).max() > 1:
-        return None
     run_id = np.full(size, -1, dtype=np.int32)
-    run_id[where] = np.arange(runs, dtype=np.int32)
+    for part in _blocks(runs):
+        own = np.arange(part.start, part.stop, dtype=np.int32)
+        along = tuple(place(part) for place in places)
+        where = np.ravel_multi_index(along, shape) if shape else np.zeros(own.size, dtype=np.intp)
+        is_taken = (run_id[where] >= 0).any()
+        run_id[where] = own
+        if is_taken or (run_id[where] != own).any():
+            return None
     return run_id.reshape(shape)
 
 

@@ -5,15 +5,19 @@ Imported with the package zarr only, through `stores`.
 
 from __future__ import annotations
 
+import asyncio
+import hashlib
 import math
 import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from zarr.abc.store import RangeByteRequest
 from zarr.codecs import BloscCodec, ZstdCodec
 from zarr.codecs import VLenUTF8Codec as ZarrTexts
 from zarr.registry import register_codec
-from zarr.storage import WrapperStore
+from zarr.storage import LocalStore, WrapperStore
 
 from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES
 
@@ -27,12 +31,39 @@ _BLOSC_HEAD, _ZSTD_HEAD = 16, 18
 class BoundedStore(WrapperStore[Any]):
     """A store that gives no object above its bound; a finished one has an object for each shard that is read."""
 
+    def __init__(self, store: Any) -> None:
+        super().__init__(store)
+        self._replaced: dict[str, str] = {}
+
+    @contextmanager
+    def replaced(self, keys: Sequence[str]) -> Iterator[dict[str, str]]:
+        """Take older objects for absent while the block writes new ones; yield the SHA-256 of each that is written."""
+        self._replaced.update(dict.fromkeys(keys, ""))
+        found: dict[str, str] = {}
+        try:
+            yield found
+            found.update({key: self._replaced[key] for key in keys})
+        finally:
+            for key in keys:
+                del self._replaced[key]
+
+    async def set(self, key: str, value: Any) -> None:
+        """Write an object."""
+        await super().set(key, value)
+        if key in self._replaced:
+            digest = await asyncio.to_thread(hashlib.sha256, value.as_numpy_array())
+            self._replaced[key] = digest.hexdigest()
+
     async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:
         """Return an object, or a part of it; one above its bound raises ValueError."""
+        if key in self._replaced:
+            return None
         most = MOST_METADATA_BYTES if key.endswith("zarr.json") else MOST_OBJECT_BYTES
         if isinstance(byte_range, RangeByteRequest) and byte_range.end - byte_range.start > most:
             raise ValueError(f"a part of {key} above {most} bytes")
-        if byte_range is None and await self._size(key) > most:
+        if byte_range is None and not isinstance(self._store, LocalStore):
+            byte_range = RangeByteRequest(0, most + 1)  # one request, where the size would be another
+        elif byte_range is None and await self._size(key) > most:
             raise ValueError(f"an object {key} above {most} bytes")
         found = await super().get(key, prototype, byte_range)
         if found is None and self.read_only and not key.endswith("zarr.json"):

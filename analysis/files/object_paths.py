@@ -17,7 +17,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vibroimpact.analysis.files.scratch import ScratchFolder
-from vibroimpact.analysis.files.stores import is_address, outage, reason_of, system_of, zarr_package
+from vibroimpact.analysis.files.stores import (
+    first_bytes,
+    is_address,
+    outage,
+    reason_of,
+    system_of,
+    zarr_package,
+)
 from vibroimpact.fmus.errors import UsageError
 
 
@@ -95,11 +102,6 @@ class ObjectPath(os.PathLike[str]):
         except FileNotFoundError:
             return None
 
-    def size(self) -> int:
-        """Return the size of the object, bytes."""
-        with self._opened() as (system, path):
-            return int(system.size(path))
-
     def iterdir(self) -> Iterator[ObjectPath]:
         """Yield the objects and prefixes below this prefix, one level deep."""
         try:
@@ -109,10 +111,10 @@ class ObjectPath(os.PathLike[str]):
             return
         yield from (self / each.rpartition("/")[2] for each in sorted(found) if each != path)
 
-    def read_bytes(self) -> bytes:
-        """Return the content of the object."""
+    def read_bytes(self, most: int | None = None) -> bytes:
+        """Return the content of the object, or no more than its first bytes."""
         with self._opened() as (system, path):
-            return bytes(system.cat_file(path))
+            return first_bytes(system, path, most)
 
     def read_text(self, encoding: str) -> str:
         """Return the content of the object as text."""
@@ -194,15 +196,16 @@ def bounded_bytes(path: AnyPath, most: int) -> bytes:
         It cannot be read.
     ValueError
     """
-    if isinstance(path, Path):
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise ValueError("it is no file")
-        size = status.st_size
-    else:
-        size = path.size()
-    if size > most:
-        raise ValueError(f"it has {size} bytes, more than {most}")
+    if isinstance(path, ObjectPath):
+        content = path.read_bytes(most + 1)
+        if len(content) > most:
+            raise ValueError(f"it has more than {most} bytes")
+        return content
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError("it is no file")
+    if status.st_size > most:
+        raise ValueError(f"it has {status.st_size} bytes, more than {most}")
     return path.read_bytes()
 
 

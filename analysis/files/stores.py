@@ -15,7 +15,7 @@ import re
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -108,10 +108,8 @@ def opened_group(place: Place, mode: str) -> Any:
         There is no store, it is unfinished, or it cannot be reached.
     """
     zarr = zarr_package()
-    from vibroimpact.analysis.files.bounded_stores import BoundedStore
-
     with one_store_error(place, writes=is_written(place, mode)), quiet_zarr(), _settings():
-        store = BoundedStore(_store(place, read_only=mode == "r"))
+        store = _bounded_store(place, read_only=mode == "r")
         if mode == "w-":
             return zarr.create_group(store, zarr_format=3)
         if mode == "r":
@@ -142,13 +140,16 @@ def arrays_of(group: Any) -> dict[str, Any]:
         return dict(group.arrays())
 
 
-def _store(place: Place, *, read_only: bool) -> Any:
+def _bounded_store(place: Place, *, read_only: bool) -> Any:
     from zarr.storage import FsspecStore, LocalStore
+
+    from vibroimpact.analysis.files.bounded_stores import BoundedStore
 
     if is_address(place):
         options = {"use_listings_cache": False}
-        return FsspecStore.from_url(os.fspath(place), storage_options=options, read_only=read_only)
-    return LocalStore(Path(place).absolute(), read_only=read_only)
+        found = FsspecStore.from_url(os.fspath(place), storage_options=options, read_only=read_only)
+        return BoundedStore(found)
+    return BoundedStore(LocalStore(Path(place).absolute(), read_only=read_only))
 
 
 def _refuse_unfinished(place: Place) -> None:
@@ -156,9 +157,9 @@ def _refuse_unfinished(place: Place) -> None:
     system, root = system_of(place)
     head = f"{root}/zarr.json"
     try:
-        if system.size(head) > MOST_METADATA_BYTES:
+        found = first_bytes(system, head, MOST_METADATA_BYTES + 1)
+        if len(found) > MOST_METADATA_BYTES:
             raise ValueError(f"metadata above {MOST_METADATA_BYTES} bytes")
-        found = system.cat_file(head)
     except FileNotFoundError:
         raise DatasetError(f"{os.fspath(place)}: expected a Zarr store, got none there.") from None
     if finished_nodes(json.loads(found)) is None:
@@ -178,6 +179,16 @@ def system_of(place: Place) -> tuple[Any, str]:
     else:
         system, root = url_to_fs(os.path.abspath(place))
     return system, str(root).rstrip("/")
+
+
+def first_bytes(system: Any, path: str, most: int | None = None) -> bytes:
+    """Return the content of an object, or no more than its first bytes: a range needs no request for its size."""
+    try:
+        return bytes(system.cat_file(path, start=0, end=most))
+    except OSError as error:
+        if "not satisfiable" in str(error):  # an empty object of S3 has no first byte
+            return b""
+        raise
 
 
 def size_of(place: Place) -> tuple[int, int]:
@@ -214,28 +225,11 @@ def _raised(error: OSError) -> None:
     raise error
 
 
-def remove_object(place: Place, key: str) -> None:
-    """Remove an object of a store, if it is there: a damaged shard would be read before it is written."""
-    system, root = system_of(place)
-    with suppress(FileNotFoundError):
-        system.rm_file(f"{root}/{key}")
-
-
 def announce(place: Place, name: str, shape: tuple[int, ...]) -> None:
     """Write another shape of an array into its metadata; zarr would list every chunk of the old shape."""
     system, root = system_of(place)
     path = f"{root}/{name}/zarr.json"
-    system.pipe_file(path, json.dumps(json.loads(system.cat_file(path)) | {"shape": shape}).encode())
-
-
-def has_object(place: Place, key: str) -> bool:
-    """Return whether a store has an object; OSError where it cannot be reached."""
-    system, root = system_of(place)
-    with one_store_error(place, writes=True):
-        try:
-            return bool(system.info(f"{root}/{key}")["type"] == "file")
-        except FileNotFoundError:
-            return False
+    system.pipe_file(path, json.dumps(json.loads(first_bytes(system, path)) | {"shape": shape}).encode())
 
 
 def objects_below(place: Place, prefix: str = "") -> list[str]:
@@ -332,4 +326,4 @@ def consolidate(place: Place) -> None:
     """Write the consolidated metadata of a store, which mark it as finished."""
     zarr = zarr_package()
     with one_store_error(place, writes=True), quiet_zarr():
-        zarr.consolidate_metadata(_store(place, read_only=False), zarr_format=3)
+        zarr.consolidate_metadata(_bounded_store(place, read_only=False), zarr_format=3)

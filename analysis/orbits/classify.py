@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
-from vibroimpact.analysis.dataset.accessor import run_ids
+from vibroimpact.analysis.dataset.accessor import columns_of_runs, run_ids
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
 from vibroimpact.analysis.files.stores import Place
@@ -53,6 +53,7 @@ LEAST_FALL = 5.0
 _MOST_SHOWN = 6
 """Largest number of classes listed in one line."""
 _STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
+_BESIDE = ("impacts_per_period", "stick_count")
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +159,11 @@ class ClassesOfDataset(Study[RunClass]):
 
         A dataset of one value for all periods, or without strobe and extrema, raises DatasetError.
         """
-        runs = self.runs.vibroimpact.runs
+        runs = self.runs
         columns = [name for name in _STATES if name in runs.variables]
-        if not columns and has_named_contacts(self.runs):
-            for each, end in zip(impacts_of_runs(self.runs), runs["outcome"].values, strict=True):
+        if not columns and has_named_contacts(runs):
+            ends = runs.vibroimpact.runs["outcome"].values
+            for each, end in zip(impacts_of_runs(runs), ends, strict=True):
                 yield _by_impacts(*each, Outcome(int(end)))
             return
         if not columns:
@@ -173,17 +175,19 @@ class ClassesOfDataset(Study[RunClass]):
                 raise DatasetError(
                     "classify: expected values of each period, got one for all. Run with each_period."
                 )
-        states = np.stack([np.atleast_2d(runs[name].values) for name in columns], axis=-1)
-        counts = runs["impacts_per_period"].values if "impacts_per_period" in runs.variables else None
-        sticks = runs["stick_count"].values if "stick_count" in runs.variables else np.zeros(len(states))
-        outcomes = runs["outcome"].values
-        for run in range(len(states)):
-            yield class_of(
-                states[run],
-                None if counts is None else counts[run],
-                Outcome(int(outcomes[run])),
-                bool(sticks[run] > 0),
-            )
+        known: dict[RunClass, RunClass] = {}  # millions of runs have few classes
+        further = [name for name in _BESIDE if name in runs.variables]
+        for block in columns_of_runs(runs, [*columns, *further, "outcome"]):
+            states = np.stack([block[name] for name in columns], axis=-1)
+            counts, sticks = (block.get(name) for name in _BESIDE)
+            for run, outcome in enumerate(block["outcome"]):
+                found = class_of(
+                    states[run],
+                    None if counts is None else counts[run],
+                    Outcome(int(outcome)),
+                    sticks is not None and bool(sticks[run] > 0),
+                )
+                yield known.setdefault(found, found)
 
     @property
     def classes(self) -> ClassesOfRuns:

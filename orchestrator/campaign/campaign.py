@@ -63,6 +63,7 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_parts,
     remove_parts_within,
     remove_temporary_files,
+    still_there,
     unfit_parts,
 )
 from vibroimpact.orchestrator.campaign.report import CampaignInterrupted, CampaignReport
@@ -307,9 +308,8 @@ class _Campaign:
         # a sweep is complete by its number of runs; rounds are complete if no stage comes
         stage = next(stages, None) if self._rounds or self._report.resumed < self._report.runs else None
         if stage is not None:
-            there = [path for path in stored if path.exists()]
-            self._compute_on(chain([stage], stages), there, workers)
-        found = [path for path in stored if path.exists()] + [part.path for part in self._computed()]
+            self._compute_on(chain([stage], stages), still_there(stored, self._home), workers)
+        found = still_there(stored, self._home) + [part.path for part in self._computed()]
         if self._rounds is not None:
             self._report.runs = sum(part.rows for part in self._stored(parts))
         return found

@@ -38,6 +38,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     write_content,
 )
 from vibroimpact.orchestrator.campaign.parts import (
+    EARLIER_ROWS,
     NO_RUNS,
     Note,
     StoredPart,
@@ -49,9 +50,6 @@ from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, remove_
 from vibroimpact.orchestrator.campaign.workers.chunks import MANIFEST
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.scene import Scene
-
-_SCRATCH = ".earlier-rows"
-"""Name of the folder in which rows of an earlier sweep become files of the new one."""
 
 
 class SealedStore(Protocol):
@@ -197,7 +195,7 @@ def _files_of_kept(
 @contextmanager
 def _scratch(home: Path) -> Iterator[Path]:
     """Make a folder for files of the block on the disk of a campaign."""
-    folder = home / _SCRATCH
+    folder = home / EARLIER_ROWS
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     try:

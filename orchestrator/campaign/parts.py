@@ -7,6 +7,7 @@ the SHA-256 of its content. A damaged file is therefore found before it is opene
 from __future__ import annotations
 
 import re
+import shutil
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -26,8 +27,9 @@ from vibroimpact.analysis.dataset import (
     refuse_unlike,
 )
 from vibroimpact.analysis.dataset.assembling import wrapped
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.fingerprints import has_recorded_hash
-from vibroimpact.analysis.files.object_paths import AnyPath
+from vibroimpact.analysis.files.object_paths import AnyPath, ObjectPath
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.workers.chunks import (
     CARRIED,
@@ -48,6 +50,8 @@ _OWN = re.compile(rf"{_PART}|{_KEPT}")
 _TEMPORARY = re.compile(
     rf"\.({_PART}|{_KEPT}|(dataset|earlier-[0-9a-f]{{8}})\.nc|campaign\.json)\.\d+\.[0-9a-f]{{8}}\.tmp"
 )
+EARLIER_ROWS = ".earlier-rows"
+"""Name of the folder in which rows of an earlier sweep become files of the new one."""
 NO_RUNS = np.empty(0, dtype=np.int64)
 
 Note = Callable[[str], None]
@@ -87,14 +91,26 @@ def list_parts(
 
 def own_files(folder: AnyPath) -> list[AnyPath]:
     """Return the files of a campaign in its folder of parts; other files there do not belong to it."""
-    return [path for path in folder.iterdir() if _OWN.fullmatch(path.name) and path.is_file()]
+    named = (path for path in folder.iterdir() if _OWN.fullmatch(path.name))
+    return [path for path in named if isinstance(path, ObjectPath) or path.is_file()]
+
+
+def still_there(paths: Sequence[AnyPath], home: AnyPath) -> list[AnyPath]:
+    """Return the files that are in the home of a campaign: the parts of a shard go when it is sealed."""
+
+    def exists(path: AnyPath) -> bool:
+        return path.exists()
+
+    return [path for path, there in zip(paths, done_at_once(exists, paths, home), strict=True) if there]
 
 
 def remove_temporary_files(folder: AnyPath) -> None:
-    """Remove the temporary files that a killed writer of a campaign left behind."""
+    """Remove the temporary files that a killed writer of a campaign left behind, and those of a cut-off extension."""
     for path in folder.iterdir():
         if _TEMPORARY.fullmatch(path.name):
             path.unlink(missing_ok=True)
+        elif path.name == EARLIER_ROWS and isinstance(path, Path) and path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
 
 
 def remove_parts(folder: AnyPath) -> None:

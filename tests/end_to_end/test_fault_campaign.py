@@ -8,18 +8,17 @@ from pathlib import Path
 
 import pytest
 from soak import faults
-
-from vibroimpact.orchestrator.campaign.formats import DatasetFormat
+from soak._homes import KINDS
 
 POINTS = 150
-ROUNDS = ["workers killed and stopped", "damaged parts"]
+ROUNDS = ["workers killed and stopped", "a full disk", "damaged parts"]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("form", faults.FORMATS)
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped here")
 def test_a_disturbed_campaign_of_misbehaving_fmus_loses_and_blames_no_innocent_point(
-    form: DatasetFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert faults.disturbed(random.Random(15), POINTS, ROUNDS, form) is None
+    assert faults.disturbed(random.Random(15), POINTS, ROUNDS, kind) is None

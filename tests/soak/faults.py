@@ -2,8 +2,8 @@
 
 One point of a hundred segfaults, one hangs, one gives NaN. Meanwhile workers are killed and stopped, and the command is
 killed. Its disk is full, parts are damaged and the scheduler is restarted; each time the same command goes on. The
-result is compared, bit for bit, with an undisturbed one. A service that is killed gets as many points of an
-oscillator, since it loads no foreign FMUs.
+result is compared, bit for bit, with an undisturbed one. In an object store requests fail where a disk would be full.
+A service that is killed gets as many points of an oscillator, since it loads no foreign FMUs.
 """
 
 from __future__ import annotations
@@ -27,19 +27,16 @@ from support.campaign_process import fork_servers_of, wait_until, workers_of
 from support.command_line import ENTRY
 
 from soak import service_kills
+from soak._homes import KINDS, Home, entry, home_of, left_in
 from soak.flipped_parts import DAMAGES
 from soak.kills import Content, bits_of, difference
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.analysis.dataset.places import dataset_place
 from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
-from vibroimpact.orchestrator.campaign import formats
-from vibroimpact.orchestrator.campaign.formats import DatasetFormat
 from vibroimpact.orchestrator.campaign.stores.seals import read_seal
 
-CASES = 2
-FORMATS: tuple[DatasetFormat, ...] = ("netcdf", "zarr")
-"""Formats of the dataset, one after the other by the seed of a case."""
+CASES = 3
 SAMPLE = 0
 """0: `make test` has a campaign of a few hundred points of its own (`tests/end_to_end/test_fault_campaign.py`)."""
 SECONDS = 3600.0
@@ -80,17 +77,21 @@ def check(seed: int) -> str | None:
     chance = random.Random(seed)
     rounds = list(ROUNDS)
     chance.shuffle(rounds)
-    form = FORMATS[seed % len(FORMATS)]
-    return disturbed(chance, POINTS, rounds, form) or service_kills.disturbed(
+    return disturbed(chance, POINTS, rounds, KINDS[seed % len(KINDS)]) or service_kills.disturbed(
         chance, "independent", POINTS, SERVICE_TRANSIENT
     )
 
 
-def disturbed(chance: random.Random, points: int, rounds: list[str], form: DatasetFormat) -> str | None:
-    """Disturb a campaign in each of the named ways, in order, let it end, and compare.
+def disturbed(chance: random.Random, points: int, rounds: list[str], kind: str) -> str | None:
+    """Disturb a campaign in a kind of home in each of the named ways, in order, let it end, and compare.
 
     A store has shards of a sixteenth of the points. Points in no order lie one after the other in a store.
     """
+    with home_of(kind) as home:
+        return _disturbed(chance, points, rounds, home)
+
+
+def _disturbed(chance: random.Random, points: int, rounds: list[str], home: Home) -> str | None:
     values = list(map(float, range(points)))
     if chance.random() < 0.5:
         chance.shuffle(values)
@@ -98,26 +99,27 @@ def disturbed(chance: random.Random, points: int, rounds: list[str], form: Datas
         SCENE.format(fmu=fmu_factory.faulty(Path.cwd(), "3.0").name, values=values, deadline=DEADLINE)
     )
     seconds = points / POINTS_PER_SECOND / (len(rounds) + 1)
-    if problem := _begun(form, points // 16, 0.2 * seconds):
+    program = entry(points // 16, ENTRY)
+    if problem := _begun(home, program, 0.2 * seconds):
         return f"the beginning: {problem}"
     for name in rounds:
-        problem = ROUNDS[name](chance, seconds)
+        problem = ROUNDS[name](chance, home, program, seconds)
         if problem is not None:
             return f"{name}: {problem}"
-    code, said = Command().end(by_force=False)
-    return _compared(points) if code == 0 else f"the last command ended with {code}: {said}"
+    code, said = Command(home.place, program).end(by_force=False)
+    return _compared(points, home) if code == 0 else f"the last command ended with {code}: {said}"
 
 
 class Command:
-    """`vibroimpact campaign scene.toml -o campaign` in a session of its own."""
+    """`vibroimpact campaign scene.toml -o HOME` in a session of its own."""
 
-    def __init__(self, *options: str, folder: str = "campaign", entry: str = ENTRY) -> None:
+    def __init__(self, home: str, program: str = ENTRY, *options: str) -> None:
         Path("scratch").mkdir(exist_ok=True)
-        self._errors = Path(f"{folder}.err")
-        arguments = ["campaign", "scene.toml", "-o", folder, *(options or ("--workers", "2"))]
+        self._errors = Path(f"{home.rpartition('/')[2]}.err")
+        arguments = ["campaign", "scene.toml", "-o", home, *(options or ("--workers", "2"))]
         with self._errors.open("w", encoding="utf-8") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", entry, *arguments],
+                [sys.executable, "-c", program, *arguments],
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
                 start_new_session=True,
@@ -167,33 +169,31 @@ class Command:
         return (1, f"processes outlived it: {outlived}") if outlived else (code, self.said()[-2000:])
 
 
-def _begun(form: DatasetFormat, shard_points: int, seconds: float) -> str | None:
+def _begun(home: Home, program: str, seconds: float) -> str | None:
     """Begin the campaign in a format, which all later commands keep, and kill the command."""
-    small = f"import {formats.__name__} as formats; formats.SHARD_POINTS = {shard_points}; {ENTRY}"
-    command = _started("--workers", "2", "--format", form, entry=small)
+    command = _started(home, program, "--workers", "2", *home.options)
     command.runs_for(seconds)
     return _killed(command)
 
 
-def _started(*options: str, entry: str = ENTRY) -> Command:
+def _started(home: Home, program: str, *options: str) -> Command:
     """Start the command and wait until it has computed some points."""
-    before = _parts_there()
-    command = Command(*options, entry=entry)
-    wait_until(lambda: command.process.poll() is not None or _parts_there() - before != set())
+    before = _parts_there(home)
+    command = Command(home.place, program, *options)
+    wait_until(lambda: command.process.poll() is not None or _parts_there(home) - before != set())
     return command
 
 
-def _parts_there() -> set[str]:
-    there = [*Path("campaign", "parts").glob("branch-*.nc"), *Path("campaign", "seals").glob("shard-*.json")]
-    return {part.name for part in there}
+def _parts_there(home: Home) -> set[str]:
+    return {path.name for path in [*home.files("parts", "branch-"), *home.files("seals", "shard-")]}
 
 
 # ---- rounds: each returns None or a problem ----
 
 
-def _workers(chance: random.Random, seconds: float) -> str | None:
+def _workers(chance: random.Random, home: Home, program: str, seconds: float) -> str | None:
     """Kill and stop workers and their fork server; stop all processes now and then, as Ctrl-Z and a closed lid do."""
-    command, end = _started(), time.monotonic() + seconds
+    command, end = _started(home, program), time.monotonic() + seconds
     while command.runs_for(min(chance.expovariate(0.5), end - time.monotonic())):
         if time.monotonic() >= end:
             break
@@ -209,8 +209,8 @@ def _workers(chance: random.Random, seconds: float) -> str | None:
     return _killed(command)
 
 
-def _client(_chance: random.Random, seconds: float) -> str | None:
-    command = _started()
+def _client(_chance: random.Random, home: Home, program: str, seconds: float) -> str | None:
+    command = _started(home, program)
     command.runs_for(seconds)
     return _killed(command)
 
@@ -222,22 +222,25 @@ def _killed(command: Command) -> str | None:
     return None if over in (None, 0) and code in (0, -signal.SIGKILL) else f"exit code {code}: {said}"
 
 
-def _disk(_chance: random.Random, seconds: float) -> str | None:
-    """Fill the disk from some moment on: no file may grow."""
-    command = _started()
+def _disk(_chance: random.Random, home: Home, program: str, seconds: float) -> str | None:
+    """Fill the disk from some moment on: no file may grow. At an address many requests fail instead."""
+    command = _started(home, program)
     command.runs_for(seconds)
-    for process in command.session():
+    if home.is_address:
+        home.switch.touch()
+    for process in command.session() if not home.is_address else ():
         process.rlimit(psutil.RLIMIT_FSIZE, (FULL, FULL))
     code, said = command.end(by_force=False)
+    home.switch.unlink(missing_ok=True)
     if code == 0:
         return None
     good = code == 1 and "Make room" in said and "Traceback" not in said
     return None if good else f"exit code {code} with a full disk: {said}"
 
 
-def _parts(chance: random.Random, seconds: float) -> str | None:
+def _parts(chance: random.Random, home: Home, program: str, seconds: float) -> str | None:
     """Damage parts and shards: each is named. A part that lost only its hash is whole, as in version 0.1."""
-    parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
+    parts = home.files("parts", "branch-")
     damaged = chance.sample(parts, min(3, len(parts)))
     hurt = []
     for part in damaged:
@@ -245,38 +248,38 @@ def _parts(chance: random.Random, seconds: float) -> str | None:
         part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, sound))
         if part.read_bytes() not in (sound, sound[:-LINE_LENGTH]):
             hurt.append(f"{part.name} was damaged and is removed")
-    hurt += [f"{shard} of the store was damaged" for shard in _damaged_shards(chance)]
-    command = _started()
+    hurt += [f"{shard} of the store was damaged" for shard in _damaged_shards(chance, home)]
+    command = _started(home, program)
     command.runs_for(seconds)
     said = command.said()
     unnamed = [words for words in hurt if words not in said]
     return _killed(command) or (f"not named: {unnamed}: {said[-2000:]}" if unnamed else None)
 
 
-def _damaged_shards(chance: random.Random) -> Iterator[str]:
+def _damaged_shards(chance: random.Random, home: Home) -> Iterator[str]:
     """Flip a bit of an object of some sealed shards, and yield their names."""
-    seals = sorted(Path("campaign", "seals").glob("shard-*.json"))
+    seals = home.files("seals", "shard-")
     for seal in chance.sample(seals, min(3, len(seals))):
         objects = read_seal(seal).objects
-        place = Path("campaign", "dataset.zarr", chance.choice(sorted(objects)))
+        place = home.path / "dataset.zarr" / chance.choice(sorted(objects))
         content = bytearray(place.read_bytes())
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
-        place.write_bytes(content)
+        place.write_bytes(bytes(content))
         yield seal.stem
 
 
-def _scheduler(chance: random.Random, seconds: float) -> str | None:
+def _scheduler(chance: random.Random, home: Home, program: str, seconds: float) -> str | None:
     """Kill a worker of an external scheduler, then restart the scheduler in the middle of the campaign."""
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     with _external(port) as first:
-        command = _started("--scheduler", address)
+        command = _started(home, program, "--scheduler", address)
         command.runs_for(0.3 * seconds)
         chance.choice(first[1:]).kill()
         command.runs_for(0.3 * seconds)
-    before = _parts_there()
+    before = _parts_there(home)
     with _external(port):
-        wait_until(lambda: command.process.poll() is not None or _parts_there() > before, seconds=120.0)
+        wait_until(lambda: command.process.poll() is not None or _parts_there(home) > before, seconds=120.0)
         over = command.process.poll()
         code, said = command.end(by_force=True)
     good = over in (None, 0) or (over == 1 and "resumes" in said and "Traceback" not in said)
@@ -321,7 +324,7 @@ def _signal(processes: list[psutil.Process], number: signal.Signals) -> None:
             continue  # it ended by itself
 
 
-ROUNDS: dict[str, Callable[[random.Random, float], str | None]] = {
+ROUNDS: dict[str, Callable[[random.Random, Home, str, float], str | None]] = {
     "workers killed and stopped": _workers,
     "the command killed": _client,
     "a full disk": _disk,
@@ -333,13 +336,13 @@ ROUNDS: dict[str, Callable[[random.Random, float], str | None]] = {
 # ---- results ----
 
 
-def _compared(points: int) -> str | None:
-    code, said = Command(folder="undisturbed").end(by_force=False)
+def _compared(points: int, home: Home) -> str | None:
+    code, said = Command("undisturbed").end(by_force=False)
     if code != 0:
         return f"the undisturbed campaign ended with {code}: {said}"
-    if left := [entry.name for entry in Path("scratch").iterdir()]:
+    if left := left_in(Path("scratch")):
         return f"left behind in the folder for temporary files: {left}"
-    got = read_runs(dataset_place("campaign"))
+    got = read_runs(dataset_place(home.place))
     return _misjudged(got, points) or difference(
         _content(read_flat(Path("undisturbed", "dataset.nc"))), _content(got)
     )

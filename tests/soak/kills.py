@@ -1,4 +1,7 @@
-"""Kills of a campaign's processes at random times, the command among them, change no bit of its dataset."""
+"""Kills of a campaign's processes at random times, the command among them, change no bit of its dataset.
+
+The dataset is a file, a store in a folder, or a store in an object store, whose process is not killed.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,10 @@ import xarray as xr
 from support.campaign_process import BUSY, workers_of
 from support.campaign_scenes import TIMING, frequency_text
 
+from soak._homes import KINDS, Home, entry, home_of, left_in
 from vibroimpact.analysis.dataset import read_flat
+from vibroimpact.analysis.dataset.places import dataset_place
+from vibroimpact.analysis.dataset.stores.runs import read_runs
 
 CASES = 60
 SAMPLE = 0
@@ -26,6 +32,7 @@ MOST_COMMANDS = 6
 """Most commands of one case: all but the last may be killed."""
 POINTS = {"independent": 120, "up-down": 60}
 MILLISECONDS = 8.0
+SHARD_POINTS = 16
 LOST_MANIFESTS = 0.3
 """Share of the commands before which `campaign.json` is removed."""
 STAMPS = ("history", "date_created", "creation_date")
@@ -33,7 +40,11 @@ STAMPS = ("history", "date_created", "creation_date")
 
 def check(seed: int) -> str | None:
     """Kill at random, resume to the end, and compare with an undisturbed campaign."""
-    chance = random.Random(seed)
+    with home_of(KINDS[seed % len(KINDS)]) as home:
+        return _killed(random.Random(seed), home)
+
+
+def _killed(chance: random.Random, home: Home) -> str | None:
     path = chance.choice(sorted(POINTS))
     expected = _undisturbed(path)
     scratch = Path("scratch")
@@ -41,19 +52,18 @@ def check(seed: int) -> str | None:
     Path("scene.toml").write_text(frequency_text(POINTS[path], path, MILLISECONDS))
     for number in range(MOST_COMMANDS):
         if chance.random() < LOST_MANIFESTS:
-            Path("campaign", "campaign.json").unlink(missing_ok=True)
+            (home.path / "campaign.json").unlink(missing_ok=True)
         last = number == MOST_COMMANDS - 1
-        code, err = _command("scene.toml", "campaign", scratch, None if last else chance)
+        code, err = _command("scene.toml", home, scratch, None if last else chance)
         if code is None:
             return f"the command had not ended after {WAIT_SECONDS:.0f} s: {err}"
         if code == 0:
             break
         if code > 0 or last:
             return f"exit code {code}: {err}"
-    left = [entry.name for entry in scratch.iterdir()]
-    if left:
+    if left := left_in(scratch):
         return f"left behind in the folder for temporary files: {left}"
-    return difference(expected, content(Path("campaign", "dataset.nc")))
+    return difference(expected, bits_of(read_runs(dataset_place(home.place))))
 
 
 Content = tuple[dict[str, tuple[str, bytes]], dict[str, str]]
@@ -66,7 +76,8 @@ def _undisturbed(path: str) -> Content:
     folder.mkdir()
     scene = folder / "scene.toml"
     scene.write_text(frequency_text(POINTS[path], path, MILLISECONDS))
-    code, err = _command(str(scene), str(folder / "campaign"), folder, None)
+    home = Home(str(folder / "campaign"), (), folder / "failing")
+    code, err = _command(str(scene), home, folder, None)
     if code != 0:
         raise RuntimeError(f"the undisturbed campaign ended with {code}: {err}")
     return content(folder / "campaign" / "dataset.nc")
@@ -100,11 +111,11 @@ def difference(expected: Content, got: Content) -> str | None:
     return None
 
 
-def _command(scene: str, folder: str, scratch: Path, chance: random.Random | None) -> tuple[int | None, str]:
+def _command(scene: str, home: Home, scratch: Path, chance: random.Random | None) -> tuple[int | None, str]:
     """Run a campaign and kill some of its processes; return its exit code (None: it hung) and its messages."""
-    arguments = ["BusyRunner", "campaign", scene, "-o", folder, "--workers", "2"]
+    arguments = ["BusyRunner", "campaign", scene, "-o", home.place, "--workers", "2", *home.options]
     with subprocess.Popen(
-        [sys.executable, "-c", BUSY, *arguments],
+        [sys.executable, "-c", entry(SHARD_POINTS, BUSY), *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.flat_file import FlatFile
-from vibroimpact.analysis.dataset.grid import on_grid
+from vibroimpact.analysis.dataset.grid import cells_of
 from vibroimpact.analysis.dataset.joining import appended_file, blocks_in_order
 from vibroimpact.analysis.dataset.outputs import DATASET_ENDING, refuse_outputs, writing
 from vibroimpact.analysis.dataset.places import dataset_place, given_place
@@ -126,12 +126,8 @@ def _to_file(store: StoreRuns, output: Path, shown: Shown) -> int:
 
 def _to_store(flat: FlatFile, output: Place, shown: Shown) -> int:
     """Write a file as a store."""
-    opened = on_grid(flat.dataset, lazily=True)
-    run_id = opened.variables["run_id"]
-    grid = StoreGrid.cut(tuple(map(str, run_id.dims)), run_id.shape)
-    axes = {str(name): one.variable for name, one in opened.coords.items() if _is_axis(str(name), one, grid)}
-    axes = {} if grid.is_line else axes
-    done, ids = 0, run_id.values
+    dims, axes, ids = cells_of(flat.dataset)
+    grid, done = StoreGrid.cut(dims, ids.shape), 0
     with whole_store(output) as place:
         create_store(place, flat.dataset, grid, axes)
         writer = StoreWriter(place)
@@ -144,12 +140,6 @@ def _to_store(flat: FlatFile, output: Place, shown: Shown) -> int:
             shown(done, flat.dataset.sizes["run"])
         writer.finish()
     return done
-
-
-def _is_axis(name: str, coordinate: xr.DataArray, grid: StoreGrid) -> bool:
-    """Return whether a coordinate lies along the cells, which the numbers of the scene and labels do not."""
-    along = set(coordinate.dims)
-    return name == "direction" or (bool(along) and along <= set(grid.dims) and name != "run_index")
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.stores.overview import OVERVIEW, BlockGrid
 from vibroimpact.analysis.dataset.stores.store import LABELS, SHARD_ORDER, grid_of
 from vibroimpact.analysis.dataset.stores.storing import Read
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
 from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_up_to
@@ -295,7 +296,8 @@ class StoreContents:
 
     def stored(self) -> xr.Dataset:
         """Return the dataset on the dimensions of the arrays of the store."""
-        variables = {name: self._variable(name) for name in self.names}
+        read = done_at_once(self._variable, self.names, self._place)
+        variables = dict(zip(self.names, read, strict=True))
         linked = sorted((name for name in self.linked if name in variables), key=self._rank)
         coords = {name: variables.pop(name) for name in linked}
         with one_store_error(self._place):

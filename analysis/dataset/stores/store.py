@@ -16,9 +16,9 @@ metadata: a store without them is unfinished, and is not opened.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 from typing import Any
 from uuid import uuid4
 
@@ -32,19 +32,17 @@ from vibroimpact.analysis.dataset.grid import direction_codes, direction_words, 
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, constant_names, swept_names
 from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
 from vibroimpact.analysis.dataset.stores.overview import CLASSES, OVERVIEW, BlockGrid, names_of, quantities_of
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_stored
 from vibroimpact.analysis.files.stores import (
     Place,
     announce,
     arrays_of,
     consolidate,
-    has_object,
     is_written,
     new_array,
-    objects_below,
     one_store_error,
     opened_group,
-    remove_object,
 )
 from vibroimpact.fmus.errors import DatasetError
 
@@ -69,6 +67,15 @@ class _Array:
     shard: tuple[int, ...]
     dtype: Any
     attrs: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """The values of one shard in one array."""
+
+    array: Any
+    block: Block
+    values: NDArray[Any]
 
 
 def create_store(
@@ -156,7 +163,7 @@ class StoreWriter:
         runs: Named,
         cells: NDArray[np.int64] | None = None,
         run_ids: NDArray[np.int32] | None = None,
-    ) -> dict[str, int]:
+    ) -> dict[str, str]:
         """Write the runs of one shard, and replace what was there.
 
         Parameters
@@ -173,7 +180,7 @@ class StoreWriter:
         Returns
         -------
         dict
-            Number of rows of each ragged dimension.
+            SHA-256 of each object of the shard, by its key.
 
         Raises
         ------
@@ -193,13 +200,27 @@ class StoreWriter:
                 f"{self._place}: expected at most {math.prod(shape)} runs in the shard, each with a cell, got {count}."
             )
         in_order = count == math.prod(shape) and bool((places == np.arange(count)).all())
+        pieces = chain(
+            self._cells(block, columns, ids, None if in_order else places, shape),
+            self._blocks_of_overview(block, columns, places, shape),
+            self._rows(self.grid.number(block), columns, ids),
+        )
         with one_store_error(self._place, writes=True):
-            for name, array in self._of_cells.items():
-                values = ids if name == "run_id" else _column(columns, name)
-                on_cells = _on_cells(array, values, None if in_order else places, shape)
-                self._replace(array, block, on_cells)
-            self._write_overview(block, runs, places, shape)
-            return {dim: self._write_rows(dim, self.grid.number(block), columns, ids) for dim in self._ragged}
+            written = done_at_once(self._replace, pieces, self._place, lambda piece: piece.values.nbytes)
+        return {key: digest for each in written for key, digest in sorted(each.items())}
+
+    def _cells(
+        self,
+        block: Block,
+        columns: Mapping[Any, xr.Variable],
+        ids: NDArray[np.int32],
+        places: NDArray[Any] | None,
+        shape: tuple[int, ...],
+    ) -> Iterator[_Piece]:
+        """Yield the values of the runs of a shard on its cells."""
+        for name, array in self._of_cells.items():
+            values = ids if name == "run_id" else _column(columns, name)
+            yield _Piece(array, block, _on_cells(array, values, places, shape))
 
     def read_shard(
         self, block: Block, names: Collection[str], cells: NDArray[np.int64]
@@ -234,14 +255,13 @@ class StoreWriter:
                         found[name] = np.asarray(array[number, :count], dtype=_kind(array))
         return found
 
-    def _write_overview(
-        self, block: Block, runs: Named, places: NDArray[Any], shape: tuple[int, ...]
-    ) -> None:
-        """Write the blocks of a shard into the overview of a large map."""
+    def _blocks_of_overview(
+        self, block: Block, columns: Mapping[Any, xr.Variable], places: NDArray[Any], shape: tuple[int, ...]
+    ) -> Iterator[_Piece]:
+        """Yield the blocks of a shard in the overview of a large map."""
         blocks = BlockGrid.of(self.grid)
         if blocks is None:
             return
-        columns = runs.variables
         parts: dict[str, NDArray[Any]] = {}
         for name, values in quantities_of(columns).items():
             on_cells = np.full(math.prod(shape), np.nan)
@@ -256,44 +276,32 @@ class StoreWriter:
                 kinds.append(codes.reshape(shape))
             parts |= dict(zip(CLASSES, blocks.rarest(kinds), strict=True))
         for name, values in parts.items():
-            self._replace(self._overview[name], blocks.place(block), values)
+            yield _Piece(self._overview[name], blocks.place(block), values)
 
     @property
     def _ragged(self) -> list[str]:
         return [dim for dim in RAGGED if f"{dim}_rows" in self._arrays]
 
-    def _write_rows(self, dim: str, number: int, columns: Mapping[Any, xr.Variable], ids: Any) -> int:
-        """Write the rows of the runs of a shard; return their number."""
-        owners = np.repeat(ids, columns[RAGGED[dim]].values)
-        for name, array in self._arrays.items():
-            if _dims(array) != (f"{dim}_shard", f"{dim}_row"):
-                continue
-            values = owners if name == f"{dim}_run" else None
-            if values is None and name in columns:
-                values = columns[name].values
-            if values is not None and len(values):
-                rows = (slice(number, number + 1), slice(0, len(values)))
-                self._replace(array, rows, values[None])
-        return len(owners)
+    def _rows(self, number: int, columns: Mapping[Any, xr.Variable], ids: Any) -> Iterator[_Piece]:
+        """Yield the rows of the runs of a shard."""
+        for dim in self._ragged:
+            owners = np.repeat(ids, columns[RAGGED[dim]].values)
+            for name, array in self._arrays.items():
+                if _dims(array) != (f"{dim}_shard", f"{dim}_row"):
+                    continue
+                values = owners if name == f"{dim}_run" else None
+                if values is None and name in columns:
+                    values = columns[name].values
+                if values is not None and len(values):
+                    yield _Piece(array, (slice(number, number + 1), slice(0, len(values))), values[None])
 
-    def _replace(self, array: Any, block: Block, values: Any) -> None:
-        """Write whole shards; the objects that were there are removed first, as they may be damaged."""
-        for key in _keys(array, block):
-            remove_object(self._place, key)
-        array[(*block, *(slice(0, size) for size in array.shape[len(block) :]))] = values
-
-    def objects(self, block: Block) -> list[str]:
-        """Return the keys of the objects that a shard has; cells without values have no object."""
-        found: list[str] = []
-        for name, array in self._arrays.items():
-            if name in self._of_cells:
-                found += _keys(array, block)
-            elif _is_of_rows(_dims(array)) and array.ndim > 1:
-                found += objects_below(self._place, f"{array.path}/c/{self.grid.number(block)}")
-        blocks = BlockGrid.of(self.grid)
-        for array in arrays_of(self._group[OVERVIEW]).values() if blocks is not None else ():
-            found += _keys(array, blocks.place(block)) if blocks is not None else []
-        return sorted(key for key in found if has_object(self._place, key))
+    def _replace(self, piece: _Piece) -> dict[str, str]:
+        """Write whole shards of an array, and return the SHA-256 of each object; older ones may be damaged."""
+        array, further = piece.array, piece.array.shape[len(piece.block) :]
+        block = (*piece.block, *(slice(0, size) for size in further))
+        with self._group.store.replaced(_keys(array, block)) as found:
+            array[block] = piece.values
+        return dict(found)
 
     def _refuse_others(self, runs: Named) -> None:
         known = {*self._arrays, "direction", *swept_names(runs)}
@@ -329,33 +337,32 @@ class StoreWriter:
                 if self._arrays.pop(name, None) is not None:
                     self._of_cells.pop(name, None)
                     del self._group[name]
-            grid = replace(
-                self.grid,
-                shape=tuple(
-                    (sizes or {}).get(d, n) for d, n in zip(self.grid.dims, self.grid.shape, strict=True)
-                ),
-            )
-            self._announce_sizes({**(sizes or {}), **{dim: grid.shards for dim in OF_SHARDS}})
+            shape = zip(self.grid.dims, self.grid.shape, strict=True)
+            grid = replace(self.grid, shape=tuple((sizes or {}).get(dim, size) for dim, size in shape))
+            final = {**(sizes or {}), **{dim: grid.shards for dim in OF_SHARDS}}
+            shapes = {array.path: _cut(array, final) for array in self._arrays.values()}
             for dim in self._ragged:
-                counts = self._arrays[RAGGED[dim]]
-                rows = [int(np.maximum(counts[block], 0).sum()) for block in grid.blocks()]
+                rows = self._of_shards(grid, RAGGED[dim], lambda counts: int(np.maximum(counts, 0).sum()))
                 self._arrays[f"{dim}_rows"][: grid.shards] = np.array(rows, dtype=np.int64)
                 most = max([1, *rows])
-                for name, array in self._arrays.items():
+                for array in self._arrays.values():
                     if _dims(array) == (f"{dim}_shard", f"{dim}_row"):
-                        announce(self._place, name, (grid.shards, most))
+                        shapes[array.path] = (grid.shards, most)
             if self._ragged:
-                index = (self._arrays["run_index"][block] for block in grid.blocks())
-                first = [int(each[each >= 0].min(initial=_LAST)) for each in index]
+                first = self._of_shards(
+                    grid, "run_index", lambda index: int(index[index >= 0].min(initial=_LAST))
+                )
                 self._arrays[SHARD_ORDER][: grid.shards] = np.argsort(first, kind="stable")
+            changed = [array for array in self._arrays.values() if shapes[array.path] != array.shape]
+            done_at_once(
+                lambda array: announce(self._place, array.path, shapes[array.path]), changed, self._place
+            )
         consolidate(self._place)
 
-    def _announce_sizes(self, sizes: Mapping[str, int]) -> None:
-        """Write the final sizes of dimensions into the metadata of each array."""
-        for array in self._arrays.values():
-            shape = tuple(sizes.get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True))
-            if shape != array.shape:
-                announce(self._place, array.path, shape)
+    def _of_shards(self, grid: StoreGrid, name: str, found: Callable[[NDArray[Any]], int]) -> list[int]:
+        """Return a number of each shard, found from its values of a variable."""
+        array = self._arrays[name]
+        return done_at_once(lambda block: found(array[block]), grid.blocks(), self._place)
 
 
 def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict[str, _Array]:
@@ -447,10 +454,14 @@ def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
     return new_array(group, name, one.dims, one.shape, one.chunk, one.shard, one.dtype, attributes)
 
 
+def _cut(array: Any, sizes: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the shape of an array with some of its dimensions cut."""
+    return tuple(sizes.get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True))
+
+
 def _keys(array: Any, block: Block) -> list[str]:
-    """Return the keys of the objects of an array with these cells, whether they are there or not."""
+    """Return the keys of the objects of an array with these cells along all of its dimensions."""
     shard = array.shards or array.chunks
-    block = (*block, *(slice(0, size) for size in array.shape[len(block) :]))
     spans = [range(s.start // n, -(-s.stop // n)) for s, n in zip(block, shard, strict=True)]
     return [f"{array.path}/{array.metadata.encode_chunk_key(place)}" for place in product(*spans)]
 

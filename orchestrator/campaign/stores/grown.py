@@ -23,6 +23,7 @@ from vibroimpact.analysis.dataset.flat_file import FlatFile
 from vibroimpact.analysis.dataset.merging import joined
 from vibroimpact.analysis.dataset.schema import RULES, attributes_of
 from vibroimpact.analysis.dataset.stores.store import StoreWriter, create_store
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.files.stores import objects_below
@@ -73,7 +74,8 @@ def seal_parts(work: Work, complete: ShardParts) -> Seal:
         The shard cannot be written.
     """
     assert work.store is not None
-    shard, pieces = complete.shard, [_rows(work.store, work.scene, path) for path in complete.paths]
+    store, shard = work.store, complete.shard
+    pieces = done_at_once(lambda path: _rows(store, work.scene, path), complete.paths, store.path)
     if complete.kept is not None:
         with FlatFile(complete.kept) as kept:
             index = kept.dataset.variables["run_index"].values
@@ -124,14 +126,18 @@ class GrownStore(Destination):
             made_again = Path(folder.name, STORE)
             self._create(made_again)
             there = set(objects_below(self.path))
-            # the root names the scene: a store that is cut off without it would be taken for one of another program
-            for key in sorted(objects_below(made_again), key=lambda key: (key != "zarr.json", key)):
+
+            def put(key: str) -> None:
                 place, content = self.path / key, (made_again / key).read_bytes()
                 if key in there and place.read_bytes() == content:
-                    continue
+                    return
                 if isinstance(place, Path):
                     place.parent.mkdir(parents=True, exist_ok=True)
                 place.write_bytes(content)
+
+            # the root names the scene: a store that is cut off without it would be taken for one of another program
+            put("zarr.json")
+            done_at_once(put, sorted(set(objects_below(made_again)) - {"zarr.json"}), self.path)
 
     def _create(self, place: Path) -> None:
         """Make the arrays of the store, without runs, at another place."""
@@ -253,9 +259,8 @@ class GrownStore(Destination):
         """Take note of a shard that is written, and remove its parts."""
         self._sealed[seal.shard] = seal
         self._missing.pop(seal.shard, None)
-        for part in self._files.pop(seal.shard, []):
-            if part.path.parent != self._seals:
-                part.path.unlink(missing_ok=True)
+        parts = [part for part in self._files.pop(seal.shard, []) if part.path.parent != self._seals]
+        done_at_once(_remove, parts, self.path)
 
     def seal(self, work: Work, complete: ShardParts) -> None:
         """Write a complete shard; it stays in its parts where one of them is damaged, which is met again at the end."""
@@ -304,6 +309,10 @@ class GrownStore(Destination):
         sizes = {"period": max(seal.periods for seal in seals), "run": runs}
         writer.finish(attrs, sizes=sizes, absent=absent)
         seal_store(self.path, self._seals, runs, of_seal, {key for seal in seals for key in seal.objects})
+
+
+def _remove(part: StoredPart) -> None:
+    part.path.unlink(missing_ok=True)
 
 
 def _number(seal: AnyPath) -> int:

@@ -7,7 +7,7 @@ its complete parts. All objects of a shard are on the disk before its seal is.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,7 +21,7 @@ from vibroimpact.analysis.dataset.assembling import assembled
 from vibroimpact.analysis.dataset.schema import attributes_of
 from vibroimpact.analysis.dataset.stores.store import StoreWriter
 from vibroimpact.analysis.files.object_paths import AnyPath, located
-from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, Seal, object_hash, write_seal
+from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, Seal, write_seal
 from vibroimpact.orchestrator.campaign.stores.shards import Cells, Shard, cells_of
 from vibroimpact.orchestrator.run.dataset import coordinate_names, empty_dataset
 from vibroimpact.orchestrator.run.points import columns_of_points
@@ -80,10 +80,8 @@ def write_shard(
         The shard cannot be written.
     """
     writer = _writer(str(store.path), str(attrs["scene_hash"]))
-    writer.write_shard(shard.block, rows, store.cells(scene).places(shard))
-    objects = {
-        key: object_hash(store.path / key) for key in _flushed(store.path, writer.objects(shard.block))
-    }
+    objects = writer.write_shard(shard.block, rows, store.cells(scene).places(shard))
+    _flush(store.path, objects)
     values, counts = np.unique(rows.outcome.values, return_counts=True)
     seal = Seal(
         shard=shard.number,
@@ -137,10 +135,10 @@ def _writer(path: str, scene_hash: str) -> StoreWriter:
     return StoreWriter(path)
 
 
-def _flushed(store: AnyPath, keys: Sequence[str]) -> Sequence[str]:
+def _flush(store: AnyPath, keys: Iterable[str]) -> None:
     """Flush objects of a store, and the names of new ones, to the disk; an object store has done so itself."""
     if not isinstance(store, Path):
-        return keys
+        return
     folders = {str((store / key).parent) for key in keys}
     for path in (*(str(store / key) for key in keys), *sorted(folders)):
         handle = os.open(path, os.O_RDONLY)
@@ -148,4 +146,3 @@ def _flushed(store: AnyPath, keys: Sequence[str]) -> Sequence[str]:
             os.fsync(handle)
         finally:
             os.close(handle)
-    return keys

@@ -15,8 +15,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.analysis.files.object_paths import AnyPath, bounded_bytes, opened_bytes, raise_outage
+from vibroimpact.analysis.files.object_paths import (
+    AnyPath,
+    ObjectPath,
+    bounded_bytes,
+    opened_bytes,
+    raise_outage,
+)
 from vibroimpact.analysis.files.store_attributes import attributes_read
 from vibroimpact.analysis.files.stores import objects_below, opened_group
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -121,7 +128,7 @@ def read_sealed(path: AnyPath) -> dict[str, Any]:
 
 def seals_in(folder: AnyPath) -> Iterator[AnyPath]:
     """Yield the paths of the seals in a folder, by the number of their shard; other files do not belong to it."""
-    if folder.is_dir():
+    if isinstance(folder, ObjectPath) or folder.is_dir():
         yield from sorted(path for path in folder.iterdir() if _NAME.fullmatch(path.name))
 
 
@@ -142,14 +149,17 @@ def refuse_changed_objects(store: AnyPath, objects: Mapping[str, str]) -> None:
     DatasetError
         It names the first object that differs.
     """
-    for key, expected in objects.items():
+
+    def refuse_changed(key: str) -> None:
         try:
             found = object_hash(store / key)
         except OSError as error:
             raise_outage(store, error)
             raise DatasetError(f"{store / key}: {error.strerror or error}.") from error
-        if found != expected:
+        if found != objects[key]:
             raise DatasetError(f"{store / key}: its content is not the one whose SHA-256 its seal has.")
+
+    done_at_once(refuse_changed, objects, store)
 
 
 def _scene_of(store: AnyPath) -> str | None:
@@ -214,7 +224,8 @@ def seal_store(
     store: AnyPath, seals: AnyPath, runs: int, attrs: Mapping[str, Any], sealed: Collection[str] = ()
 ) -> None:
     """Write the seal of a finished store of some runs: attributes as those of a part, objects without another seal."""
-    objects = {key: object_hash(store / key) for key in sorted(objects_below(store)) if key not in sealed}
+    keys = [key for key in sorted(objects_below(store)) if key not in sealed]
+    objects = dict(zip(keys, done_at_once(lambda key: object_hash(store / key), keys, store), strict=True))
     write_sealed(seals / FINISHED, {"runs": runs, "attrs": dict(attrs), "objects": objects})
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import fsspec
@@ -19,6 +21,7 @@ from support.store_scenes import BODY
 import vibroimpact.analysis.files.object_lock as object_lock
 import vibroimpact.orchestrator.campaign.formats as formats
 import vibroimpact.orchestrator.campaign.schedule as schedule
+import vibroimpact.orchestrator.campaign.stores.sealing as sealing
 from vibroimpact.analysis.files.object_paths import ObjectPath, located
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
@@ -190,6 +193,66 @@ def test_a_campaign_whose_lock_was_taken_over_gives_up_and_leaves_the_lock() -> 
         with pytest.raises(CampaignError, match="another campaign has taken over"):
             refuse_lost()
     assert b"other" in lock.read_bytes()
+
+
+class Requests:
+    """Requests to the object store in memory: each takes some milliseconds; that of one object may fail."""
+
+    def __init__(self, patch: pytest.MonkeyPatch, failing: str = "") -> None:
+        self.seen: list[tuple[str, str, float, float]] = []
+        sealing._writer.cache_clear()  # it keeps a file system
+        kind = fsspec.get_filesystem_class("memory")
+        for name in ("pipe_file", "cat_file", "info", "rm_file"):
+            patch.setattr(kind, name, self._slow(name, getattr(kind, name), failing))
+
+    def _slow(self, name: str, request: Callable[..., object], failing: str) -> Callable[..., object]:
+        def slow(system: object, path: str, *arguments: object, **options: object) -> object:
+            began = time.perf_counter()
+            time.sleep(0.01)
+            if failing and path.endswith(failing):
+                raise OSError(errno.EIO, "no answer", path)
+            try:
+                return request(system, path, *arguments, **options)
+            finally:
+                self.seen.append((name, "/" + path.lstrip("/"), began, time.perf_counter()))
+
+        return slow
+
+
+def test_the_objects_of_a_shard_are_written_at_once_and_its_seal_last(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with monkeypatch.context() as patch:
+        requests = Requests(patch)
+        campaign_here(patch, MAP, HOME)
+    written = {path: (began, ended) for name, path, began, ended in requests.seen if name == "pipe_file"}
+    for number in range(3):
+        seal = f"/map/seals/shard-{number:06d}.json"
+        keys = json.loads(fsspec.filesystem("memory").cat_file(seal))["objects"]
+        spans = [written[f"/map/dataset.zarr/{key}"] for key in keys]
+        first, last = min(began for began, _ in spans), max(ended for _, ended in spans)
+        assert last <= written[seal][0]
+        assert max(sum(began <= at < ended for began, ended in spans) for at, _ in spans) >= 3
+        among = [(name, path) for name, path, began, _ in requests.seen if first < began < last]
+        assert [name for name, path in among if "/dataset.zarr/" in path] == ["pipe_file"] * (len(keys) - 1)
+
+
+@pytest.mark.parametrize("failing", ["outcome/c/1/0", "impact_time/c/2/0", "seals/shard-000001.json"])
+def test_a_request_that_fails_is_one_line_and_loses_no_other_shard(
+    failing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        Requests(patch, failing)
+        with pytest.raises(CampaignError, match="no answer") as gone:
+            campaign_here(patch, MAP, HOME)
+    sealing._writer.cache_clear()
+    assert "\n" not in str(gone.value)
+    sealed = objects("seals/shard")
+    number = int(failing.split("/")[2] if "/c/" in failing else 1)
+    assert f"/map/seals/shard-{number:06d}.json" not in sealed
+    assert campaign_here(monkeypatch, MAP, HOME).resumed >= 8 * len(sealed)
+    campaign_here(monkeypatch, MAP, tmp_path / "file")
+    assert_same_datasets(HOME, tmp_path / "file")
 
 
 def test_a_campaign_in_a_bucket_has_the_dataset_of_a_folder(

@@ -28,6 +28,19 @@ def sweep(*axes: str, **options: Any) -> str:
 
 ONE, THREE = axis("forcing.amplitude", [0.5]), axis("forcing.amplitude", [0.5, 0.4, 0.6])
 
+
+def test_the_files_of_a_cut_off_extension_go_with_the_next_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = sweep(axis("forcing.amplitude", [0.1, 0.2]))
+    for text in (small, small, sweep(axis("forcing.amplitude", [0.1, 0.2, 0.3]))):
+        left = tmp_path / "campaign" / ".earlier-rows"
+        left.mkdir(parents=True, exist_ok=True)
+        (left / "000000.nc").write_bytes(b"half a file")
+        campaign_here(monkeypatch, text, tmp_path / "campaign")
+        assert not left.exists()
+
+
 GROWN = {
     "twice as fine": (sweep(frequency(101)), sweep(frequency(201)), 101),
     "an appended value": (

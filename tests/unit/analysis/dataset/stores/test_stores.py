@@ -9,6 +9,7 @@ import tempfile
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import (
     Direction,
     RunRecord,
+    accessor,
     dataset_place,
     open_dataset,
     read_flat,
@@ -266,7 +268,10 @@ def test_a_store_is_no_dataset_until_it_is_finished(small_shards: None, tmp_path
         )
         with pytest.raises(DatasetError, match="expected a finished store, got one without consolidated"):
             open_dataset(tmp_path / "a.zarr")
-        assert writer.write_shard(block, rows, run_ids=ids) == {"impact": 0, "stick": 0, "sample": 0}
+        written = writer.write_shard(block, rows, run_ids=ids)
+        stored = {key: sha256((tmp_path / "a.zarr" / key).read_bytes()).hexdigest() for key in written}
+        assert written == stored
+        assert not any(key.startswith("impact_velocity") for key in written)
     writer.finish()
     with open_dataset(tmp_path / "a.zarr") as opened:
         assert opened.sizes["impact"] == 0
@@ -317,6 +322,23 @@ def test_a_thread_that_leaves_the_settings_of_zarr_takes_them_from_no_other() ->
             entered.wait(0.2)
         left.set()
         assert found.result()
+
+
+@pytest.mark.parametrize("name", DATASETS)
+@pytest.mark.usefixtures("small_shards")
+def test_columns_in_blocks_are_those_of_all_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_dataset(DATASETS[name](), tmp_path / "a.nc")
+    convert_dataset(tmp_path / "a.nc", tmp_path / "a.zarr")
+    with open_dataset(tmp_path / "a.zarr") as opened, open_dataset(tmp_path / "a.nc") as file:
+        names = [each for each in ("displacement_max", "outcome", "message") if each in opened]
+        for one, most in itertools.product((opened, file), (40, 1 << 22)):
+            monkeypatch.setattr(accessor, "BLOCK_VALUES", most)
+            blocks, runs = list(accessor.columns_of_runs(one, names)), one.vibroimpact.runs
+            for each in names:
+                expected = runs[each].values
+                np.testing.assert_array_equal(np.concatenate([block[each] for block in blocks]), expected)
 
 
 @pytest.mark.parametrize("left", [0, 7, 40])
