@@ -55,7 +55,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-ENGINE = 7
+ENGINE = 8
 """Version of the C engine that follows the package's bodies; other versions give other results in a campaign."""
 
 ENGINE_OF_ONE_MASS = 6

@@ -150,6 +150,49 @@ def test_no_contact_is_less_exact_than_by_series(scene: Scene, tolerance: float)
     assert abs(found[2] / right[2] - 1.0) <= lasts
 
 
+#: Natural frequency, shape, velocity and force of each mode; stiffness, damping, exponent and frequency of the force.
+#: At loose tolerances the ways out of these contacts went on beyond the end of the force, as those of thin contacts.
+SPENT = {
+    "4 modes": (
+        [
+            (0.149, 0.153, -0.519, 0.00277),
+            (1.43, -0.51, 0.427, -0.00924),
+            (12.9, -0.172, 1.04, -0.00313),
+            (228.0, -0.808, -0.949, -0.0146),
+        ],
+        (31.4, 2.91, 2.0, 0.297),
+    ),
+    "8 modes": (
+        [
+            (0.259, -2.45, 1.2, -0.0204),
+            (0.484, 0.37, -1.67, 0.00309),
+            (2.51, -0.823, 0.158, -0.00685),
+            (3.44, -0.751, -0.169, -0.00626),
+            (43.7, -0.369, -2.48, -0.00307),
+            (98.1, -0.61, -1.18, -0.00508),
+            (123.0, 0.44, -2.33, 0.00366),
+            (911.0, 1.76, 2.17, 0.0147),
+        ],
+        (16.2, 0.704, 1.0, 0.517),
+    ),
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("by_series", [True, False])
+@pytest.mark.parametrize("name", SPENT)
+def test_a_hunt_crossley_contact_ends_at_the_speed_that_spends_its_force(
+    name: str, by_series: bool, tolerance: float
+) -> None:
+    modes, (stiffness, damping, exponent, frequency) = SPENT[name]
+    natural, shape, velocity, force = np.ascontiguousarray(np.transpose(modes))
+    stop = Stop(shape, 1e-12, law="hunt_crossley", stiffness=stiffness, damping=damping, exponent=exponent)
+    scene = Scene(Modes(natural, 0.02, force, frequency), (stop,), np.zeros_like(natural), velocity)
+    # 1 + damping d' is 0 at the end, and the contact has begun with the speed shape . velocity
+    found = scene.contact(tolerance, by_series=by_series)
+    assert abs(found[0] * damping * (shape @ velocity) - 1.0) < 4.0 * tolerance
+
+
 def test_elastic_contacts_of_an_undamped_beam_conserve_energy() -> None:
     scene = struck_beam(64, 0.0, LAWS["hertz"])
     scene = replace(scene, modes=replace(scene.modes, force=0.0, angular_frequency=0.0))

@@ -178,7 +178,7 @@ static void check_steps(uint64_t *seed)
         vi_power_course course[VI_PORTS];
         const int port[1] = {0};
         double q_end[VI_MODES], p_end[VI_MODES], right_q[VI_MODES], right_p[VI_MODES], moved[VI_NODES];
-        vi_power_begin(&start, &model, &tables.basis, &state, 0.0, 1, port, at);
+        vi_power_begin(&start, &model, &tables, &state, 0.0, 1, port, at);
         const bool solved = vi_power_solve(&start, level, course);
         const double *series = course[0].force_series;
         if (!solved || !(fabs(series[VI_NODES - 1]) + fabs(series[VI_NODES - 2]) <= 1e-13 * fabs(series[0]))) {

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "motion/rows.h"
+
 /* Size of an entry, relative to the roots of its two diagonal entries, up to which it is 0: a few roundings. */
 static const double NEGLIGIBLE = 8.0 * DBL_EPSILON;
 /* Least size of 1 + tangent^2 of a rotation; below, the plane has only one vector, to half the digits. */
@@ -39,12 +41,31 @@ static bool find_rotation(vi_complex first, vi_complex second, vi_complex off, r
     return true;
 }
 
-static void rotate(int n, const rotation *turn, vi_complex x[], vi_complex y[])
+/* The product, with the bits of vi_complex_multiply: both parts at once. */
+static inline vi_pair multiply(vi_complex a, vi_pair b)
 {
-    for (int k = 0; k < n; ++k) {
-        const vi_complex kept = x[k];
-        x[k] = vi_complex_subtract(vi_complex_multiply(turn->cosine, kept), vi_complex_multiply(turn->sine, y[k]));
-        y[k] = vi_complex_add(vi_complex_multiply(turn->sine, kept), vi_complex_multiply(turn->cosine, y[k]));
+    return (vi_pair){a.re, a.re} * b + (vi_pair){-a.im, a.im} * (vi_pair){b[1], b[0]};
+}
+
+static inline void rotate_one(const rotation *turn, vi_complex *x, vi_complex *y)
+{
+    vi_pair *const first = (vi_pair *)x, *const second = (vi_pair *)y;
+    const vi_pair kept = *first, other = *second;
+    *first = multiply(turn->cosine, kept) - multiply(turn->sine, other);
+    *second = multiply(turn->sine, kept) + multiply(turn->cosine, other);
+}
+
+/* Rotate the entries beside those of i and j, above the diagonal: only these are read. */
+static void rotate_matrix(int n, const rotation *turn, vi_complex a[][VI_STATES], int i, int j)
+{
+    for (int k = 0; k < i; ++k) {
+        rotate_one(turn, &a[k][i], &a[k][j]);
+    }
+    for (int k = i + 1; k < j; ++k) {
+        rotate_one(turn, &a[i][k], &a[k][j]);
+    }
+    for (int k = j + 1; k < n; ++k) {
+        rotate_one(turn, &a[i][k], &a[j][k]);
     }
 }
 
@@ -58,15 +79,13 @@ static bool annihilate(int n, vi_complex a[][VI_STATES], vi_complex vector[][VI_
     }
     const vi_complex moved = vi_complex_multiply(vi_complex_divide(turn.sine, turn.cosine), off);
     const vi_complex first = vi_complex_subtract(a[i][i], moved), second = vi_complex_add(a[j][j], moved);
-    rotate(n, &turn, a[i], a[j]);
-    for (int k = 0; k < n; ++k) {
-        a[k][i] = a[i][k];
-        a[k][j] = a[j][k];
-    }
+    rotate_matrix(n, &turn, a, i, j);
     a[i][i] = first;
     a[j][j] = second;
-    a[i][j] = a[j][i] = (vi_complex){0.0, 0.0};
-    rotate(n, &turn, vector[i], vector[j]);
+    a[i][j] = (vi_complex){0.0, 0.0};
+    for (int k = 0; k < n; ++k) {
+        rotate_one(&turn, &vector[i][k], &vector[j][k]);
+    }
     return true;
 }
 

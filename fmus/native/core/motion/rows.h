@@ -75,26 +75,63 @@ typedef double vi_pair __attribute__((vector_size(16), aligned(8), may_alias));
 /* Width of a block of columns of a table. */
 enum { VI_COLUMNS = 8 };
 
+/* One block of vi_rows_combine. */
+static inline void vi_rows_combine_block(double *restrict value, const double *restrict row, ptrdiff_t stride,
+                                         const double *restrict weight, int count)
+{
+    vi_pair *const to = (vi_pair *)value;
+    vi_pair a = to[0], b = to[1], c = to[2], d = to[3];
+    for (int n = 0; n < count; ++n, row += stride) {
+        const vi_pair *const from = (const vi_pair *)row, factor = {weight[n], weight[n]};
+        a += factor * from[0];
+        b += factor * from[1];
+        c += factor * from[2];
+        d += factor * from[3];
+    }
+    to[0] = a;
+    to[1] = b;
+    to[2] = c;
+    to[3] = d;
+}
+
+/* Two blocks of vi_rows_combine side by side, since each sum waits for its last product. */
+static inline void vi_rows_combine_blocks(double *restrict value, const double *restrict row, ptrdiff_t stride,
+                                          const double *restrict weight, int count)
+{
+    vi_pair *const to = (vi_pair *)value;
+    vi_pair a = to[0], b = to[1], c = to[2], d = to[3], e = to[4], f = to[5], g = to[6], h = to[7];
+    for (int n = 0; n < count; ++n, row += stride) {
+        const vi_pair *const from = (const vi_pair *)row, factor = {weight[n], weight[n]};
+        a += factor * from[0];
+        b += factor * from[1];
+        c += factor * from[2];
+        d += factor * from[3];
+        e += factor * from[4];
+        f += factor * from[5];
+        g += factor * from[6];
+        h += factor * from[7];
+    }
+    to[0] = a;
+    to[1] = b;
+    to[2] = c;
+    to[3] = d;
+    to[4] = e;
+    to[5] = f;
+    to[6] = g;
+    to[7] = h;
+}
+
 /* value += weight[0] * row 0 + weight[1] * row 1 + ... of a table whose rows are `stride` numbers apart. The sums are
  * in the order of the rows. width: a multiple of VI_COLUMNS. */
 static inline void vi_rows_combine(double *restrict value, const double *restrict table, ptrdiff_t stride,
                                    const double *restrict weight, int count, int width)
 {
-    for (int i = 0; i < width; i += VI_COLUMNS) {
-        vi_pair *const to = (vi_pair *)(value + i);
-        vi_pair a = to[0], b = to[1], c = to[2], d = to[3];
-        const double *row = table + i;
-        for (int n = 0; n < count; ++n, row += stride) {
-            const vi_pair *const from = (const vi_pair *)row, factor = {weight[n], weight[n]};
-            a += factor * from[0];
-            b += factor * from[1];
-            c += factor * from[2];
-            d += factor * from[3];
-        }
-        to[0] = a;
-        to[1] = b;
-        to[2] = c;
-        to[3] = d;
+    int i = 0;
+    for (; i + 2 * VI_COLUMNS <= width; i += 2 * VI_COLUMNS) {
+        vi_rows_combine_blocks(value + i, table + i, stride, weight, count);
+    }
+    if (i < width) {
+        vi_rows_combine_block(value + i, table + i, stride, weight, count);
     }
 }
 

@@ -15,18 +15,19 @@ typedef struct {
     double sign;
     vi_press press;
     double depth, rate, acceleration;
+    double plain; /* force without damping, N */
     double toward[VI_POWER_ROW]; /* shape */
 } vi_power_contact;
 
-/* The body at the start of a step. */
+/* The body at the start of a step. Rows of modes have zeros behind the last mode. */
 typedef struct {
     const vi_structure_model *model;
-    const vi_legendre *basis;
+    const vi_power_tables *tables;
     int contacts;
     vi_power_contact contact[VI_PORTS];
     double cosine, sine; /* of the forcing phase */
     bool ramps;          /* does any input load slope? */
-    const double *p, *held_rate;
+    double p[VI_POWER_ROW], slope[VI_POWER_ROW]; /* of a mode: velocity, and slope of its input load */
     double load[VI_POWER_ROW]; /* of a mode: its input load less its spring's force */
     double gain[VI_POWER_ROW]; /* acceleration by load and damping */
     double turn[VI_POWER_ROW]; /* rate of change of the load and of the spring's force */
@@ -40,7 +41,7 @@ typedef struct {
 
 /* Begin at this state, `u` seconds after the instant of its input loads. port[]: the pressed contacts; depth[]: of all
  * contacts. */
-void vi_power_begin(vi_power_start *start, const vi_structure_model *model, const vi_legendre *basis,
+void vi_power_begin(vi_power_start *start, const vi_structure_model *model, const vi_power_tables *tables,
                     const vi_drift_start *state, double u, int contacts, const int port[], const double depth[]);
 
 /* Find depths and forces of the contacts. Returns false where a contact ends or the iteration fails. */

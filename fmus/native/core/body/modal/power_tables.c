@@ -36,6 +36,9 @@ bool vi_power_tables_fit(vi_power_tables *t, const vi_structure_model *model)
     t->angular_frequency = model->clock.angular_frequency;
     t->exist = model->fastest > 0.0;
     memcpy(t->observed, model->observed, size);
+    memset(t->stiffness, 0, sizeof t->stiffness);
+    memset(t->decay, 0, sizeof t->decay);
+    memset(t->force, 0, sizeof t->force);
     for (int j = 0; j < t->modes; ++j) {
         t->stiffness[j] = model->mode[j].stiffness;
         t->decay[j] = model->mode[j].decay;
@@ -102,6 +105,18 @@ static void respond(const vi_power_tables *t, int i, const double weight[], doub
     }
 }
 
+/* Response at node i to forces that grow, from the response to forces at the nodes. */
+static void respond_to_growth(const vi_power_tables *t, double step, vi_node_response response, int i,
+                              vi_growth_response grows)
+{
+    for (int k = 0; k < VI_NODES; ++k) {
+        const double time = step * t->basis.node[k];
+        grows[0][i] += response[k][i];
+        grows[1][i] += time * response[k][i];
+        grows[2][i] += 0.5 * time * time * response[k][i];
+    }
+}
+
 /* Response at node i of a point with this shape, for the body's forcing. */
 static void respond_to_wave(const vi_power_tables *t, const double shape[], double wave[2][VI_NODES], int i,
                             double way[VI_MODES][VI_NODES], double response[2][VI_NODES])
@@ -125,8 +140,11 @@ static void make_contact(const vi_power_tables *t, vi_power_level *level, int k,
             weight[j] = t->shape[k][j] * t->shape[l][j];
         }
         if (t->press[l].kind == VI_PRESS_POWER) {
-            respond(t, i, weight, way->x, level->yield[vi_pair_of_contacts(k, l)]);
-            respond(t, i, weight, way->v, level->yield_rate[vi_pair_of_contacts(k, l)]);
+            const int pair = vi_pair_of_contacts(k, l);
+            respond(t, i, weight, way->x, level->yield[pair]);
+            respond(t, i, weight, way->v, level->yield_rate[pair]);
+            respond_to_growth(t, level->step, level->yield[pair], i, level->grows[pair]);
+            respond_to_growth(t, level->step, level->yield_rate[pair], i, level->grows_rate[pair]);
         }
     }
     for (int j = 0; j < t->modes; ++j) {

@@ -24,6 +24,10 @@ static inline int vi_pair_of_contacts(int k, int l)
 /* A node's values for forces at the nodes: [k][i] at node i for the force 1 N at node k. */
 typedef double vi_node_response[VI_NODES][VI_NODES];
 
+/* Values at the nodes for the forces 1, t and t^2 / 2 of the time t since the start of the step. */
+enum { VI_GROWTHS = 3 };
+typedef double vi_growth_response[VI_GROWTHS][VI_NODES];
+
 /* Responses over steps of one length. `wave`: to cos and sin of the angular frequency of the forcing. */
 typedef struct {
     double step;                                          /* s; 0: the tables are not made yet */
@@ -35,6 +39,7 @@ typedef struct {
     double moment_rate[VI_NODES][VI_POWER_ROW]; /* its velocity */
     double wave_end[2][VI_POWER_ROW], wave_end_rate[2][VI_POWER_ROW]; /* of a mode at the end, for the force 1 */
     vi_node_response yield[VI_PAIRS], yield_rate[VI_PAIRS]; /* displacement and velocity of one of a pair of contacts */
+    vi_growth_response grows[VI_PAIRS], grows_rate[VI_PAIRS]; /* of the same */
     vi_node_response seen[VI_PORTS]; /* displacement of the observed point, for that force */
     double wave[VI_PORTS][2][VI_NODES], wave_rate[VI_PORTS][2][VI_NODES]; /* of a contact, for the body's forcing */
     double wave_seen[2][VI_NODES]; /* of the observed point */
@@ -45,7 +50,8 @@ typedef struct {
 struct vi_power_tables {
     int32_t modes, contacts, exist, prepared; /* exist: do all modes have closed forms? */
     double angular_frequency;
-    double stiffness[VI_MODES], decay[VI_MODES], force[VI_MODES]; /* of the body for which they were made */
+    /* of the body for which they were made, with zeros behind the last mode */
+    double stiffness[VI_POWER_ROW], decay[VI_POWER_ROW], force[VI_POWER_ROW];
     double shape[VI_PORTS][VI_MODES], observed[VI_MODES];
     vi_press press[VI_PORTS];
     vi_legendre basis;

@@ -76,7 +76,11 @@ static bool is_thin(const vi_structure *s, const vi_situation *now, int k, doubl
     const double reached = (rate + 0.5 * vi_max(0.0, acceleration) * *time) * *time;
     const double entered = vi_max(ENTRY * reached, shallow);
     const double left = vi_max(-rate * *time, coasts(s, k, depth, rate) ? shallow : 0.0);
-    return rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered;
+    if (rate > 0.0) {
+        return depth <= entered;
+    }
+    return depth <= shallow ? depth <= left || depth == 0.0
+                            : depth <= left && vi_thin_lasts(s, k, rate, now->acceleration, *time);
 }
 
 static void look_at_power(const vi_structure *s, vi_situation *now, int k, double rate)

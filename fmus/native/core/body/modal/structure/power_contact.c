@@ -16,7 +16,7 @@ enum { FEWEST_MODES = 4, REPAID = 2048 };
 /* Time left, in radians of the fastest rate, that one segment of the series covers at less cost. */
 static const double ONE_SEGMENT = 2.5;
 /* Longest step: in times to where the depth would be 0, ahead and behind; in radians of the forcing. */
-static const double AHEAD = 0.75, BEHIND = 4.0, OF_FORCING = 2.0;
+static const double AHEAD = 0.9, BEHIND = 4.0, OF_FORCING = 2.0;
 /* Share of the last two coefficients of the force in the error of a step. */
 static const double LAST_TERMS = 0.005;
 /* Largest last terms, relative to the force, in tolerances. */
@@ -25,8 +25,9 @@ static const double OF_FORCE = 50.0;
 static const double RAISES = 1e-3;
 /* Rounding of a depth, in roundings of the displacement. */
 static const double NOISE = 16.0;
-/* Time to the end of a contact, in radians of the fastest rate, below which its force may be that of a thin contact. */
-static const double NEAR_END = 2.0;
+/* Time to the end of a contact, in radians of the fastest rate, below which its force may be that of a thin contact.
+ * Its change of the velocity, relative to the velocity, is then at most this number of roots of the tolerance. */
+static const double NEAR_END = 2.0, LITTLE = 2.0;
 /* Most steps before the time is counted. */
 enum { MOST_STEPS = 64 };
 /* Cost of a step, in evaluations of a mode by series, for each mode. */
@@ -115,7 +116,7 @@ static double most_moved(const vi_structure *s, const vi_power_start *start, con
         const double radian = mode->natural > 0.0 ? 1.0 / mode->natural : HUGE_VAL;
         const double by_rate = vi_min(time, radian), by_load = vi_min(0.5 * time * time, 2.0 * radian * radian);
         const double by_force = vi_min(0.5 * time * time, time * radian);
-        const double force = fabs(mode->force) + fabs(start->held_rate[j]) * time + most_push(start, course, j);
+        const double force = fabs(mode->force) + fabs(start->slope[j]) * time + most_push(start, course, j);
         sum += fabs(s->model->shape[l][j])
                * (fabs(start->p[j]) * by_rate + fabs(start->load[j]) * by_load + force * by_force);
     }
@@ -135,7 +136,7 @@ static bool stays_clear(const vi_structure *s, const vi_power_start *start, cons
     }
     double away[VI_NODES], series[VI_NODES];
     vi_power_other(start, level, course, l, -vi_structure_direction(s, l), clearance, away);
-    vi_legendre_series(start->basis, away, series);
+    vi_legendre_series(&start->tables->basis, away, series);
     return vi_power_least(series) > 0.0;
 }
 
@@ -166,8 +167,10 @@ static double relative_error(const vi_structure *s, const vi_power_contact *cont
     const double noise = NOISE * DBL_EPSILON * vi_structure_displacement_size(s, contact->port) / deepest;
     const double reach = level->reach[contact->port], noise_of_force = contact->press.exponent * noise * largest;
     const double terms = fabs(last[0]) + fabs(last[1]), tolerance = s->model->tolerance;
+    /* a force that would stop the contact within the step: the error of a much smaller force moves nothing */
+    const double stopping = rate / (s->model->compliance[contact->port][contact->port] * level->step);
     return vi_max(LAST_TERMS * terms * reach / (tolerance * rate + noise_of_force * reach),
-                  terms / (OF_FORCE * tolerance * largest + noise_of_force));
+                  terms / (OF_FORCE * tolerance * (largest + stopping) + noise_of_force));
 }
 
 /* Extend the extremes. Returns false where the observed point moves too quickly for them. */
@@ -176,14 +179,14 @@ static bool follow_extremes(const vi_structure *s, const vi_power_start *start, 
 {
     double moved[VI_NODES], series[VI_NODES];
     vi_power_observe(start, level, course, moved);
-    vi_legendre_series(start->basis, moved, series);
+    vi_legendre_series(&start->tables->basis, moved, series);
     const double spread = vi_legendre_spread(series), here = vi_structure_observed(s);
     const double last = fabs(series[VI_NODES - 1]) + fabs(series[VI_NODES - 2]);
     if (!(last <= s->model->tolerance * spread + NOISE * DBL_EPSILON * fabs(here))) {
         return false;
     }
-    vi_record_extend(s->record, here + vi_legendre_largest(start->basis, series, moved, 1.0, 0.0));
-    vi_record_extend(s->record, here - vi_legendre_largest(start->basis, series, moved, -1.0, 0.0));
+    vi_record_extend(s->record, here + vi_legendre_largest(&start->tables->basis, series, moved, 1.0, 0.0));
+    vi_record_extend(s->record, here - vi_legendre_largest(&start->tables->basis, series, moved, -1.0, 0.0));
     return true;
 }
 
@@ -197,7 +200,7 @@ static void record(const vi_structure *s, const vi_power_start *start, const vi_
         vi_touch_down *touch = &s->state->touch_down[k];
         touch->impulse += level->step * series[0];
         if (vi_structure_follows_peak(s, k)) {
-            touch->peak = vi_legendre_largest(start->basis, series, course[i].force, 1.0, touch->peak);
+            touch->peak = vi_legendre_largest(&start->tables->basis, series, course[i].force, 1.0, touch->peak);
         }
     }
 }
@@ -251,12 +254,15 @@ static double step_once(const vi_structure *s, const vi_power_start *start, doub
     return 0.0;
 }
 
-/* Is a contact about to end, so that its force may be that of a thin contact? */
-static bool is_ending(const vi_power_start *start)
+/* May the force of a contact, which moves out, act as that of a thin contact? */
+static bool may_be_thin(const vi_power_start *start)
 {
+    const double most = LITTLE * sqrt(start->model->tolerance);
     for (int i = 0; i < start->contacts; ++i) {
         const vi_power_contact *contact = &start->contact[i];
-        if (contact->depth <= NEAR_END * -contact->rate * start->model->radian) {
+        const double speed = -contact->rate, time = speed > 0.0 ? contact->depth / speed : HUGE_VAL;
+        const double change = contact->plain * start->model->compliance[contact->port][contact->port] * time;
+        if (time <= NEAR_END * start->model->radian && change <= most * speed) {
             return true;
         }
     }
@@ -279,8 +285,8 @@ double vi_structure_press_on(const vi_structure *s, const vi_situation *now, con
         for (int i = 0; i < contacts && step > 0; ++i) {
             depth[port[i]] = -vi_structure_clearance(s, port[i]);
         }
-        vi_power_begin(&start, s->model, &s->power->basis, &here, u, contacts, port, depth);
-        if (step > 0 && is_ending(&start)) {
+        vi_power_begin(&start, s->model, s->power, &here, u, contacts, port, depth);
+        if (step > 0 && may_be_thin(&start)) {
             break;
         }
         moved = step_once(s, &start, length - u);

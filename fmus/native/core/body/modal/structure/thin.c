@@ -77,6 +77,17 @@ double vi_thin_time(const vi_structure *s, int k, double rate, const double acce
     return vi_max(accurate, vi_min(moves, turned));
 }
 
+bool vi_thin_lasts(const vi_structure *s, int k, double rate, const double acceleration[], double time)
+{
+    const double damping = vi_structure_press(s, k).damping;
+    if (damping == 0.0) {
+        return true;
+    }
+    const double pull = fabs(vi_structure_at(s->model, s->model->shape[k], acceleration));
+    const double jerk = jerk_size(s, k, acceleration) * sqrt(s->model->compliance[k][k]);
+    return 1.0 + damping * (rate - (pull + 0.5 * jerk * time) * time) > 0.0;
+}
+
 /* Integral of max(0, depth + rate t)^n over u seconds; *moment: integral of its effect on the displacement. */
 static double integrate(double n, double depth, double rate, double u, double *moment)
 {
