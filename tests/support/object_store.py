@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
@@ -29,6 +30,13 @@ def endpoint() -> Iterator[str]:
 
 @pytest.fixture
 def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
+    """Yield the file system that has the bucket `bucket`."""
+    with bucket_of(endpoint, monkeypatch) as system:
+        yield system
+
+
+@contextmanager
+def bucket_of(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3fs.S3FileSystem]:
     """Make the bucket `bucket` and yield the file system that has it; this process and its children find it."""
     import fsspec
 
