@@ -174,7 +174,7 @@ typedef struct {
     vi_lane_array fastest_impact, impacts;
     /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
-    vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps of VI_CELLS */
+    vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps over all cells of a round */
     vi_lane_array hit_pairs, hit_share;       /* whole pairs of the last flight to a contact, and share of one more */
     vi_lane_array hit_q, hit_p;               /* at the start of that one */
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */

@@ -59,7 +59,8 @@ LANES_INLINE void ends_of_pairs(const vi_lane_group *g, int at, const flight *f,
 /* Count the pairs in which a contact is surely not met. q[]: at the ends of the pairs; bend: q'' now, over a pair.
  *
  * The motion exceeds the line over a pair by at most an eighth of its largest -y''. Second differences give y'' at the
- * ends of pairs to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it. */
+ * ends of pairs to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it.
+ * The difference at the end of the last near pair reaches into the next pair. */
 LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const flight *f, const vector q[], vector bend)
 {
     const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
@@ -74,7 +75,7 @@ LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const fli
             next = sign * q[i + 1] - limit;
             end_curve = (next - here) - (here - before);
         }
-        mask passes = larger(before, here) < 0.125 * smaller(smaller(curve, end_curve) - error[i > VI_NEAR_PAIRS], none);
+        mask passes = larger(before, here) < 0.125 * smaller(smaller(curve, end_curve) - error[i >= VI_NEAR_PAIRS], none);
         if (i == 1) {
             /* just left: the mean velocity since then, which is smooth, stays negative */
             const vector leaving = sign * (f->now.p * pair_of(g, at));
@@ -114,7 +115,7 @@ LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, flight *f)
 /* Move on to the pair in which each lane may meet a contact, its goal or the end of its round. */
 LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts, flight *f)
 {
-    candidate cell;
+    candidate pair;
     vector count[VI_LANES_CONTACTS], cleared, q[VI_PAIRS + 1];
     for (int i = 0;; ++i) {
         ends_of_pairs(g, at, f, q);
@@ -122,30 +123,30 @@ LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts,
         for (int c = 0; c < contacts; ++c) {
             count[c] = count_clear(g, at, c, f, q, bend);
         }
-        cell.passed = sure_pairs(f, contacts, count, &cleared);
-        const mask jumps = cell.passed == (double)VI_PAIRS;
+        pair.passed = sure_pairs(f, contacts, count, &cleared);
+        const mask jumps = pair.passed == (double)VI_PAIRS;
         if (i == MOST_JUMPS || !any(jumps)) {
             break;
         }
         jump(g, at, jumps, f);
         bound(g, at, f);
     }
-    const mask jumps = cell.passed == (double)VI_PAIRS;
-    const vector length = larger(f->to_goal - cell.passed, all(0.0));
-    cell.length = only(~jumps, smaller(length, all(1.0)));
-    cell.goal = ~jumps & (length <= 1.0);
-    cell.searched = ~jumps & (cleared == cell.passed);
-    cell.twofold = cell.searched & ~cell.searched;
-    cell.sign = cell.limit = cell.number = all(0.0);
+    const mask jumps = pair.passed == (double)VI_PAIRS;
+    const vector length = larger(f->to_goal - pair.passed, all(0.0));
+    pair.length = only(~jumps, smaller(length, all(1.0)));
+    pair.goal = ~jumps & (length <= 1.0);
+    pair.searched = ~jumps & (cleared == pair.passed);
+    pair.twofold = pair.searched & ~pair.searched;
+    pair.sign = pair.limit = pair.number = all(0.0);
     for (int c = contacts - 1; c >= 0; --c) {
-        const mask met = cell.searched & (count[c] == cell.passed);
-        cell.twofold |= met & (cell.number > 0.0);
-        cell.sign = choose(met, load(g->sign[c] + at), cell.sign);
-        cell.limit = choose(met, load(g->limit[c] + at), cell.limit);
-        cell.number = choose(met, all((double)(c + 1)), cell.number);
+        const mask met = pair.searched & (count[c] == pair.passed);
+        pair.twofold |= met & (pair.number > 0.0);
+        pair.sign = choose(met, load(g->sign[c] + at), pair.sign);
+        pair.limit = choose(met, load(g->limit[c] + at), pair.limit);
+        pair.number = choose(met, all((double)(c + 1)), pair.number);
     }
-    cell.start = after_pairs(g, at, &f->now, q, cell.passed);
-    return cell;
+    pair.start = after_pairs(g, at, &f->now, q, pair.passed);
+    return pair;
 }
 
 /* Result of a round for the lanes. */
@@ -156,50 +157,73 @@ typedef struct {
     mask hits, careful;
 } arrival;
 
-/* Move to the contact, the goal or the end of a pair with these Taylor coefficients. */
-LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, candidate *cell, const vector term[])
+/* A search in a pair. `from`, `to`: the part that is judged, later the part with the contact. */
+typedef struct {
+    place from, to, end; /* end: of the pair, or the goal */
+    stop stop;
+    vector noise; /* rounding of y */
+    mask open;    /* undecided beyond `from` */
+    mask hits;
+} pair_search;
+
+LANES_INLINE pair_search begin_search(const vi_lane_group *g, int at, const flight *f, const candidate *pair,
+                                      const vector term[])
 {
-    const vector none = all(0.0), flown = f->jumped + cell->passed;
+    const vector none = all(0.0);
+    pair_search s = {.end = place_at(term, pair->length), .hits = none != none};
+    s.from = (place){none, pair->start.q - term[0], pair->start.p * pair_of(g, at)};
+    s.to = s.end;
+    s.stop = (stop){pair->sign, pair->limit, (pair->passed == 0.0) & (f->on == pair->number)};
+    s.noise = ROUNDING * (size_of(pair->limit) + size_of(term[0]) + size_of(term[1]) + size_of(s.end.added));
+    s.open = pair->searched & ~pair->twofold;
+    return s;
+}
+
+/* Judge the parts of a pair, in their order, up to the first that has a contact. Undecided parts are halved. */
+LANES_INLINE void judge_parts(const vector term[], pair_search *s)
+{
     const bends b = bends_of(term);
-    const place end = place_at(term, cell->length);
-    place from = {none, cell->start.q - term[0], cell->start.p * pair_of(g, at)}, to = end;
-    stop next = {cell->sign, cell->limit, (cell->passed == 0.0) & (f->on == cell->number)};
-    const vector noise = ROUNDING * (size_of(cell->limit) + size_of(term[0]) + size_of(term[1]) + size_of(end.added));
-    arrival a = {.hits = none != none, .careful = cell->twofold};
-    mask open = cell->searched & ~cell->twofold;
-    for (int i = 0; i < MOST_PARTS && any(open); ++i) {
-        const verdict part = judge(&next, term, &b, &from, &to, noise);
-        const mask hits = open & part.hits, passes = open & part.clear, cuts = open & ~(hits | passes);
-        a.hits |= hits;
-        open &= ~(hits | (passes & (to.share == cell->length)));
-        if (any(open)) {
-            from = either_place(passes & open, &to, &from);
-            to = either_place(passes & open, &end, &to);
-            next.leaves &= from.share == 0.0;
+    for (int i = 0; i < MOST_PARTS && any(s->open); ++i) {
+        const verdict part = judge(&s->stop, term, &b, &s->from, &s->to, s->noise);
+        const mask hits = s->open & part.hits, passes = s->open & part.clear, cuts = s->open & ~(hits | passes);
+        s->hits |= hits;
+        s->open &= ~(hits | (passes & (s->to.share == s->end.share)));
+        if (any(s->open)) {
+            s->from = either_place(passes & s->open, &s->to, &s->from);
+            s->to = either_place(passes & s->open, &s->end, &s->to);
+            s->stop.leaves &= s->from.share == 0.0;
             if (any(cuts)) {
-                const place half = place_at(term, 0.5 * (from.share + to.share));
-                to = either_place(cuts, &half, &to);
+                const place half = place_at(term, 0.5 * (s->from.share + s->to.share));
+                s->to = either_place(cuts, &half, &s->to);
             }
         }
     }
-    place stays = end;
-    if (any(open)) {
-        stays = either_place(open, &from, &end);
-        a.careful |= open & (from.share == 0.0);
+}
+
+/* Move to the contact, the goal or the end of a pair with these Taylor coefficients. */
+LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, candidate *pair, const vector term[])
+{
+    pair_search s = begin_search(g, at, f, pair, term);
+    judge_parts(term, &s);
+    arrival a = {.hits = s.hits, .careful = pair->twofold};
+    place stays = s.end;
+    if (any(s.open)) {
+        stays = either_place(s.open, &s.from, &s.end);
+        a.careful |= s.open & (s.from.share == 0.0);
     }
     if (any(a.hits)) {
-        const vector y = term[0] - cell->sign * cell->limit;
-        const mask repeats = repeat_last(g, at, flown, &cell->start);
-        const place met = find_contact(g, at, a.hits, repeats, term, y, &from, &to);
-        const mask lost = a.hits & ~(size_of(y + met.added) <= noise);
+        const vector y = term[0] - pair->sign * pair->limit;
+        const mask repeats = repeat_last(g, at, f->jumped + pair->passed, &pair->start);
+        const place met = find_contact(g, at, a.hits, repeats, term, y, &s.from, &s.to);
+        const mask lost = a.hits & ~(size_of(y + met.added) <= s.noise);
         a.hits &= ~lost;
         a.careful |= lost;
         stays = either_place(a.hits, &met, &stays);
     }
-    cell->goal &= stays.share == cell->length;
+    pair->goal &= stays.share == pair->length;
     a.share = stays.share;
     a.slope = stays.slope;
-    a.q = choose(a.hits, cell->sign * cell->limit, term[0] + stays.added);
+    a.q = choose(a.hits, pair->sign * pair->limit, term[0] + stays.added);
     a.p = a.slope * pair_rate(g, at);
     return a;
 }
@@ -222,21 +246,21 @@ LANES_INLINE vector restitution_of(const vi_lane_group *g, int at, int contacts,
 }
 
 /* Rebound at the hit contacts; returns the lanes that leave lockstep. */
-LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *cell, arrival *a)
+LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *pair, arrival *a)
 {
-    const vector approach = cell->sign * a->p;
+    const vector approach = pair->sign * a->p;
     vector resolution = all(0.0);
     for (int c = 0; c < contacts; ++c) {
-        resolution = choose(cell->number == (double)(c + 1), load(g->resolution[c] + at), resolution);
+        resolution = choose(pair->number == (double)(c + 1), load(g->resolution[c] + at), resolution);
     }
-    const vector restitution = restitution_of(g, at, contacts, a->hits, cell->number, approach);
+    const vector restitution = restitution_of(g, at, contacts, a->hits, pair->number, approach);
     const vector after = restitution * approach;
     const vector fastest = larger(load(g->fastest_impact + at), only(a->hits, approach));
     const mask leaves = a->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
     store(g->fastest_impact + at, fastest);
-    store(g->hit + at, only(a->hits, cell->number));
+    store(g->hit + at, only(a->hits, pair->number));
     store(g->approach + at, only(a->hits, approach));
-    a->p = choose(a->hits, -cell->sign * after, a->p);
+    a->p = choose(a->hits, -pair->sign * after, a->p);
     return leaves;
 }
 
@@ -267,29 +291,29 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
         sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }
     vector term[VI_LANE_ORDER + 1];
-    candidate cell = choose_pair(g, at, contacts, &f);
-    expand(g, at, &cell.start, term);
-    arrival a = search(g, at, &f, &cell, term);
-    const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
-    const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
-    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), flown = f.jumped + cell.passed;
+    candidate pair = choose_pair(g, at, contacts, &f);
+    expand(g, at, &pair.start, term);
+    arrival a = search(g, at, &f, &pair, term);
+    const mask leaves = rebound(g, at, contacts, &pair, &a), moves = ~a.careful;
+    const mask arrives = pair.goal & ~a.hits & moves, stays = a.careful & (pair.passed == 0.0);
+    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), flown = f.jumped + pair.passed;
     /* the rest of the core counts cells */
     const vector cells = 2.0 * only(moves, a.share), one = only(cells >= 1.0, all(1.0)), share = cells - one;
-    const vector q = choose(moves, a.q, cell.start.q);
-    const vector p = choose(moves, a.p, cell.start.p);
+    const vector q = choose(moves, a.q, pair.start.q);
+    const vector p = choose(moves, a.p, pair.start.p);
     store(g->start_q[0] + at, f.start.q);
     store(g->start_p[0] + at, f.start.p);
     store(g->start_cosine + at, f.start.cosine);
     store(g->start_sine + at, f.start.sine);
     store(g->jumped + at, 2.0 * f.jumped);
     store(g->hit_pairs + at, choose(a.hits, flown, load(g->hit_pairs + at)));
-    store(g->hit_q + at, choose(a.hits, cell.start.q, load(g->hit_q + at)));
-    store(g->hit_p + at, choose(a.hits, cell.start.p, load(g->hit_p + at)));
+    store(g->hit_q + at, choose(a.hits, pair.start.q, load(g->hit_q + at)));
+    store(g->hit_p + at, choose(a.hits, pair.start.p, load(g->hit_p + at)));
     store(g->hit_share + at, choose(a.hits, a.share, load(g->hit_share + at)));
-    store(g->passed + at, 2.0 * cell.passed + one);
+    store(g->passed + at, 2.0 * pair.passed + one);
     store(g->share + at, share);
     store(g->impacts + at, impacts);
-    store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
+    store(g->on + at, choose(a.hits, pair.number, only(stays, f.on)));
     move_clock(g, at, 2.0 * flown + one, share, arrives);
     if (plan->rate > 0.0) {
         take_samples(g, plan, points, at);
