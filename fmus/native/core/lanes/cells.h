@@ -21,7 +21,7 @@ typedef struct {
     vector on;
     vector to_goal;             /* pairs */
     vector jumped;              /* whole pairs passed from `start` to `now` */
-    vector third[2], fourth[2]; /* bounds of derivatives of q over VI_NEAR_PAIRS pairs, over all, times powers of the pair */
+    vector third[2], fourth[2]; /* bounds of derivatives of q over the near pairs, and over all, in units of a pair */
 } flight;
 
 /* Length of a pair, s. */

@@ -12,8 +12,8 @@
 
 #include "lanes/lane_points.h"
 
-/* VI_CELLS: of a round; VI_PAIRS: pairs of cells of a round between rigid stops, more than a period of the fastest rate;
- * VI_LANE_ORDER: of the Taylor series. */
+/* VI_CELLS: of a round. VI_PAIRS: pairs of cells of a round of one mode between rigid stops; they reach over a period of
+ * the fastest rate. VI_NEAR_PAIRS: first ones, with bounds of their own. VI_LANE_ORDER: of the Taylor series. */
 enum { VI_LANES = 8, VI_CELLS = 8, VI_PAIRS = 9, VI_NEAR_PAIRS = 4, VI_LANE_ORDER = 14 };
 
 /* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
@@ -39,8 +39,8 @@ typedef struct {
     vi_lane_array taylor[VI_LANE_ORDER + 1][VI_PARTS]; /* of q over a cell */
     /* the same over a pair of cells, about its middle, in the share of the pair less 1/2; between rigid stops */
     vi_lane_array middle[VI_LANE_ORDER + 1][VI_PARTS];
-    /* bounds of the third and fourth derivatives of q over a pair, of VI_NEAR_PAIRS pairs and of all: a number, and
-     * factors of |q| and |p| at the start */
+    /* bounds of the third and fourth derivatives of q over the near pairs, and over all, in units of a pair. Each is a
+     * number, and factors of |q| and |p| at the start. */
     vi_lane_array third_by[2][3], fourth_by[2][3];
     /* after whole cells, and turn of the force; after more than VI_CELLS cells: of pairs between rigid stops */
     vi_lane_array end_q[2 * VI_PAIRS + 1][VI_PARTS], end_p[2 * VI_PAIRS + 1][VI_PARTS];

@@ -7,8 +7,8 @@
 /* Step of a search for a contact, in pairs, below which it is the last one. The polynomial of third order then gives the
  * value and the slope to a rounding. */
 #define LAST_CONTACT_STEP 2e-6
-/* Largest change of the start of a pair since the last contact, in changes of q over the pair, after which the search
- * begins at the share of that contact. */
+/* Largest change of a pair's start since the last contact, in changes of q over the pair. Below it the search begins at
+ * the share of that contact. */
 #define ALIKE 1e-3
 /* Most steps of a search for a contact. */
 enum { MOST_CONTACT_STEPS = 5 };
