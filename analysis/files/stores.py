@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
@@ -243,6 +245,16 @@ def objects_below(place: Place, prefix: str = "") -> list[str]:
         except FileNotFoundError:
             return []
         return [str(path).removeprefix(f"{root}/") for path in found]
+
+
+def dims_of(array: Any) -> tuple[str, ...]:
+    """Return the names of the dimensions of an array."""
+    return tuple(array.metadata.dimension_names or ())
+
+
+def kind_of(array: Any) -> np.dtype[Any]:
+    """Return the type of the values of an array in memory: texts are objects."""
+    return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype).newbyteorder("=")
 
 
 def new_array(

@@ -65,8 +65,8 @@ def as_function(declared: type[Operation]) -> Callable[..., None]:
 
     def command(**given: Any) -> None:
         operation = declared(**given)
-        operation.function()
         if not gc.isenabled():  # in a process of its own, see `cli.main`
+            operation.function()  # imports the modules of the command
             gc.freeze()
             gc.enable()
         operation.carry_out()

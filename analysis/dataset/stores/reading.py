@@ -25,7 +25,14 @@ from vibroimpact.analysis.dataset.stores.storing import Read
 from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.probing import MOST_EXPANSION, SPARSE_BYTES
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_read
-from vibroimpact.analysis.files.stores import Place, arrays_of, one_store_error, opened_group, size_up_to
+from vibroimpact.analysis.files.stores import (
+    Place,
+    arrays_of,
+    kind_of,
+    one_store_error,
+    opened_group,
+    size_up_to,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 _DERIVED = ("run_id", *(f"{dim}_run" for dim in RAGGED), "displacement_range")
@@ -37,7 +44,7 @@ class _StoreArray(BackendArray):
     def __init__(self, place: Place, array: Any) -> None:
         self._place, self._array = place, array
         self.shape = array.shape
-        self.dtype = _kind(array)
+        self.dtype = kind_of(array)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
         return indexing.explicit_indexing_adapter(
@@ -93,10 +100,6 @@ def _forward(key: tuple[Any, ...], shape: tuple[int, ...]) -> tuple[tuple[Any, .
         forward.append(slice(places.start, places.stop, places.step) if len(places) else slice(0, 0))
         turned.append(slice(None, None, -1) if backward else slice(None))
     return tuple(forward), tuple(turned)
-
-
-def _kind(array: Any) -> np.dtype[Any]:
-    return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype).newbyteorder("=")
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +254,7 @@ class StoreContents:
             dims = tuple(dim for dim, label in LABELS.items() if label == name)
         elif dims:
             dims = ("run",)
-        return _Described(dims, _kind(array), attributes_read(self._attrs[name]))
+        return _Described(dims, kind_of(array), attributes_read(self._attrs[name]))
 
     def _refuse_large(self) -> None:
         """Raise ValueError if the store announces more than its objects can hold."""
@@ -259,7 +262,7 @@ class StoreContents:
         for name in self.names:
             ragged = self._ragged(name)
             size = math.prod(self._arrays[name].shape) if ragged is None else int(self.rows[ragged].sum())
-            promised += size * _kind(self._arrays[name]).itemsize
+            promised += size * kind_of(self._arrays[name]).itemsize
         if promised > SPARSE_BYTES:
             # the folders of a large store would be listed for a second
             size = size_up_to(self._place, -(-promised // MOST_EXPANSION))
@@ -334,7 +337,7 @@ class StoreContents:
             return self._lazy(
                 name, dims, _StoreArray(self._place, array), attrs, array.shards or array.chunks
             )
-        if _kind(array).kind == "f":
+        if kind_of(array).kind == "f":
             attrs["_FillValue"] = np.float64(np.nan)
         rows = self.rows[ragged]
         chunks = (tuple(rows[self.order][rows[self.order] > 0].tolist()) or (0,),)

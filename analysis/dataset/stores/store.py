@@ -39,7 +39,9 @@ from vibroimpact.analysis.files.stores import (
     announce,
     arrays_of,
     consolidate,
+    dims_of,
     is_written,
+    kind_of,
     new_array,
     one_store_error,
     opened_group,
@@ -153,8 +155,8 @@ class StoreWriter:
                 name: array
                 for name, array in self._arrays.items()
                 if (self.grid.is_line or name not in kept)
-                and not _is_of_rows(_dims(array))
-                and _dims(array)[: len(self.grid.dims)] == self.grid.dims
+                and not _is_of_rows(dims_of(array))
+                and dims_of(array)[: len(self.grid.dims)] == self.grid.dims
             }
 
     def write_shard(
@@ -244,15 +246,15 @@ class StoreWriter:
         with one_store_error(self._place):
             for name in self._of_cells.keys() & set(names):
                 array = self._of_cells[name]
-                values = np.asarray(array[block], dtype=_kind(array))
+                values = np.asarray(array[block], dtype=kind_of(array))
                 found[name] = values.reshape(-1, *values.shape[len(block) :])[cells]
             if "direction" in found:
                 found["direction"] = direction_codes(found["direction"])
             for dim in self._ragged:
                 count = int(self._arrays[RAGGED[dim]][block].sum())
                 for name, array in self._arrays.items():
-                    if name in names and _dims(array) == (f"{dim}_shard", f"{dim}_row"):
-                        found[name] = np.asarray(array[number, :count], dtype=_kind(array))
+                    if name in names and dims_of(array) == (f"{dim}_shard", f"{dim}_row"):
+                        found[name] = np.asarray(array[number, :count], dtype=kind_of(array))
         return found
 
     def _blocks_of_overview(
@@ -287,7 +289,7 @@ class StoreWriter:
         for dim in self._ragged:
             owners = np.repeat(ids, columns[RAGGED[dim]].values)
             for name, array in self._arrays.items():
-                if _dims(array) != (f"{dim}_shard", f"{dim}_row"):
+                if dims_of(array) != (f"{dim}_shard", f"{dim}_row"):
                     continue
                 values = owners if name == f"{dim}_run" else None
                 if values is None and name in columns:
@@ -346,7 +348,7 @@ class StoreWriter:
                 self._arrays[f"{dim}_rows"][: grid.shards] = np.array(rows, dtype=np.int64)
                 most = max([1, *rows])
                 for array in self._arrays.values():
-                    if _dims(array) == (f"{dim}_shard", f"{dim}_row"):
+                    if dims_of(array) == (f"{dim}_shard", f"{dim}_row"):
                         shapes[array.path] = (grid.shards, most)
             if self._ragged:
                 first = self._of_shards(
@@ -441,9 +443,8 @@ def _whole(variable: xr.Variable) -> _Array:
 def _linked(like: xr.Dataset, grid: StoreGrid, fixed: Mapping[str, xr.Variable]) -> str:
     """Return the names of the coordinates of runs, in the order of the scene, for the attribute of each variable."""
     names = ["run_index", "direction", *swept_names(like), *fixed]
-    return " ".join(
-        dict.fromkeys(name for name in names if grid.is_line or name in fixed or name == "run_index")
-    )
+    linked = [name for name in names if grid.is_line or name in fixed or name == "run_index"]
+    return " ".join(dict.fromkeys(linked))
 
 
 def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
@@ -456,7 +457,7 @@ def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
 
 def _cut(array: Any, sizes: Mapping[str, int]) -> tuple[int, ...]:
     """Return the shape of an array with some of its dimensions cut."""
-    return tuple(sizes.get(dim, size) for dim, size in zip(_dims(array), array.shape, strict=True))
+    return tuple(sizes.get(dim, size) for dim, size in zip(dims_of(array), array.shape, strict=True))
 
 
 def _keys(array: Any, block: Block) -> list[str]:
@@ -468,11 +469,7 @@ def _keys(array: Any, block: Block) -> list[str]:
 
 def grid_of(run_id: Any) -> StoreGrid:
     """Return the cells of a store, from the array that has a number for each."""
-    return StoreGrid(_dims(run_id), run_id.shape, run_id.chunks, run_id.shards or run_id.chunks)
-
-
-def _dims(array: Any) -> tuple[str, ...]:
-    return tuple(array.metadata.dimension_names or ())
+    return StoreGrid(dims_of(run_id), run_id.shape, run_id.chunks, run_id.shards or run_id.chunks)
 
 
 def _is_of_rows(dims: tuple[str, ...]) -> bool:
@@ -494,15 +491,9 @@ def _on_cells(
     """Return values of runs on the cells of a block, in the form of an array; without places, in their order."""
     further = array.shape[len(shape) :]
     if values is not None and places is None and values.shape[1:] == further:
-        return np.asarray(values, dtype=_kind(array)).reshape((*shape, *further))
-    found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=_kind(array))
+        return np.asarray(values, dtype=kind_of(array)).reshape((*shape, *further))
+    found: Any = np.full((math.prod(shape), *further), array.fill_value, dtype=kind_of(array))
     if values is not None:
         places = np.arange(len(values)) if places is None else places
         found[(places, *(slice(0, size) for size in values.shape[1:]))] = values
     return found.reshape((*shape, *further))
-
-
-def _kind(array: Any) -> Any:
-    """Return the type of the values in memory: texts are objects."""
-    dtype = array.dtype
-    return object if dtype.kind in "OUT" else dtype.newbyteorder("=")
