@@ -6,6 +6,9 @@
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
+/* Shortest return to a stop, in pairs, that is found from the middle of a pair. A rounding of q there would count in the
+ * small speeds of shorter ones: these are found lane by lane, from their start. */
+#define SHORTEST_RETURN 0.125
 /* Most times in a row that a lane goes through all its pairs in one round. */
 enum { MOST_JUMPS = 1 };
 /* Most parts of a pair that are judged, each half as long as an undecided one. */
@@ -215,7 +218,8 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, can
         const vector y = term[0] - pair->sign * pair->limit;
         const mask repeats = repeat_last(g, at, f->jumped + pair->passed, &pair->start);
         const place met = find_contact(g, at, a.hits, repeats, term, y, &s.from, &s.to);
-        const mask lost = a.hits & ~(size_of(y + met.added) <= s.noise);
+        const mask left = (pair->passed == 0.0) & (f->on == pair->number);
+        const mask lost = a.hits & (~(size_of(y + met.added) <= s.noise) | (left & (met.share < SHORTEST_RETURN)));
         a.hits &= ~lost;
         a.careful |= lost;
         stays = either_place(a.hits, &met, &stays);
