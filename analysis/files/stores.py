@@ -19,12 +19,13 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from vibroimpact.analysis.files.store_metadata import MOST_METADATA_BYTES, finished_nodes
 from vibroimpact.fmus.errors import DatasetError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 STORE_ENDING = ".zarr"
 LONGEST_REASON = 200
@@ -254,6 +255,8 @@ def dims_of(array: Any) -> tuple[str, ...]:
 
 def kind_of(array: Any) -> np.dtype[Any]:
     """Return the type of the values of an array in memory: texts are objects."""
+    import numpy as np  # commands of the service need none
+
     return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype).newbyteorder("=")
 
 
