@@ -58,10 +58,10 @@ CHOSEN = {
         "const vector after = restitution * approach;",
         "const vector after = restitution * approach * (1.0 - 1e-9);",
     ),
-    "lanes look at the curve of a cell too boldly": (
+    "lanes look at the curve of a pair too boldly": (
         "core/lanes/rounds.h",
-        "0.125 * smaller(smaller(curve, end_curve) - error, none);",
-        "0.0125 * smaller(smaller(curve, end_curve) - error, none);",
+        "0.125 * smaller(smaller(curve, end_curve) - error[i >= VI_NEAR_PAIRS], none);",
+        "0.0125 * smaller(smaller(curve, end_curve) - error[i >= VI_NEAR_PAIRS], none);",
     ),
     "lanes of several modes take every rise for a steady one": (
         "core/lanes/many_search.h",

@@ -40,9 +40,9 @@ typedef struct {
 static const double TURN = 6.283185307179586;
 /* Hash of all results, on every processor and with every C library; when it changes, ENGINE (orchestrator/run) must
  * change. */
-static const uint64_t BITS = 0x981bfa55fa167210u;
+static const uint64_t BITS = 0xa2c39bb0fe7d6ec7u;
 static const uint64_t BITS_OF_YIELDING = 0xe2aa616ece9fd36cu; /* Kelvin-Voigt stops, time series */
-static const uint64_t BITS_OF_SAMPLES = 0x955be75b9797c9c0u; /* time series of several modes, and of one between three or four stops */
+static const uint64_t BITS_OF_SAMPLES = 0x9e95a2911ae6a1ceu; /* time series of several modes, and of one between three or four stops */
 
 static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
 {

@@ -1,5 +1,14 @@
-/* The motion of a vector of lanes of one mode over cells: states at their ends, Taylor polynomials, bounds. */
+/* The motion of a vector of lanes of one mode over pairs of cells: states at their ends, Taylor polynomials, bounds.
+ *
+ * The polynomial of a pair is about its middle: it reaches as far to either side as that of a cell to one.
+ */
+#ifndef VIBROIMPACT_LANE_CELLS_H
+#define VIBROIMPACT_LANE_CELLS_H
+
 #include "lanes/recording.h"
+
+/* Share of a pair about which its polynomial is. */
+#define MIDDLE 0.5
 
 /* A state of the lanes of a vector. */
 typedef struct {
@@ -10,25 +19,37 @@ typedef struct {
 typedef struct {
     state now, start;           /* from here the contacts are searched; start: of the round */
     vector on;
-    vector to_goal;             /* cells */
-    vector jumped;              /* whole cells passed from `start` to `now` */
-    vector second, third, fourth; /* bounds of derivatives of q over VI_CELLS cells, times powers of the cell */
+    vector to_goal;             /* pairs */
+    vector jumped;              /* whole pairs passed from `start` to `now` */
+    vector third[2], fourth[2]; /* bounds of derivatives of q over the near pairs, and over all, in units of a pair */
 } flight;
 
-/* Bound the derivatives of q over the next VI_CELLS cells. */
+/* Length of a pair, s. */
+LANES_INLINE vector pair_of(const vi_lane_group *g, int at)
+{
+    return 2.0 * load(g->cell + at);
+}
+
+/* Pairs in a second. */
+LANES_INLINE vector pair_rate(const vi_lane_group *g, int at)
+{
+    return 0.5 * load(g->cell_rate + at);
+}
+
+/* A bound over pairs ahead. */
+LANES_INLINE vector bound_by(const vi_lane_array by[3], int at, const state *s)
+{
+    return load(by[0] + at) + (load(by[1] + at) * size_of(s->q) + load(by[2] + at) * size_of(s->p));
+}
+
+/* Bound the derivatives of q over the pairs ahead. */
 LANES_INLINE void bound(const vi_lane_group *g, int at, flight *f)
 {
-    /* the energy norm grows at most by the loads; the derivatives follow from the equation */
-    const vector k = load(g->one.stiffness + at), loads = load(g->one.load + at), drag = load(g->one.drag + at);
-    const vector w = load(g->angular_frequency + at), cell = load(g->cell + at), square = cell * cell;
-    const vector q = f->now.q, p = f->now.p;
-    const vector norm = root(p * p + k * (q * q)) + loads * load(g->one.span + at);
-    const vector second = loads + load(g->one.root_rate + at) * norm;
-    const vector third = w * loads + (drag * second + k * norm);
-    const vector fourth = w * (w * loads) + (drag * third + k * second);
-    f->second = second * square;
-    f->third = third * (square * cell);
-    f->fourth = fourth * (square * square);
+#pragma GCC unroll 2
+    for (int far = 0; far < 2; ++far) {
+        f->third[far] = bound_by(g->one.third_by[far], at, &f->now);
+        f->fourth[far] = bound_by(g->one.fourth_by[far], at, &f->now);
+    }
 }
 
 /* Value of a table's row for a state. */
@@ -65,41 +86,45 @@ LANES_INLINE vector gathered(const vi_lane_array *table, int at, const int row[]
               + gather(table + VI_OF_ONE, VI_PARTS, at, row));
 }
 
-/* The state after some whole cells of each lane; q[]: displacements after all numbers of cells. */
-LANES_INLINE state after_cells(const vi_lane_group *g, int at, const state *s, const vector q[], vector cells)
+/* The state after some whole pairs of each lane; q[]: displacements after all numbers of pairs. */
+LANES_INLINE state after_pairs(const vi_lane_group *g, int at, const state *s, const vector q[], vector pairs)
 {
     int row[VI_WIDTH];
     vector here;
 #pragma GCC unroll 8
     for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = (int)cells[i];
-        here[i] = q[row[i]][i];
+        row[i] = 2 * (int)pairs[i];
+        here[i] = q[row[i] / 2][i];
     }
     const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
     return (state){here, gathered(g->one.end_p[0], at, row, s),
                    s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
 }
 
-/* The state of this displacement and velocity some cells later. */
-LANES_INLINE state turned(const vi_lane_group *g, int at, int cells, vector q, vector p, const state *s)
+/* The state of this displacement and velocity some pairs later. */
+LANES_INLINE state turned(const vi_lane_group *g, int at, int pairs, vector q, vector p, const state *s)
 {
-    const vector c = load(g->one.turn_cosine[cells] + at), n = load(g->one.turn_sine[cells] + at);
+    const vector c = load(g->one.turn_cosine[2 * pairs] + at), n = load(g->one.turn_sine[2 * pairs] + at);
     return (state){q, p, s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
 }
 
-/* Taylor coefficients of q over a cell that begins in a state, in its share. */
+/* Half of the second derivative of q in a state, over a pair. */
+LANES_INLINE vector half_of(const vi_lane_group *g, int at, const state *s)
+{
+    return 4.0 * linear(g->one.taylor[2], at, s);
+}
+
+/* Taylor coefficients of q about the middle of the pair that begins in a state, in its share less MIDDLE. */
 LANES_INLINE void expand(const vi_lane_group *g, int at, const state *s, vector term[])
 {
-    term[0] = s->q;
-    term[1] = s->p * load(g->cell + at);
 #pragma GCC unroll 16
-    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
-        term[n] = linear(g->one.taylor[n], at, s);
+    for (int n = 0; n <= VI_LANE_ORDER; ++n) {
+        term[n] = linear(g->one.middle[n], at, s);
     }
 }
 
-/* Added value of the polynomial beyond its first term, and its slope, at a share of the cell. Odd and even powers are
- * summed apart, which halves the chain of operations. */
+/* Added value of a polynomial beyond its first term, and its slope. Odd and even powers are summed apart, which halves
+ * the chain of operations. */
 LANES_INLINE void evaluate(const vector term[], vector share, vector *added, vector *slope)
 {
     const vector square = share * share;
@@ -116,7 +141,7 @@ LANES_INLINE void evaluate(const vector term[], vector share, vector *added, vec
     *slope = odd_slope + share * even_slope;
 }
 
-/* Half the second derivative of the polynomial at a share of the cell. */
+/* Half the second derivative of a polynomial. */
 LANES_INLINE vector half_bend(const vector term[], vector share)
 {
     const int last = VI_LANE_ORDER;
@@ -140,3 +165,5 @@ LANES_INLINE vector first_guess(vector y, vector slope, vector end_y, vector end
     const vector x = t + t * back * ((inverse * end_slope - 1.0) * back - (inverse * slope - 1.0) * t);
     return length * smaller(larger(x, all(0.0)), all(1.0));
 }
+
+#endif

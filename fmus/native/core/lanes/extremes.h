@@ -47,7 +47,8 @@ typedef struct {
     crests waiting;
 } extremes;
 
-/* Bounds of derivatives of q over VI_CELLS cells, times powers of the cell: `bound` of cells.h. */
+/* Bounds of derivatives of q over VI_CELLS cells, times powers of the cell. The energy norm grows at most by
+ * the loads; the derivatives follow from the equation. */
 typedef struct {
     vector second, third, fourth;
 } bounds;

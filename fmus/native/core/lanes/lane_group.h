@@ -12,7 +12,9 @@
 
 #include "lanes/lane_points.h"
 
-enum { VI_LANES = 8, VI_CELLS = 8, VI_LANE_ORDER = 14 }; /* VI_CELLS: of a round; VI_LANE_ORDER: of the Taylor series */
+/* VI_CELLS: of a round. VI_PAIRS: pairs of cells of a round of one mode between rigid stops; they reach over a period of
+ * the fastest rate. VI_NEAR_PAIRS: first ones, with bounds of their own. VI_LANE_ORDER: of the Taylor series. */
+enum { VI_LANES = 8, VI_CELLS = 8, VI_PAIRS = 9, VI_NEAR_PAIRS = 4, VI_LANE_ORDER = 14 };
 
 /* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
 #define VI_LANE_TAIL 1e-4
@@ -35,8 +37,14 @@ typedef double vi_lane_array[VI_LANES];
 /* Tables of a body of one mode. Its motion over a cell is linear in the five parts at the start. */
 typedef struct {
     vi_lane_array taylor[VI_LANE_ORDER + 1][VI_PARTS]; /* of q over a cell */
-    vi_lane_array end_q[VI_CELLS + 1][VI_PARTS], end_p[VI_CELLS + 1][VI_PARTS]; /* after whole cells */
-    vi_lane_array turn_cosine[VI_CELLS + 1], turn_sine[VI_CELLS + 1]; /* turn of the force after whole cells */
+    /* the same over a pair of cells, about its middle, in the share of the pair less 1/2; between rigid stops */
+    vi_lane_array middle[VI_LANE_ORDER + 1][VI_PARTS];
+    /* bounds of the third and fourth derivatives of q over the near pairs, and over all, in units of a pair. Each is a
+     * number, and factors of |q| and |p| at the start. */
+    vi_lane_array third_by[2][3], fourth_by[2][3];
+    /* after whole cells, and turn of the force; after more than VI_CELLS cells: of pairs between rigid stops */
+    vi_lane_array end_q[2 * VI_PAIRS + 1][VI_PARTS], end_p[2 * VI_PAIRS + 1][VI_PARTS];
+    vi_lane_array turn_cosine[2 * VI_PAIRS + 1], turn_sine[2 * VI_PAIRS + 1];
     vi_lane_array stiffness, drag, root_rate; /* 2 decay, 2 decay + natural */
     vi_lane_array load;                       /* |force| + |held| */
     vi_lane_array span;                       /* VI_CELLS cells, s */
@@ -166,8 +174,9 @@ typedef struct {
     vi_lane_array fastest_impact, impacts;
     /* the last round: its start, whole cells passed and the share of one more */
     vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
-    vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps of VI_CELLS */
-    vi_lane_array hit_cells, hit_share;       /* whole cells of the last flight to a contact, and share of one more */
+    vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps over all cells of a round */
+    vi_lane_array hit_pairs, hit_share;       /* whole pairs of the last flight to a contact, and share of one more */
+    vi_lane_array hit_q, hit_p;               /* at the start of that one */
     vi_lane_array hit, approach;              /* number of the contact, from 1 (0: none), and its speed of approach */
     vi_lane_array event;
     vi_lane_record record;

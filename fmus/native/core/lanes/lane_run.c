@@ -351,7 +351,7 @@ static void begin_point(vi_lanes_work *w, int lane, int64_t point)
         w->points->samples_of[point] = 0;
     }
     g->on[lane] = g->fastest_impact[lane] = g->impacts[lane] = 0.0;
-    g->hit_cells[lane] = -1.0;
+    g->hit_pairs[lane] = -1.0;
     g->record.impacts[lane] = g->record.extremes[lane] = g->record.doubtful[lane] = 0.0;
     g->record.waits[lane] = g->record.open[lane] = 0.0;
     g->record.last_turn[lane] = -1.0;

@@ -41,21 +41,23 @@ static void turn_of(double angle, double *cosine, double *sine)
     *sine = angle + angle * s;
 }
 
+/* A row over the parts of the state after the step `a`, as a row over the parts before it. */
+static void shift(const step *a, const double after[VI_PARTS], double before[VI_PARTS])
+{
+    for (int part = 0; part < VI_PARTS; ++part) {
+        before[part] = after[VI_OF_Q] * a->q[part] + after[VI_OF_P] * a->p[part];
+    }
+    before[VI_OF_COSINE] += after[VI_OF_COSINE] * a->cosine + after[VI_OF_SINE] * a->sine;
+    before[VI_OF_SINE] += after[VI_OF_COSINE] * -a->sine + after[VI_OF_SINE] * a->cosine;
+    before[VI_OF_ONE] += after[VI_OF_ONE];
+}
+
 /* The step `a`, then the step `b`. */
 static step joined(const step *a, const step *b)
 {
     step both;
-    const double turned[2][2] = {{a->cosine, -a->sine}, {a->sine, a->cosine}};
-    for (int part = 0; part < VI_PARTS; ++part) {
-        both.q[part] = b->q[VI_OF_Q] * a->q[part] + b->q[VI_OF_P] * a->p[part];
-        both.p[part] = b->p[VI_OF_Q] * a->q[part] + b->p[VI_OF_P] * a->p[part];
-    }
-    for (int i = 0; i < 2; ++i) {
-        both.q[VI_OF_COSINE + i] += b->q[VI_OF_COSINE] * turned[0][i] + b->q[VI_OF_SINE] * turned[1][i];
-        both.p[VI_OF_COSINE + i] += b->p[VI_OF_COSINE] * turned[0][i] + b->p[VI_OF_SINE] * turned[1][i];
-    }
-    both.q[VI_OF_ONE] += b->q[VI_OF_ONE];
-    both.p[VI_OF_ONE] += b->p[VI_OF_ONE];
+    shift(a, b->q, both.q);
+    shift(a, b->p, both.p);
     both.cosine = a->cosine * b->cosine - a->sine * b->sine;
     both.sine = a->sine * b->cosine + a->cosine * b->sine;
     return both;
@@ -69,6 +71,88 @@ static void store(vi_one_mode *tables, int lane, int cells, const step *s)
     }
     tables->turn_cosine[cells][lane] = s->cosine;
     tables->turn_sine[cells][lane] = s->sine;
+}
+
+static step stored(const vi_one_mode *tables, int lane, int cells)
+{
+    step s;
+    for (int part = 0; part < VI_PARTS; ++part) {
+        s.q[part] = tables->end_q[cells][part][lane];
+        s.p[part] = tables->end_p[cells][part][lane];
+    }
+    s.cosine = tables->turn_cosine[cells][lane];
+    s.sine = tables->turn_sine[cells][lane];
+    return s;
+}
+
+/* Bounds of q and p at the ends of some pairs: a number, and factors of |q| and |p| at the start. */
+typedef struct {
+    double q[3], p[3];
+} reach;
+
+static double larger_of(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/* Bounds of a row at the ends of some pairs. */
+static void reach_row(const vi_lane_array rows[][VI_PARTS], int lane, int pairs, double by[3])
+{
+    double force = 0.0, held = 0.0;
+    by[1] = by[2] = 0.0;
+    for (int i = 0; i <= 2 * pairs; i += 2) {
+        const double c = rows[i][VI_OF_COSINE][lane], s = rows[i][VI_OF_SINE][lane];
+        force = larger_of(force, c * c + s * s);
+        held = larger_of(held, fabs(rows[i][VI_OF_ONE][lane]));
+        by[1] = larger_of(by[1], fabs(rows[i][VI_OF_Q][lane]));
+        by[2] = larger_of(by[2], fabs(rows[i][VI_OF_P][lane]));
+    }
+    by[0] = sqrt(force) + held;
+}
+
+/* Bounds over a pair, in units of the pair, from q'' + drag q' + spring q = force cos + held. Inside a pair q exceeds its
+ * ends by an eighth of the largest q'', and q' by half of it. */
+static void bound_pairs(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double pair, int far)
+{
+    const double square = pair * pair, turn = mode->angular_frequency * pair, drag = 2.0 * mode->decay * pair;
+    const double spring = mode->stiffness * square, force = fabs(mode->force) * square, held = fabs(mode->held) * square;
+    const double stiff = drag * drag - spring; /* q''' = force' - drag force + stiff q' + drag spring q */
+    const double room = 1.0 / (1.0 - 0.5 * drag - 0.125 * spring), bend = stiff - turn * turn;
+    const double third = force * sqrt(turn * turn + drag * drag) + held * drag;
+    const double fourth = force * sqrt(bend * bend + turn * turn * drag * drag) + held * fabs(stiff);
+    reach ends;
+    reach_row(tables->end_q, lane, far ? VI_PAIRS : VI_NEAR_PAIRS, ends.q);
+    reach_row(tables->end_p, lane, far ? VI_PAIRS : VI_NEAR_PAIRS, ends.p);
+    for (int i = 0; i < 3; ++i) {
+        const double p = pair * ends.p[i], own = drag * p + spring * ends.q[i];
+        const double second = ((i == 0 ? force + held : 0.0) + own) * room;
+        const double slope = p + 0.5 * second, size = ends.q[i] + 0.125 * second;
+        tables->third_by[far][i][lane] = (i == 0 ? third : 0.0) + (fabs(stiff) * slope + drag * spring * size);
+        tables->fourth_by[far][i][lane] = (i == 0 ? fourth : 0.0)
+                                          + (drag * fabs(spring - stiff) * slope + spring * fabs(stiff) * size);
+    }
+}
+
+void vi_lane_pair_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell)
+{
+    const step one = stored(tables, lane, 1), cells = stored(tables, lane, VI_CELLS);
+    double scale = 1.0; /* a pair is twice as long as a cell */
+    for (int n = 0; n <= VI_LANE_ORDER; ++n, scale *= 2.0) {
+        double term[VI_PARTS], middle[VI_PARTS];
+        for (int part = 0; part < VI_PARTS; ++part) {
+            term[part] = scale * tables->taylor[n][part][lane];
+        }
+        shift(&one, term, middle);
+        for (int part = 0; part < VI_PARTS; ++part) {
+            tables->middle[n][part][lane] = middle[part];
+        }
+    }
+    for (int i = VI_CELLS + 2; i <= 2 * VI_PAIRS; i += 2) {
+        const step before = stored(tables, lane, i - VI_CELLS), both = joined(&before, &cells);
+        store(tables, lane, i, &both);
+    }
+    bound_pairs(tables, lane, mode, 2.0 * cell, 0);
+    bound_pairs(tables, lane, mode, 2.0 * cell, 1);
 }
 
 void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell)

@@ -12,4 +12,7 @@ typedef struct {
 /* Fill the tables of one lane for cells of this length, s, and its bounds; the length must be short against every rate. */
 void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell);
 
+/* Fill the tables of one lane for pairs of cells, after vi_lane_tables. */
+void vi_lane_pair_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell);
+
 #endif

@@ -190,6 +190,7 @@ static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi
         return false;
     }
     vi_lane_tables(one, lane, &mode, cell);
+    vi_lane_pair_tables(one, lane, &mode, cell);
     g->cell[lane] = cell;
     g->cell_rate[lane] = 1.0 / cell;
     g->q[0][lane] = q[0];

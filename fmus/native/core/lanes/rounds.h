@@ -1,21 +1,22 @@
 /* The lockstep of bodies of one mode, for one instruction set: see rounds_many.h. */
+#include "lanes/pair_search.h"
 #include "lanes/rounds_samples.h"
 #include "lanes/waiting.h"
 
 /* Rounding of a displacement, in units of the sum of the sizes of its terms. */
 #define ROUNDING (16.0 * 2.220446049250313e-16)
 
-/* Largest difference between the first guess of a contact and the share of the cell that ended the last flight. That
- * share is a better guess then: periodic motion repeats. */
-#define ALIKE 1e-3
-/* Step of third order below which its error is a rounding. */
-#define EXACT_FROM 4e-6
-/* Most times in a row that a lane goes through all its cells in one round. */
-enum { MOST_JUMPS = 3 };
+/* Shortest return to a stop, in pairs, that is found from the middle of a pair. A rounding of q there would count in the
+ * small speeds of shorter ones: these are found lane by lane, from their start. */
+#define SHORTEST_RETURN 0.125
+/* Most times in a row that a lane goes through all its pairs in one round. */
+enum { MOST_JUMPS = 1 };
+/* Most parts of a pair that are judged, each half as long as an undecided one. */
+enum { MOST_PARTS = 8 };
 
-/* The cell in which a lane may meet a contact or its goal. */
+/* The pair of cells in which a lane may meet a contact or its goal. */
 typedef struct {
-    vector passed;        /* whole cells before it */
+    vector passed;        /* whole pairs before it */
     vector length;        /* share of it up to the goal or its end */
     mask goal;            /* its end is the goal */
     mask searched;        /* a contact may be met in it */
@@ -42,44 +43,46 @@ LANES_INLINE flight begin_round(const vi_lane_group *g, int at)
     turn(load(g->angular_frequency + at) * load(g->rest + at), &f.now.cosine, &f.now.sine);
     f.start = f.now;
     f.on = load(g->on + at);
-    f.to_goal = larger(seconds_to_goal(g, at) * load(g->cell_rate + at), all(0.0));
+    f.to_goal = larger(seconds_to_goal(g, at) * pair_rate(g, at), all(0.0));
     f.jumped = all(0.0);
     bound(g, at, &f);
     return f;
 }
 
-/* Displacements at the ends of the cells ahead. */
-LANES_INLINE void ends_of_cells(const vi_lane_group *g, int at, const flight *f, vector q[])
+/* Displacements at the ends of the pairs ahead. */
+LANES_INLINE void ends_of_pairs(const vi_lane_group *g, int at, const flight *f, vector q[])
 {
     q[0] = f->now.q;
-#pragma GCC unroll 8
-    for (int i = 1; i <= VI_CELLS; ++i) {
-        q[i] = linear(g->one.end_q[i], at, &f->now);
+#pragma GCC unroll 9
+    for (int i = 1; i <= VI_PAIRS; ++i) {
+        q[i] = linear(g->one.end_q[2 * i], at, &f->now);
     }
 }
 
-/* Count the cells in which a contact is surely not met. q[]: at the ends of the cells; bend: q'' now, over a cell.
+/* Count the pairs in which a contact is surely not met. q[]: at the ends of the pairs; bend: q'' now, over a pair.
  *
- * The motion exceeds the line over a cell by at most an eighth of its largest -y''. Second differences give y'' at the
- * ends of cells to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it. */
+ * The motion exceeds the line over a pair by at most an eighth of its largest -y''. Second differences give y'' at the
+ * ends of pairs to a twelfth of the fourth derivative. Between them y'' is off a line by an eighth of it.
+ * The difference at the end of the last near pair reaches into the next pair. */
 LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const flight *f, const vector q[], vector bend)
 {
     const vector sign = load(g->sign[c] + at), limit = load(g->limit[c] + at);
-    const vector error = f->fourth * (1.0 / 12.0 + 1.0 / 8.0), none = all(0.0);
+    const vector error[2] = {f->fourth[0] * (1.0 / 12.0 + 1.0 / 8.0), f->fourth[1] * (1.0 / 12.0 + 1.0 / 8.0)};
+    const vector none = all(0.0);
     vector before = sign * q[0] - limit, here = sign * q[1] - limit, curve = sign * bend;
     mask clear = before == before, counted = (mask)all(WHOLE);
-#pragma GCC unroll 8
-    for (int i = 1; i <= VI_CELLS; ++i) {
-        vector next = here, end_curve = curve - f->third;
-        if (i < VI_CELLS) {
+#pragma GCC unroll 9
+    for (int i = 1; i <= VI_PAIRS; ++i) {
+        vector next = here, end_curve = curve - f->third[1];
+        if (i < VI_PAIRS) {
             next = sign * q[i + 1] - limit;
             end_curve = (next - here) - (here - before);
         }
-        mask passes = larger(before, here) < 0.125 * smaller(smaller(curve, end_curve) - error, none);
+        mask passes = larger(before, here) < 0.125 * smaller(smaller(curve, end_curve) - error[i >= VI_NEAR_PAIRS], none);
         if (i == 1) {
             /* just left: the mean velocity since then, which is smooth, stays negative */
-            const vector leaving = sign * (f->now.p * load(g->cell + at));
-            const mask left = larger(leaving, here) + f->third * (1.0 / 24.0) < 0.0, on = f->on == (double)(c + 1);
+            const vector leaving = sign * (f->now.p * pair_of(g, at));
+            const mask left = larger(leaving, here) + f->third[0] * (1.0 / 24.0) < 0.0, on = f->on == (double)(c + 1);
             passes = (passes & ~on) | (left & on);
         }
         clear &= passes;
@@ -91,127 +94,141 @@ LANES_INLINE vector count_clear(const vi_lane_group *g, int at, int c, const fli
     return (vector)counted - WHOLE;
 }
 
-/* Whole cells that a lane surely passes: no contact in them, and not beyond the goal. */
-LANES_INLINE vector sure_cells(const flight *f, int contacts, const vector count[], vector *cleared)
+/* Whole pairs that a lane surely passes: no contact in them, and not beyond the goal. */
+LANES_INLINE vector sure_pairs(const flight *f, int contacts, const vector count[], vector *cleared)
 {
-    *cleared = all((double)VI_CELLS);
+    *cleared = all((double)VI_PAIRS);
     for (int c = 0; c < contacts; ++c) {
         *cleared = smaller(count[c], *cleared);
     }
-    return smaller(*cleared, whole_part(smaller(f->to_goal, all((double)VI_CELLS))));
+    return smaller(*cleared, whole_part(smaller(f->to_goal, all((double)VI_PAIRS))));
 }
 
-/* Lanes that pass all their cells go on from there in the same round. */
+/* Lanes that pass all their pairs go on from there in the same round. */
 LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, flight *f)
 {
-    const vector q = linear(g->one.end_q[VI_CELLS], at, &f->now), p = linear(g->one.end_p[VI_CELLS], at, &f->now);
-    const state next = turned(g, at, VI_CELLS, q, p, &f->now);
+    const vector q = linear(g->one.end_q[2 * VI_PAIRS], at, &f->now), p = linear(g->one.end_p[2 * VI_PAIRS], at, &f->now);
+    const state next = turned(g, at, VI_PAIRS, q, p, &f->now);
     f->now = chosen(jumps, &next, &f->now);
     f->on = only(~jumps, f->on);
-    f->jumped += only(jumps, all((double)VI_CELLS));
-    f->to_goal -= only(jumps, all((double)VI_CELLS));
+    f->jumped += only(jumps, all((double)VI_PAIRS));
+    f->to_goal -= only(jumps, all((double)VI_PAIRS));
 }
 
-/* Move on to the cell in which each lane may meet a contact, its goal or the end of its round. */
-LANES_INLINE candidate choose_cell(const vi_lane_group *g, int at, int contacts, flight *f)
+/* Move on to the pair in which each lane may meet a contact, its goal or the end of its round. */
+LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts, flight *f)
 {
-    candidate cell;
-    vector count[VI_LANES_CONTACTS], cleared, q[VI_CELLS + 1];
+    candidate pair;
+    vector count[VI_LANES_CONTACTS], cleared, q[VI_PAIRS + 1];
     for (int i = 0;; ++i) {
-        ends_of_cells(g, at, f, q);
-        const vector bend = 2.0 * linear(g->one.taylor[2], at, &f->now);
+        ends_of_pairs(g, at, f, q);
+        const vector bend = 2.0 * half_of(g, at, &f->now);
         for (int c = 0; c < contacts; ++c) {
             count[c] = count_clear(g, at, c, f, q, bend);
         }
-        cell.passed = sure_cells(f, contacts, count, &cleared);
-        const mask jumps = cell.passed == (double)VI_CELLS;
+        pair.passed = sure_pairs(f, contacts, count, &cleared);
+        const mask jumps = pair.passed == (double)VI_PAIRS;
         if (i == MOST_JUMPS || !any(jumps)) {
             break;
         }
         jump(g, at, jumps, f);
         bound(g, at, f);
     }
-    const mask jumps = cell.passed == (double)VI_CELLS;
-    const vector length = larger(f->to_goal - cell.passed, all(0.0));
-    cell.length = only(~jumps, smaller(length, all(1.0)));
-    cell.goal = ~jumps & (length <= 1.0);
-    cell.searched = ~jumps & (cleared == cell.passed);
-    cell.twofold = cell.searched & ~cell.searched;
-    cell.sign = cell.limit = cell.number = all(0.0);
+    const mask jumps = pair.passed == (double)VI_PAIRS;
+    const vector length = larger(f->to_goal - pair.passed, all(0.0));
+    pair.length = only(~jumps, smaller(length, all(1.0)));
+    pair.goal = ~jumps & (length <= 1.0);
+    pair.searched = ~jumps & (cleared == pair.passed);
+    pair.twofold = pair.searched & ~pair.searched;
+    pair.sign = pair.limit = pair.number = all(0.0);
     for (int c = contacts - 1; c >= 0; --c) {
-        const mask met = cell.searched & (count[c] == cell.passed);
-        cell.twofold |= met & (cell.number > 0.0);
-        cell.sign = choose(met, load(g->sign[c] + at), cell.sign);
-        cell.limit = choose(met, load(g->limit[c] + at), cell.limit);
-        cell.number = choose(met, all((double)(c + 1)), cell.number);
+        const mask met = pair.searched & (count[c] == pair.passed);
+        pair.twofold |= met & (pair.number > 0.0);
+        pair.sign = choose(met, load(g->sign[c] + at), pair.sign);
+        pair.limit = choose(met, load(g->limit[c] + at), pair.limit);
+        pair.number = choose(met, all((double)(c + 1)), pair.number);
     }
-    cell.start = after_cells(g, at, &f->now, q, cell.passed);
-    return cell;
-}
-
-/* One step towards the zero of y + sign * (added value of the polynomial), of third order (Chebyshev's). */
-LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
-{
-    vector added, slope;
-    evaluate(term, share, &added, &slope);
-    const vector bend = half_bend(term, share);
-    const vector inverse = 1.0 / slope, step = (sign * y + added) * inverse;
-    return share - step * (1.0 + step * (bend * inverse));
-}
-
-/* Share of the cell at which the rising motion y + sign * (added value) of some lanes meets its contact. */
-LANES_INLINE vector find_contact(const vi_lane_group *g, int at, mask hits, const flight *f, const candidate *cell,
-                                 const vector term[], vector y, vector slope, vector end_y, vector end_slope)
-{
-    const vector guess = first_guess(y, slope, end_y, end_slope, cell->length), last = load(g->hit_share + at);
-    const mask repeats = (f->jumped + cell->passed == load(g->hit_cells + at)) & (size_of(last - guess) < ALIKE);
-    const vector from = choose(repeats, last, guess);
-    const vector near = smaller(larger(closer(term, y, cell->sign, from), all(0.0)), cell->length);
-    const mask found = size_of(near - from) < EXACT_FROM;
-    if (!any(hits & ~found)) {
-        return near;
-    }
-    const vector nearer = smaller(larger(closer(term, y, cell->sign, near), all(0.0)), cell->length);
-    return choose(found, near, nearer);
+    pair.start = after_pairs(g, at, &f->now, q, pair.passed);
+    return pair;
 }
 
 /* Result of a round for the lanes. */
 typedef struct {
-    vector share; /* passed share of the cell */
+    vector share; /* passed share of the pair */
     vector q, p;
     vector slope; /* of the polynomial, before a rebound */
     mask hits, careful;
 } arrival;
 
-/* Move to the contact, the goal or the end of a cell with these Taylor coefficients. */
-LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, const candidate *cell, const vector term[])
+/* A search in a pair. `from`, `to`: the part that is judged, later the part with the contact. */
+typedef struct {
+    place from, to, end; /* end: of the pair, or the goal */
+    stop stop;
+    vector noise; /* rounding of y */
+    mask open;    /* undecided beyond `from` */
+    mask hits;
+} pair_search;
+
+LANES_INLINE pair_search begin_search(const vi_lane_group *g, int at, const flight *f, const candidate *pair,
+                                      const vector term[])
 {
-    vector added, slope;
-    evaluate(term, cell->length, &added, &slope);
-    const vector length = cell->length, bare = cell->sign * term[0] - cell->limit;
-    const mask leaves = (cell->passed == 0.0) & (f->on == cell->number);
-    const vector y = only(~leaves, bare), first = cell->sign * term[1];
-    const vector end_y = y + cell->sign * added, end_slope = cell->sign * slope;
-    const vector noise = ROUNDING * (size_of(cell->limit) + size_of(term[0]) + size_of(term[1]) + size_of(added));
-    const mask rises = (smaller(first, end_slope) > 0.125 * f->third * (length * length)) & (y <= noise);
-    /* Bernstein coefficients of the cubic with these values and slopes, and the deviation from the cubic */
-    const vector third = length * (1.0 / 3.0);
-    const vector highest = larger(larger(y, end_y), larger(y + third * first, end_y - third * end_slope));
-    const mask below = highest + f->fourth * (1.0 / 384.0) < 0.0;
-    arrival a;
-    a.hits = cell->searched & ~cell->twofold & rises & (end_y > 0.0);
-    a.careful = cell->searched & ~a.hits & (cell->twofold | ~(below | (rises & (end_y <= 0.0))));
-    a.share = length;
+    const vector none = all(0.0);
+    pair_search s = {.end = place_at(term, pair->length), .hits = none != none};
+    s.from = (place){none, pair->start.q - term[0], pair->start.p * pair_of(g, at)};
+    s.to = s.end;
+    s.stop = (stop){pair->sign, pair->limit, (pair->passed == 0.0) & (f->on == pair->number)};
+    s.noise = ROUNDING * (size_of(pair->limit) + size_of(term[0]) + size_of(term[1]) + size_of(s.end.added));
+    s.open = pair->searched & ~pair->twofold;
+    return s;
+}
+
+/* Judge the parts of a pair, in their order, up to the first that has a contact. Undecided parts are halved. */
+LANES_INLINE void judge_parts(const vector term[], pair_search *s)
+{
+    const bends b = bends_of(term);
+    for (int i = 0; i < MOST_PARTS && any(s->open); ++i) {
+        const verdict part = judge(&s->stop, term, &b, &s->from, &s->to, s->noise);
+        const mask hits = s->open & part.hits, passes = s->open & part.clear, cuts = s->open & ~(hits | passes);
+        s->hits |= hits;
+        s->open &= ~(hits | (passes & (s->to.share == s->end.share)));
+        if (any(s->open)) {
+            s->from = either_place(passes & s->open, &s->to, &s->from);
+            s->to = either_place(passes & s->open, &s->end, &s->to);
+            s->stop.leaves &= s->from.share == 0.0;
+            if (any(cuts)) {
+                const place half = place_at(term, 0.5 * (s->from.share + s->to.share));
+                s->to = either_place(cuts, &half, &s->to);
+            }
+        }
+    }
+}
+
+/* Move to the contact, the goal or the end of a pair with these Taylor coefficients. */
+LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, candidate *pair, const vector term[])
+{
+    pair_search s = begin_search(g, at, f, pair, term);
+    judge_parts(term, &s);
+    arrival a = {.hits = s.hits, .careful = pair->twofold};
+    place stays = s.end;
+    if (any(s.open)) {
+        stays = either_place(s.open, &s.from, &s.end);
+        a.careful |= s.open & (s.from.share == 0.0);
+    }
     if (any(a.hits)) {
-        a.share = choose(a.hits, find_contact(g, at, a.hits, f, cell, term, y, first, end_y, end_slope), length);
-        evaluate(term, a.share, &added, &slope);
-        const mask lost = a.hits & ~(size_of(y + cell->sign * added) <= noise);
+        const vector y = term[0] - pair->sign * pair->limit;
+        const mask repeats = repeat_last(g, at, f->jumped + pair->passed, &pair->start);
+        const place met = find_contact(g, at, a.hits, repeats, term, y, &s.from, &s.to);
+        const mask left = (pair->passed == 0.0) & (f->on == pair->number);
+        const mask lost = a.hits & (~(size_of(y + met.added) <= s.noise) | (left & (met.share < SHORTEST_RETURN)));
         a.hits &= ~lost;
         a.careful |= lost;
+        stays = either_place(a.hits, &met, &stays);
     }
-    a.slope = slope;
-    a.q = choose(a.hits, cell->sign * cell->limit, term[0] + added);
-    a.p = slope * load(g->cell_rate + at);
+    pair->goal &= stays.share == pair->length;
+    a.share = stays.share;
+    a.slope = stays.slope;
+    a.q = choose(a.hits, pair->sign * pair->limit, term[0] + stays.added);
+    a.p = a.slope * pair_rate(g, at);
     return a;
 }
 
@@ -233,21 +250,21 @@ LANES_INLINE vector restitution_of(const vi_lane_group *g, int at, int contacts,
 }
 
 /* Rebound at the hit contacts; returns the lanes that leave lockstep. */
-LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *cell, arrival *a)
+LANES_INLINE mask rebound(vi_lane_group *g, int at, int contacts, const candidate *pair, arrival *a)
 {
-    const vector approach = cell->sign * a->p;
+    const vector approach = pair->sign * a->p;
     vector resolution = all(0.0);
     for (int c = 0; c < contacts; ++c) {
-        resolution = choose(cell->number == (double)(c + 1), load(g->resolution[c] + at), resolution);
+        resolution = choose(pair->number == (double)(c + 1), load(g->resolution[c] + at), resolution);
     }
-    const vector restitution = restitution_of(g, at, contacts, a->hits, cell->number, approach);
+    const vector restitution = restitution_of(g, at, contacts, a->hits, pair->number, approach);
     const vector after = restitution * approach;
     const vector fastest = larger(load(g->fastest_impact + at), only(a->hits, approach));
     const mask leaves = a->hits & ~((after > VI_LANE_TAIL * fastest) & (approach * approach > resolution));
     store(g->fastest_impact + at, fastest);
-    store(g->hit + at, only(a->hits, cell->number));
+    store(g->hit + at, only(a->hits, pair->number));
     store(g->approach + at, only(a->hits, approach));
-    a->p = choose(a->hits, -cell->sign * after, a->p);
+    a->p = choose(a->hits, -pair->sign * after, a->p);
     return leaves;
 }
 
@@ -278,26 +295,30 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
         sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }
     vector term[VI_LANE_ORDER + 1];
-    const candidate cell = choose_cell(g, at, contacts, &f);
-    expand(g, at, &cell.start, term);
-    arrival a = search(g, at, &f, &cell, term);
-    const mask leaves = rebound(g, at, contacts, &cell, &a), moves = ~a.careful;
-    const mask arrives = cell.goal & ~a.hits & moves, stays = a.careful & (cell.passed == 0.0);
-    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), share = only(moves, a.share);
-    const vector q = choose(moves, a.q, cell.start.q);
-    const vector p = choose(moves, a.p, cell.start.p);
+    candidate pair = choose_pair(g, at, contacts, &f);
+    expand(g, at, &pair.start, term);
+    arrival a = search(g, at, &f, &pair, term);
+    const mask leaves = rebound(g, at, contacts, &pair, &a), moves = ~a.careful;
+    const mask arrives = pair.goal & ~a.hits & moves, stays = a.careful & (pair.passed == 0.0);
+    const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), flown = f.jumped + pair.passed;
+    /* the rest of the core counts cells */
+    const vector cells = 2.0 * only(moves, a.share), one = only(cells >= 1.0, all(1.0)), share = cells - one;
+    const vector q = choose(moves, a.q, pair.start.q);
+    const vector p = choose(moves, a.p, pair.start.p);
     store(g->start_q[0] + at, f.start.q);
     store(g->start_p[0] + at, f.start.p);
     store(g->start_cosine + at, f.start.cosine);
     store(g->start_sine + at, f.start.sine);
-    store(g->jumped + at, f.jumped);
-    store(g->hit_cells + at, choose(a.hits, f.jumped + cell.passed, load(g->hit_cells + at)));
+    store(g->jumped + at, 2.0 * f.jumped);
+    store(g->hit_pairs + at, choose(a.hits, flown, load(g->hit_pairs + at)));
+    store(g->hit_q + at, choose(a.hits, pair.start.q, load(g->hit_q + at)));
+    store(g->hit_p + at, choose(a.hits, pair.start.p, load(g->hit_p + at)));
     store(g->hit_share + at, choose(a.hits, a.share, load(g->hit_share + at)));
-    store(g->passed + at, cell.passed);
+    store(g->passed + at, 2.0 * pair.passed + one);
     store(g->share + at, share);
     store(g->impacts + at, impacts);
-    store(g->on + at, choose(a.hits, cell.number, only(stays, f.on)));
-    move_clock(g, at, f.jumped + cell.passed, share, arrives);
+    store(g->on + at, choose(a.hits, pair.number, only(stays, f.on)));
+    move_clock(g, at, 2.0 * flown + one, share, arrives);
     if (plan->rate > 0.0) {
         take_samples(g, plan, points, at);
     }

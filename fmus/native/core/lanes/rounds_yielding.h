@@ -10,6 +10,8 @@
 
 /* Limit of a stop that is not met while another one is pressed. */
 #define NEVER 1e300
+/* Most times in a row that a lane goes through all its cells in one round. */
+enum { MOST_JUMPS_OF_PHASES = 3 };
 
 /* State of the lanes of a vector in a round. */
 typedef struct {
@@ -213,7 +215,7 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
         }
         cell.passed = smaller(cleared, whole_part(smaller(s->to_goal, all((double)VI_CELLS))));
         jumps = cell.passed == (double)VI_CELLS;
-        if (i == MOST_JUMPS || !any(jumps)) {
+        if (i == MOST_JUMPS_OF_PHASES || !any(jumps)) {
             break;
         }
         jump_phase(g, at, contacts, jumps, s);
@@ -234,6 +236,16 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
     }
     go_to_phase_cell(g, at, contacts, s, &cell);
     return cell;
+}
+
+/* One step towards the zero of y + sign * (added value of the polynomial), of third order (Chebyshev's). */
+LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
+{
+    vector added, slope;
+    evaluate(term, share, &added, &slope);
+    const vector bend = half_bend(term, share);
+    const vector inverse = 1.0 / slope, step = (sign * y + added) * inverse;
+    return share - step * (1.0 + step * (bend * inverse));
 }
 
 /* Taylor coefficients of q over the cell, in its share, and of sign (q + lag q') without its limit. */
