@@ -7,6 +7,7 @@ requests fail.
 from __future__ import annotations
 
 import logging
+import os
 import random
 import subprocess
 import sys
@@ -60,6 +61,7 @@ def served_apart(switch: Path) -> Iterator[str]:
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
     ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
