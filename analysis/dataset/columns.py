@@ -238,11 +238,17 @@ def _with_columns(table: Floats, number: int) -> Floats:
     return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
 
 
-def joined(pieces: Sequence[RunColumns]) -> RunColumns:
-    """Return the runs of several columns of one scene, one after the other."""
+def joined(pieces: list[RunColumns]) -> RunColumns:
+    """Return the runs of several columns of one scene, one after the other.
+
+    The list is emptied: a column of the pieces is let go as soon as it is joined, so that memory holds few of them
+    twice.
+    """
     if len(pieces) == 1:
-        return pieces[0]
-    return RunColumns(*(_joined([getattr(piece, name) for piece in pieces]) for name in RunColumns.__slots__))
+        return pieces.pop()
+    columns = {name: [getattr(piece, name) for piece in pieces] for name in RunColumns.__slots__}
+    pieces.clear()
+    return RunColumns(*(_joined(columns.pop(name)) for name in RunColumns.__slots__))
 
 
 def _joined(values: Sequence[Any]) -> Any:

@@ -50,12 +50,15 @@ def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
     return joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
 
 
-def joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
+def joined(parts: list[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     """Join one-dimensional datasets along run and along every ragged dimension, then put the runs in order.
+
+    The list is emptied: a variable of the parts is let go as soon as it is joined, so that memory holds few of them
+    twice.
 
     Parameters
     ----------
-    parts : sequence of xarray.Dataset
+    parts : list of xarray.Dataset
         Attributes are those of the first.
     names : sequence of str
         Names of their files, for messages.
@@ -65,13 +68,10 @@ def joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     DatasetError
         If they differ in their variables, or a run is in two of them.
     """
-    parts = _completed(parts)
-    first = parts[0]
-    for name, part in zip(names, parts, strict=True):
-        refuse_unlike(name, part, names[0], first)
-    periods = max(part.sizes.get("period", 0) for part in parts)
+    first, variables = _alike(parts, names)
+    parts.clear()
     columns = {
-        str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
+        str(name): _stacked([each.pop(name).values for each in variables], variable.dims)
         for name, variable in first.variables.items()
         if not _is_shared(name, variable)
     }
@@ -80,7 +80,7 @@ def joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
         order = np.argsort(index)
         if (np.diff(index[order]) == 0).any():
             raise DatasetError(
-                f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
+                f"merge: expected each run in one file, got a run_index twice in {len(names)} files."
             )
         columns = _ordered(columns, first, order)
     return _with_columns(first, columns)
@@ -114,6 +114,16 @@ def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dat
     }
     coords = {str(name): data.pop(str(name)) for name in first.coords}
     return assembled(data, coords, first.attrs)
+
+
+def _alike(
+    parts: Sequence[xr.Dataset], names: Sequence[str]
+) -> tuple[xr.Dataset, list[dict[Hashable, xr.Variable]]]:
+    """Return the first part, completed, and the variables of all; DatasetError if they differ."""
+    completed = _completed(parts)
+    for name, part in zip(names, completed, strict=True):
+        refuse_unlike(name, part, names[0], completed[0])
+    return completed[0], [dict(part.variables) for part in completed]
 
 
 def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
@@ -178,9 +188,10 @@ def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: x
             )
 
 
-def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...], periods: int) -> NDArray[Any]:
+def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...]) -> NDArray[Any]:
     """Join the arrays of one variable; runs with fewer periods than the longest end in NaN."""
-    if "period" in dims and any(array.shape[1] < periods for array in arrays):
+    periods = max(array.shape[1] for array in arrays) if "period" in dims else 0
+    if any(array.shape[1] < periods for array in arrays if periods):
         arrays = [np.pad(a, ((0, 0), (0, periods - a.shape[1])), constant_values=np.nan) for a in arrays]
     return np.concatenate(arrays)
 

@@ -69,10 +69,11 @@ def _ends(points: PointColumns) -> Iterator[int]:
     yield count
 
 
-def _together(pieces: Sequence[Sequence[RunRecord] | RunColumns]) -> Sequence[RunRecord] | RunColumns:
-    """Return the results of pieces as one; columns if a piece has columns."""
+def _together(pieces: list[Sequence[RunRecord] | RunColumns]) -> Sequence[RunRecord] | RunColumns:
+    """Return the results of pieces as one, columns if a piece has columns; the list is emptied."""
     records = [piece for piece in pieces if not isinstance(piece, RunColumns)]
     if len(records) == len(pieces):
         return [record for piece in records for record in piece]
     columns = [piece if isinstance(piece, RunColumns) else columns_of(piece) for piece in pieces]
-    return columns[0] if len(columns) == 1 else joined(columns)
+    pieces.clear()
+    return joined(columns)

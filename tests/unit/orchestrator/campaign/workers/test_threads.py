@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +20,20 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
 from vibroimpact.orchestrator.campaign.workers.chunks import Chunk, ChunkResult, Work
 from vibroimpact.orchestrator.scene import Scene
 
+HELD_AFTER_FREE = """
+import numpy as np, psutil
+import vibroimpact.orchestrator.campaign.workers.threads as threads
+np.ones(3_000_000)  # freed at once: the library now keeps arrays of 24 MB in its heap
+threads._give_arrays_back()
+before = psutil.Process().memory_info().rss
+arrays, kept = [], []
+for _ in range(200):
+    arrays.append(np.ones(50_000))
+    kept.append(np.ones(10))
+del arrays
+print(psutil.Process().memory_info().rss - before)
+"""
+"""Program that prints the bytes that stay with the process after 80 MB of arrays were freed."""
 RESTITUTION = axis("stop[1].restitution", [0.0, 0.4, 0.8])
 
 
@@ -112,3 +128,10 @@ def test_only_lanes_on_few_processors_go_by_threads(
 ) -> None:
     monkeypatch.setattr(threads, "processor_count", lambda: processors)
     assert threads.thread_count(execution) == count
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a setting of the C library of Linux")
+def test_freed_arrays_go_back_to_the_system() -> None:
+    """Freed arrays below a small object that stays are held by the heap, unless their memory is mapped alone."""
+    run = subprocess.run([sys.executable, "-c", HELD_AFTER_FREE], capture_output=True, text=True, check=True)
+    assert float(run.stdout) < 10e6
