@@ -16,15 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import RULES, dataset_place, read_runs
-from vibroimpact.analysis.dataset.derived import (
-    LARGEST_IMPACT,
-    MEAN_IMPACTS,
-    RANGE,
-    RANGE_ENDS,
-    largest_of_runs,
-    mean_of_periods,
-    range_over_periods,
-)
+from vibroimpact.analysis.dataset.derived import DERIVED
 from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import image_of
 from vibroimpact.analysis.files.open_files import netcdf_lock
@@ -270,14 +262,11 @@ def _quantities(file: netCDF4.Dataset, axes: Sequence[str]) -> list[Quantity]:
         and variable.dtype is not str
         and (variable.dimensions == ("run",) or variable.dimensions[-1] in ALONG)
     ]
-    if all(name in file.variables for name in RANGE_ENDS):
-        units = _quantity(file[RANGE_ENDS[0]]).units
-        shown.append(Quantity(RANGE, "range of the displacement in a run", units))
-    if "impact_velocity" in file.variables:
-        units = _quantity(file["impact_velocity"]).units
-        shown.append(Quantity(LARGEST_IMPACT, "largest impact velocity in a run", units))
-    if "impacts_per_period" in file.variables:
-        shown.append(Quantity(MEAN_IMPACTS, "impacts per forcing period, mean of a run", "1"))
+    shown += [
+        Quantity(derived.name, derived.label, _quantity(file[derived.sources[0]]).units)
+        for derived in DERIVED
+        if derived.is_from(file.variables)
+    ]
     if can_be_classified(file):
         shown.append(Quantity(CLASS, "class of the motion", "1"))
     return sorted(shown, key=lambda one: one.name)
@@ -294,13 +283,9 @@ def _rows(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the run of each value of a variable, and the values."""
     places = np.arange(count, dtype=np.int64)
-    if quantity.name == RANGE:
-        return places, range_over_periods(*(np.asarray(file[name][:]) for name in RANGE_ENDS))
-    if quantity.name == LARGEST_IMPACT:
-        owner = np.repeat(places, file["impact_count"][:])
-        return places, largest_of_runs(owner, np.asarray(file["impact_velocity"][:]), count)
-    if quantity.name == MEAN_IMPACTS:
-        return places, mean_of_periods(np.asarray(file["impacts_per_period"][:]))
+    for derived in DERIVED:
+        if derived.name == quantity.name:
+            return places, derived.values({name: np.asarray(file[name][:]) for name in derived.sources})
     variable = file[quantity.name]
     values = np.asarray(variable[...], dtype=np.float64)
     if variable.dimensions[0] == "run":

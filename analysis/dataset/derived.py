@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,3 +54,57 @@ def mean_of_periods(impacts: NDArray[Any], axis: int = -1) -> Floats:
     there = ~np.isnan(impacts)
     mean = np.sum(impacts, axis=axis, where=there) / np.maximum(there.sum(axis=axis), 1)
     return np.where(mean > 0.0, mean, np.nan)
+
+
+def _range(columns: Mapping[str, NDArray[Any]]) -> Floats:
+    return range_over_periods(*(columns[name] for name in RANGE_ENDS))
+
+
+def _largest_impact(columns: Mapping[str, NDArray[Any]]) -> Floats:
+    counts = columns["impact_count"]
+    return largest_of_runs(np.repeat(np.arange(len(counts)), counts), columns["impact_velocity"], len(counts))
+
+
+def _mean_impacts(columns: Mapping[str, NDArray[Any]]) -> Floats:
+    return mean_of_periods(columns["impacts_per_period"])
+
+
+@dataclass(frozen=True, slots=True)
+class DerivedQuantity:
+    """A quantity of runs that comes from their other variables.
+
+    Attributes
+    ----------
+    name, label : str
+    sources : tuple of str
+        The variables of runs that it comes from; the first has its units.
+    values : callable
+        Function of these variables by name; returns the quantity, shape (run,).
+    """
+
+    name: str
+    label: str
+    sources: tuple[str, ...]
+    values: Callable[[Mapping[str, NDArray[Any]]], Floats]
+
+    def is_from(self, names: Container[str]) -> bool:
+        """Return whether runs with these variables have the quantity."""
+        return all(name in names for name in self.sources)
+
+
+DERIVED = (
+    DerivedQuantity(RANGE, "range of the displacement in a run", RANGE_ENDS, _range),
+    DerivedQuantity(
+        LARGEST_IMPACT,
+        "largest impact velocity in a run",
+        ("impact_velocity", "impact_count"),
+        _largest_impact,
+    ),
+    DerivedQuantity(
+        MEAN_IMPACTS,
+        "impacts per forcing period, mean of a run",
+        ("impacts_per_period",),
+        _mean_impacts,
+    ),
+)
+"""All derived quantities."""

@@ -52,6 +52,12 @@ class BeamPoints(StructurePoints):
             natural, ratios, mass, load[:, None], shapes[0] / mass, shapes[1], shapes[2:], same, same
         )
 
+    @property
+    def natural_frequencies(self) -> Floats:
+        """Natural angular frequencies of one point, without residual vectors: see `BodyPoints`."""
+        vectors = len(set(self._places())) if self.integers.get("residual") else 0
+        return self.structure_of(self.floats).frequencies[: self.integers["modes"] - vectors]
+
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
         return np.asarray(displacements * np.sqrt(_mass_of(self.floats)))

@@ -93,6 +93,11 @@ class BodyPoints(ABC):
     def mass_normalised(self) -> ImpactingBody:
         """Return a body without a flaw as mass-normalised modes under its harmonic force: equations.md 5.2, 6.4."""
 
+    @property
+    @abstractmethod
+    def natural_frequencies(self) -> Floats:
+        """Natural angular frequencies of one point without damping, rad/s, shape (mode,), ascending."""
+
     @abstractmethod
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of states (m, shape (state, element)) in mass-normalised modes, kg^(1/2) m."""

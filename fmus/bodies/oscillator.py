@@ -46,6 +46,11 @@ class OscillatorPoints(BodyPoints):
             shape,
         )
 
+    @property
+    def natural_frequencies(self) -> Floats:
+        """The natural angular frequency of one point: see `BodyPoints`."""
+        return np.array([np.sqrt(self.floats["stiffness"] / self.floats["mass"])])
+
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
         return np.asarray(displacements * np.sqrt(self.floats["mass"]))

@@ -114,6 +114,12 @@ class StructurePoints(BodyPoints):
                 kind=which,
             )
 
+    @property
+    def natural_frequencies(self) -> Floats:
+        """Natural angular frequencies of one point: see `BodyPoints`; empty without modes."""
+        found = self.structure_of(self.floats)
+        return np.empty(0) if found is None else found.frequencies
+
     def mass_normalised(self) -> ImpactingBody:
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
         numbers = self.floats

@@ -88,7 +88,8 @@ class Sine:
             raise UsageError(f"--ramp: expected a number >= 0, s, got {self.ramp!r}.")
         if self.samples is not None and self.samples < 2 * self.rise + 1:
             raise UsageError(
-                f"--duration: expected more than twice the ramp of {self.ramp:g} s, got {self.samples / self.rate:g}."
+                f"--duration: expected more than twice the ramp of {self.ramp:g} s, got {self.samples / self.rate:g}. "
+                "Use a longer duration, or a shorter --ramp."
             )
         object.__setattr__(self, "_turns", Fraction(self.frequency) / Fraction(self.rate))
 
@@ -113,12 +114,12 @@ class Sine:
         if self.amplitude > limits.amplitude:
             raise UsageError(
                 f"--amplitude: expected at most {limits.amplitude:g} V, got {self.amplitude:g}. "
-                "--most-amplitude is the limit."
+                "Use a smaller one, or raise --most-amplitude if what is driven bears it."
             )
         if self.steepest > limits.slew:
             raise UsageError(
                 f"--amplitude, --frequency, --ramp: expected at most {limits.slew:g} V/s, got {self.steepest:.4g}. "
-                "--most-slew is the limit."
+                "Use smaller ones or a longer ramp, or raise --most-slew if what is driven bears it."
             )
 
     def phase(self, first: int, count: int) -> Floats:

@@ -26,10 +26,9 @@ from vibroimpact.fmus.messages import CALL, Message, message
 from vibroimpact.orchestrator.campaign.destination import ShardParts, UnfitShardsError
 from vibroimpact.orchestrator.campaign.earlier_sweep import EarlierSweep
 from vibroimpact.orchestrator.campaign.extension import (
-    Kept,
     kept_path,
     other_differences,
-    read_kept,
+    read_only_kept,
     scene_of_manifest,
     without_held,
 )
@@ -59,7 +58,6 @@ from vibroimpact.orchestrator.campaign.parts import (
     NO_RUNS,
     StoredPart,
     list_parts,
-    own_files,
     remove_parts,
     remove_parts_within,
     remove_temporary_files,
@@ -234,18 +232,7 @@ class _Campaign:
         hashed, note = self._manifest.scene_hash, self._progress.note
         store = earlier_store(self._home, old, self._shard_points, hashed, note)
         earlier = EarlierSweep(old, self._manifest, self._home, note, store)
-        try:
-            handed_over = earlier.hand_over(self._scene, self._report.runs)
-        except OSError as error:
-            raise CampaignError(
-                message(
-                    f"{self._home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
-                    "They are where they were. Make room or restore access; then the same ",
-                    CALL,
-                    " goes on.",
-                )
-            ) from error
-        if not handed_over:
+        if not earlier.hand_over(self._scene, self._report.runs):
             refuse_other_scene(self._manifest_path, different)
         self._manifest = read_manifest(self._manifest_path)
 
@@ -287,7 +274,7 @@ class _Campaign:
         self._report.chunks.clear()
         self._computed_files.clear()
         self._rounds = Rounds(self._scene) if adaptive_axes(self._scene) else None
-        kept = self._read_kept()
+        kept = read_only_kept(self._parts_folder, self._kept_path, self._scene, self._progress.note)
         runs = kept.runs if kept is not None else NO_RUNS
         self._destination.make()
         held = self._destination.held()
@@ -328,21 +315,6 @@ class _Campaign:
             StoredPart(path, chunk, None, chunk.count)
             for path, chunk in zip(self._computed_files, self._report.chunks, strict=True)
         ]
-
-    def _read_kept(self) -> Kept | None:
-        for path in own_files(self._parts_folder):  # files of earlier sweeps go
-            if path.name.startswith("kept-") and path != self._kept_path:
-                path.unlink()
-        if not self._kept_path.exists():
-            return None
-        try:
-            return read_kept(self._kept_path, self._scene)
-        except DatasetError as error:
-            self._kept_path.unlink()
-            self._progress.note(
-                f"{self._kept_path.name} was damaged and is removed; its points come again: {error}"
-            )
-            return None
 
     def _interrupted(self) -> Message:
         done = self._report.resumed + self._report.outcomes.total()

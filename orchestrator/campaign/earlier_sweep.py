@@ -20,6 +20,8 @@ import xarray as xr
 from vibroimpact.analysis.dataset import join_files, read_part, take_runs, write_dataset
 from vibroimpact.analysis.dataset.flat_file import blocks_of
 from vibroimpact.analysis.files.object_paths import AnyPath
+from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.messages import CALL, message
 from vibroimpact.orchestrator.campaign.extension import (
     Runs,
     is_of,
@@ -82,8 +84,22 @@ class EarlierSweep:
     def hand_over(self, new: Scene, runs: int) -> bool:
         """Hand the folder over to a new sweep; return False where the new sweep keeps no row of the old one.
 
-        The folder belongs to the old sweep until the new manifest is written, and nothing is removed before.
+        The folder belongs to the old sweep until the new manifest is written, and nothing is removed before. Raise
+        CampaignError where the system refuses to write.
         """
+        try:
+            return self._hand_over(new, runs)
+        except OSError as error:
+            raise CampaignError(
+                message(
+                    f"{self.home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
+                    "They are where they were. Make room or restore access; then the same ",
+                    CALL,
+                    " goes on.",
+                )
+            ) from error
+
+    def _hand_over(self, new: Scene, runs: int) -> bool:
         old, hashed, sources = self.manifest, scene_hash(new), self._sources()
         manifest = new_manifest(new, old.identity, runs, old.continued_with, shard_points=old.shard_points)
         if sources:

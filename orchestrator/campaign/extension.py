@@ -34,9 +34,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     flat_scene,
     scene_hash,
 )
-from vibroimpact.orchestrator.campaign.parts import (
-    StoredPart,
-)
+from vibroimpact.orchestrator.campaign.parts import Note, StoredPart, own_files
 from vibroimpact.orchestrator.campaign.workers.chunks import Chunk
 from vibroimpact.orchestrator.run.dataset import (
     coordinate_names,
@@ -306,6 +304,21 @@ def read_kept(path: AnyPath, scene: Scene) -> Kept:
         carried = _carried(rows, begin, stop) if chained else None
         stretches.append(StoredPart(path, Chunk(branch, int(runs[first]), last + 1), carried))
     return Kept(path, runs, stretches)
+
+
+def read_only_kept(folder: AnyPath, path: AnyPath, scene: Scene, note: Note) -> Kept | None:
+    """Return the kept rows of a sweep, None without sound ones; other kept rows in the folder of parts are removed."""
+    for other in own_files(folder):
+        if other.name.startswith("kept-") and other != path:
+            other.unlink()
+    if not path.exists():
+        return None
+    try:
+        return read_kept(path, scene)
+    except DatasetError as error:
+        path.unlink()
+        note(f"{path.name} was damaged and is removed; its points come again: {error}")
+        return None
 
 
 def without_held(kept: Kept, held: Sequence[StoredPart]) -> Kept:

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
-from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws
+from vibroimpact.orchestrator.run.summary import contacts, effects, engine, laws, natural_frequencies
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -70,6 +70,8 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
 def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
     yield "points", _points(cost)
     yield "trial", f"none: {cost.untried}" if cost.trial is None else _trial(cost.trial)
+    if scene.is_one_body and cost.trial is not None and cost.trial.outcome not in FAILED:
+        yield "modes", natural_frequencies(scene.at(cost.trial.values))
     refused = _refused(scene)
     if cost.first:
         yield "run", "refused: the points of adaptive axes are found by `vibroimpact campaign`"

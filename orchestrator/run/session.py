@@ -102,7 +102,7 @@ class Session:
     def begin(
         self, values: Mapping[str, float] | None = None, start: tuple[float, ...] | None = None
     ) -> None:
-        """Begin at time 0, from the scene's start state or a carried state.
+        """Begin at time 0, from the scene's start state or a carried state, with all inputs 0.
 
         Parameters
         ----------
@@ -124,6 +124,7 @@ class Session:
                 "body.modes, execution.macro_step: expected what the opened scene has, got another number. "
                 "Open a scene that says so."
             )
+        self._inputs.values[:] = 0.0
         self._forcing = scene.forcing
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)

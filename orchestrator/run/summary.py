@@ -5,6 +5,7 @@ from __future__ import annotations
 from vibroimpact.orchestrator.importer.specification import PairSpec, StopContactSpec
 from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
+from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
@@ -17,6 +18,9 @@ EFFECTS_OF_THE_SHORT_FORM = (
     *("sensor", "load cell", "exciter", FALLING_FORCE, "noise", "AD conversion"),
 )
 """Effects that tables and numbers of the short form ask for, and the package's components in a general scene."""
+
+SHOWN_FREQUENCIES = 5
+"""Maximum number of natural frequencies in words."""
 
 
 def engine(scene: Scene, execution: str = "auto") -> str:
@@ -55,6 +59,22 @@ def _body(scene: Scene) -> str:
     used = modes or ("auto" if body.finds_modes else body.kept_modes)
     reduced = f" by {used} mode{'' if used == 1 else 's'}" if used != body.size else ""
     return f"{body.FMU}, a structure of {body.size} {'mass' if body.size == 1 else 'masses'}{reduced}"
+
+
+def natural_frequencies(scene: Scene) -> str:
+    """Return the first natural angular frequencies of the body of a scene in words, rad/s in SI.
+
+    Examples
+    --------
+    >>> from vibroimpact.orchestrator.scene.scene import parse_scene
+    >>> text = "[body]\\nmass = 1\\nstiffness = 4\\n[record]\\nrecorded_time = 5"
+    >>> natural_frequencies(parse_scene(text, "free.toml"))
+    'natural frequencies, rad/s: 2'
+    """
+    found = body_points(scene).natural_frequencies
+    unit = ", rad/s" if scene.units == "SI" else ""
+    more = f" and {found.size - SHOWN_FREQUENCIES} more" if found.size > SHOWN_FREQUENCIES else ""
+    return f"natural frequencies{unit}: {', '.join(f'{one:.6g}' for one in found[:SHOWN_FREQUENCIES])}{more}"
 
 
 def laws(scene: Scene) -> dict[str, str]:

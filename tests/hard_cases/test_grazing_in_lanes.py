@@ -148,3 +148,20 @@ def test_elastic_stops_that_yield_give_back_the_energy_of_hundreds_of_contacts(s
         assert len(impacts) > 300
         assert np.abs(impacts[:, 6] - 1.0).max() <= 1e-8  # the rounding of the stop's position over the depth
         assert np.abs(impacts[:, 3] / math.sqrt(amplitude**2 - 0.25) - 1.0).max() <= 1e-10
+
+
+def test_the_speeds_of_short_returns_drift_by_the_rounding_of_a_position_alone() -> None:
+    # a held force presses bodies to an elastic stop; returns found from the middle of a pair of cells drift by 1.2e-6
+    count, bounces, speed = 64, 300, 1e-4
+    position = np.linspace(0.3, 1.7, count)
+    points = oscillators(
+        count, 0, 1, decay=0.0, force=0.0, held=position + 1.0, angular_frequency=1.0, position=position,
+        restitution=1.0, start_q=position - speed**2 / (math.hypot(1.0, speed) + 1.0), start_p=0.0,
+    )  # fmt: skip
+    points |= {"begin": np.zeros(count), "end": np.full(count, bounces * 2.0 * math.atan(speed))}
+    found = run(points)
+    assert found.has_run.all()
+    speeds = [rows[rows[:, 0] == IMPACT, 3] for rows in found.rows]
+    assert all(abs(len(each) - bounces) <= 1 for each in speeds)
+    drifts = np.array([each[-1] / each[0] - 1.0 for each in speeds])
+    assert math.sqrt(np.mean(drifts**2)) <= 9e-7

@@ -58,6 +58,11 @@ CHOSEN = {
         "const vector after = restitution * approach;",
         "const vector after = restitution * approach * (1.0 - 1e-9);",
     ),
+    "short returns in lanes are found from the middle of a pair": (
+        "core/lanes/rounds.h",
+        "#define SHORTEST_RETURN 0.125",
+        "#define SHORTEST_RETURN 0.0",
+    ),
     "lanes look at the curve of a pair too boldly": (
         "core/lanes/rounds.h",
         "0.125 * smaller(smaller(curve, end_curve) - error[i >= VI_NEAR_PAIRS], none);",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from support import bits_of_scenes
 from support.bits_of_scenes import KEPT, LANES, SCENES, dataset_of, digest, fingerprint, kept
 
 from vibroimpact.analysis.dataset import Outcome
@@ -26,6 +29,15 @@ def test_a_scene_runs_to_its_end_and_gives_the_bits_that_it_gave(name: str) -> N
 
 def test_every_scene_has_its_bits() -> None:
     assert not kept() or set(kept()) == set(SCENES)
+
+
+def test_a_question_for_help_writes_no_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bits_of_scenes, "KEPT", tmp_path / "bits.json")
+    monkeypatch.setattr(bits_of_scenes, "SCENES", {})
+    monkeypatch.setattr("sys.argv", ["bits_of_scenes", "--help"])
+    with pytest.raises(SystemExit, match=r"^0$"):
+        bits_of_scenes.main()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", LANES)

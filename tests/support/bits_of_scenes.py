@@ -6,6 +6,7 @@ bits.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import re
@@ -236,6 +237,8 @@ def kept() -> Mapping[str, str]:
 
 def main() -> None:
     """Write the digests of all scenes from this machine; digests of other machines are removed."""
+    parser = argparse.ArgumentParser(prog="python -m support.bits_of_scenes", description=main.__doc__)
+    parser.parse_args()
     digests = {name: digest(dataset_of(name)) for name in SCENES}
     KEPT.write_text(json.dumps({fingerprint(): digests}, indent=1) + "\n", encoding="ascii")
 

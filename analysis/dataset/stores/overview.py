@@ -14,15 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.derived import (
-    LARGEST_IMPACT,
-    MEAN_IMPACTS,
-    RANGE,
-    RANGE_ENDS,
-    largest_of_runs,
-    mean_of_periods,
-    range_over_periods,
-)
+from vibroimpact.analysis.dataset.derived import DERIVED
 from vibroimpact.analysis.dataset.stores.grid import SHARD_POINTS, Block, StoreGrid
 
 OVERVIEW = "overview"
@@ -38,28 +30,16 @@ Floats = NDArray[np.float64]
 
 def quantities_of(columns: Mapping[Any, xr.Variable]) -> dict[str, Floats]:
     """Return the quantities of runs that a map shows, shape (run,) each, from their variables."""
-    found: dict[str, Floats] = {}
-    if all(name in columns for name in RANGE_ENDS):
-        found[RANGE] = range_over_periods(*(columns[name].values for name in RANGE_ENDS))
-    if "impact_velocity" in columns:
-        counts = columns["impact_count"].values
-        owner = np.repeat(np.arange(len(counts)), counts)
-        found[LARGEST_IMPACT] = largest_of_runs(owner, columns["impact_velocity"].values, len(counts))
-    if "impacts_per_period" in columns:
-        found[MEAN_IMPACTS] = mean_of_periods(columns["impacts_per_period"].values)
-    return found
+    return {
+        quantity.name: quantity.values({name: columns[name].values for name in quantity.sources})
+        for quantity in DERIVED
+        if quantity.is_from(columns)
+    }
 
 
 def names_of(names: Mapping[Any, Any]) -> list[str]:
     """Return the names of the arrays of an overview, from the variables of its runs."""
-    found = []
-    for quantity, needed in (
-        (RANGE, RANGE_ENDS),
-        (LARGEST_IMPACT, ("impact_velocity",)),
-        (MEAN_IMPACTS, ("impacts_per_period",)),
-    ):
-        if all(name in names for name in needed):
-            found += [f"{quantity}_{part}" for part in PARTS]
+    found = [f"{quantity.name}_{part}" for quantity in DERIVED if quantity.is_from(names) for part in PARTS]
     return found + (list(CLASSES) if all(name in names for name in CLASSES) else [])
 
 

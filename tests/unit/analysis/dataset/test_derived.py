@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.dataset.derived import (
+    DERIVED,
     largest_impact_velocity,
     largest_of_runs,
     mean_of_periods,
@@ -51,3 +52,19 @@ def test_periods_without_values_count_neither_for_the_mean_nor_for_the_range() -
     np.testing.assert_array_equal(mean_of_periods(impacts), [1.5, np.nan, np.nan])
     highest, lowest = np.array([[1.0, np.nan], [np.nan, np.nan]]), np.array([[-1.0, -2.0], [np.nan, np.nan]])
     np.testing.assert_array_equal(range_over_periods(highest, lowest), [3.0, np.nan])
+
+
+def test_a_quantity_needs_all_its_sources_and_has_a_value_for_each_run() -> None:
+    columns = {
+        "displacement_max": np.array([[1.0, 3.0], [0.0, 0.0]]),
+        "displacement_min": np.array([[-1.0, 0.0], [0.0, 0.0]]),
+        "impact_count": np.array([2, 0]),
+        "impact_velocity": np.array([0.5, 0.25]),
+        "impacts_per_period": np.array([[2.0, 0.0], [0.0, 0.0]]),
+    }
+    expected = ([4.0, 0.0], [0.5, np.nan], [1.0, np.nan])
+    for quantity, values in zip(DERIVED, expected, strict=True):
+        assert quantity.is_from(columns)
+        np.testing.assert_array_equal(quantity.values(columns), values)
+        for source in quantity.sources:
+            assert not quantity.is_from(columns.keys() - {source})

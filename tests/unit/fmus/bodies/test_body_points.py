@@ -95,3 +95,21 @@ def test_a_state_is_told_in_mass_normalised_modes_with_its_kinetic_energy() -> N
     modal = body("Chain").normalised(velocities)
     assert (modal**2).sum() == pytest.approx(1.0 * 0.3**2 + 2.0 * 0.2**2, rel=1e-13)
     assert body("Oscillator").normalised(np.array([[0.3]]))[0, 0] ** 2 == pytest.approx(2.0 * 0.3**2)
+
+
+@pytest.mark.parametrize("fmu", BODIES)
+def test_the_natural_frequencies_are_those_of_the_modes(fmu: str) -> None:
+    one = body(fmu)
+    np.testing.assert_allclose(one.natural_frequencies, one.mass_normalised().frequencies, rtol=1e-14)
+
+
+def test_damping_that_couples_the_modes_of_a_chain_leaves_its_natural_frequencies() -> None:
+    coupled = body("Chain", **{"damping[2]": 0.5})
+    assert coupled.flaw == "coupled"
+    np.testing.assert_array_equal(coupled.natural_frequencies, body("Chain").natural_frequencies)
+
+
+def test_residual_vectors_have_no_natural_frequency() -> None:
+    floats, integers = BODIES["Beam"]
+    one = POINTS_OF_FMU["Beam"](floats, integers | {"residual": 1}, 1)
+    np.testing.assert_array_equal(one.natural_frequencies, body("Beam").natural_frequencies[:2])

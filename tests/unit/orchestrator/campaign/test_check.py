@@ -211,7 +211,7 @@ def test_check_says_what_runs_and_what_it_costs(scene_file: Path) -> None:
     lines = done.stdout.splitlines()
     assert lines[0] == f"{scene_file}: no problems"
     assert [line.split()[0] for line in lines[1:]] == [
-        *("engine", "stops", "effects", "without", "points", "trial", "run", "campaign", "dataset")
+        *("engine", "stops", "effects", "without", "points", "trial", "modes", "run", "campaign", "dataset")
     ]
     assert "6 in 2 branches of 3, along which each starts where the one before ended" in done.stdout
     assert "one point was computed, forcing.angular_frequency = 1.1: " in done.stdout

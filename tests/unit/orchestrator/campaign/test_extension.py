@@ -18,7 +18,7 @@ import vibroimpact.analysis.dataset.flat_file as flat_file
 import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
 
 
@@ -230,3 +230,21 @@ def test_a_campaign_that_dies_at_any_step_of_an_extension_goes_on(
             break
         steps += 1
     assert steps > 5
+
+
+def test_a_full_disk_leaves_the_earlier_sweep_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    campaign_here(monkeypatch, sweep(frequency(5)), tmp_path)
+    before = (tmp_path / "dataset.nc").read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr("vibroimpact.orchestrator.campaign.earlier_sweep.join_files", full)
+        with pytest.raises(
+            CampaignError, match=r"could not be kept: No space left on device\. They are where"
+        ):
+            campaign_here(monkeypatch, sweep(frequency(9)), tmp_path)
+    assert (tmp_path / "dataset.nc").read_bytes() == before
+    assert campaign_here(monkeypatch, sweep(frequency(9)), tmp_path).resumed == 5

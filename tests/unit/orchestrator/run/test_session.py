@@ -150,3 +150,12 @@ def test_a_block_that_cannot_be_is_one_clear_error() -> None:
         session.begin()
         with pytest.raises(UsageError, match="expected outputs that the FMU has as they are"):
             session.hold(two, np.array([1.0]))
+
+
+@pytest.mark.parametrize("execution", ["fused", "coupled"])
+def test_a_session_that_begins_again_has_lost_the_force_of_the_run_before(execution: str) -> None:
+    with Session(parse_scene(FREE, "free.toml"), ["velocity"], execution=execution) as session:
+        session.begin()
+        assert session.advance(0.02, {"force": (3.0, 0.0)})["velocity"] > 0.0
+        session.begin()
+        assert session.advance(0.02)["velocity"] == 0.0
