@@ -209,7 +209,10 @@ def of_all_periods(periods: Floats) -> Floats:
 
     The columns are `PERIOD_COLUMNS`, shape (run, period, 5), then (run, 1, 5): largest, smallest, both strobe values
     of the last period, mean. A run with fewer periods than the others ends in NaN; a run without any has NaN alone.
+    Values of one period stand for all as they are.
     """
+    if periods.shape[1] == 1:
+        return periods
     result = np.full((len(periods), 1, len(PERIOD_COLUMNS)), np.nan)
     # each recorded period has its number of impacts, also where nothing else is recorded
     count = np.count_nonzero(~np.isnan(periods[:, :, 4]), axis=1)
@@ -241,7 +244,7 @@ def _with_columns(table: Floats, number: int) -> Floats:
 def joined(pieces: list[RunColumns]) -> RunColumns:
     """Return the runs of several columns of one scene, one after the other.
 
-    The list is emptied: a column of the pieces is let go as soon as it is joined, so that memory holds few of them
+    The list is emptied. A column of the pieces is let go as soon as it is joined, so that memory holds few of them
     twice.
     """
     if len(pieces) == 1:

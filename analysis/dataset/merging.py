@@ -53,7 +53,7 @@ def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
 def joined(parts: list[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     """Join one-dimensional datasets along run and along every ragged dimension, then put the runs in order.
 
-    The list is emptied: a variable of the parts is let go as soon as it is joined, so that memory holds few of them
+    The list is emptied. A variable of the parts is let go as soon as it is joined, so that memory holds few of them
     twice.
 
     Parameters
