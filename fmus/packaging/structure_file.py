@@ -13,6 +13,8 @@ from vibroimpact.fmus.errors import UsageError
 #: Place of the file in an FMU.
 STRUCTURE_MEMBER = "resources/structure.bin"
 MAGIC = b"VISTRUC1"
+#: Bytes before the arrays, and the largest number of modes.
+HEAD, MOST_MODES = len(MAGIC) + 3 * 8, 64
 #: Arrays of the file in their order; each has a row of one number for each mode, or several rows.
 STRUCTURE_ARRAYS = (
     *("mode.angular_frequency", "mode.damping_ratio", "mode.damping", "mode.contact_shape"),
@@ -42,3 +44,10 @@ def structure_file(arrays: Mapping[str, Any], *, coupled: bool = False) -> bytes
             raise UsageError(f"{name}: expected an array of shape {shape}, got {array.shape}.")
         rows.append(array.tobytes())
     return b"".join(rows)
+
+
+def natural_frequencies(content: bytes) -> tuple[float, ...]:
+    """Return the angular frequencies in the content of a file, rad/s; those there are, if it is cut off."""
+    modes = int.from_bytes(content[len(MAGIC) : len(MAGIC) + 8], "little")
+    numbers = content[HEAD : HEAD + 8 * min(modes, MOST_MODES)]
+    return tuple(np.frombuffer(numbers[: len(numbers) // 8 * 8], dtype="<f8").tolist())

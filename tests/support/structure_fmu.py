@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from support.component_fmu import ComponentFmu
 
+from support.component_fmu import ComponentFmu
 
 MODES, CONTACTS = 64, 32
 Arrays = Mapping[str, ArrayLike]

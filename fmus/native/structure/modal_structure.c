@@ -19,8 +19,12 @@ static void defaults(void *self)
     modal_structure *s = self;
     s->modes = 1;
     s->modes_described = VI_MODES;
-    for (int j = 0; j < VI_MODES; ++j) {
-        s->natural[j] = 1.0;
+    for (int j = 0; j < VI_MODES; ++j) { /* an oscillator of mass 1 and stiffness 1 */
+        s->natural[j] = s->body.model.observed[j] = s->forcing[j] = s->force_shape[j] = 1.0;
+        s->base[j] = -1.0;
+        for (int k = 0; k < VI_PORTS; ++k) {
+            s->body.model.shape[k][j] = 1.0;
+        }
     }
 }
 
@@ -54,6 +58,7 @@ static void attach(void *self, const void *resources)
         return;
     }
     const int n = file->modes;
+    memset(s->body.model.shape, 0, sizeof s->body.model.shape); /* contacts beyond those of the file meet nothing */
     s->modes = s->modes_of_file = n;
     s->coupled = file->coupled;
     const double *next = take(file->numbers, n, s->natural);

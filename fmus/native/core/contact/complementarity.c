@@ -11,7 +11,7 @@ static const double REDUNDANT = 1e-13;
 static const double SOFTENING = 1e-6;
 enum { REFINEMENTS = 4 };
 /* Most turns of the pivoting: those of its proof, 2^contacts, up to eight contacts; more contacts take a few each. */
-enum { MOST_TURNS = VI_PORTS <= 8 ? 1 << VI_PORTS : 128 * VI_PORTS };
+enum { MOST_TURNS = VI_PORTS <= 8 ? 1 << VI_PORTS : 32 * VI_PORTS };
 
 /* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
 static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
