@@ -91,7 +91,10 @@ def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
 def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
     """Return the compiler options for the core and the tests."""
     options = [*LANGUAGE, *WARNINGS, "-Werror", "-g1", "-O1"]
-    options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", NATIVE / "structure", fmi_headers())]
+    options += [
+        f"-I{folder}"
+        for folder in (NATIVE / "core", NATIVE / "adapters", NATIVE / "structure", fmi_headers())
+    ]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
     return tuple(options)

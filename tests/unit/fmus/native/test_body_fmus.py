@@ -10,7 +10,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from support.body_scenes import BEAM, BODIES, OSCILLATOR, BodyScene
+from support.body_scenes import BEAM, BODIES, BodyScene
 from support.component_fmu import (
     KELVIN_VOIGT,
     LOWER,

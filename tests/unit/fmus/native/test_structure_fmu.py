@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 from fmpy.fmi1 import FMICallException
+from fmpy.validation import validate_fmu
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
