@@ -100,7 +100,8 @@ def export_fmu(
     units : mapping of str to UnitDefinition, optional
         Units, by variable name, for variables without a unit of their own: those of a Gain.
     structure : bytes, optional
-        Modes of a Structure: `structure_file`. `modes` and `contacts` should be their numbers.
+        Modes of a Structure: `structure_file`. `modes` and `contacts` should be their numbers. Without it, the body is
+        an oscillator of mass 1 and stiffness 1.
     note : callable
         Function that gets a line about each compilation for another machine, and each warning of the library.
 
@@ -153,7 +154,7 @@ def export_fmu(
         return members_of(contents)
 
     given = dict(starts or {})
-    displaced = [] if full else _displacements(original, given)
+    displaced = [] if full or structure is not None else _displacements(original, given)
     write_fmu(target, _first_taken([*(given | one for one in displaced), given], members_with))
     return target
 

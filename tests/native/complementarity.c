@@ -65,7 +65,7 @@ static void check_order(uint64_t *seed, int n, double g[VI_PORTS][VI_PORTS], con
     }
 }
 
-enum { PROBLEMS = VI_PORTS > 8 ? 1000 : 50000 };
+enum { PROBLEMS = VI_PORTS > 8 ? 500 : 50000 };
 
 static void random_problems(uint64_t *seed)
 {
