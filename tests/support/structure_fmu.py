@@ -1,51 +1,52 @@
-"""The Structure FMU with arrays of modes, set as FMI 3.0 arrays or by its file."""
+"""A body's FMU with the record of its impacts and sticks, taken along the way."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from support.component_fmu import ComponentFmu
 
-MODES, CONTACTS = 64, 32
-Arrays = Mapping[str, ArrayLike]
+ROW_IMPACT, ROW_STICK = 1.0, 2.0
 
 
-def modes_of(
-    mass: ArrayLike, stiffness: ArrayLike, damping: ArrayLike | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return angular frequencies, mass-normalised shapes (points, modes) and the modal damping matrix."""
-    root = np.sqrt(np.asarray(mass, dtype=float))
-    square, vectors = np.linalg.eigh(np.asarray(stiffness, dtype=float) / np.outer(root, root))
-    shape = vectors / root[:, None]
-    viscous = np.zeros((root.size, root.size)) if damping is None else np.asarray(damping, dtype=float)
-    square = np.where(np.abs(square) < 1e-13 * max(np.abs(square).max(), 1e-300), 0.0, square)
-    return np.sqrt(square), shape, shape.T @ viscous @ shape
+def forced(amplitude: float, angular_frequency: float, phase: float = 0.0) -> dict[str, float]:
+    """Return the parameters of a harmonic force, for a beam or an oscillator."""
+    return {
+        "forcing.amplitude": amplitude,
+        "forcing.angular_frequency": angular_frequency,
+        "forcing.phase": phase % (2.0 * math.pi),
+    }
 
 
-def structure_fmu(
-    arrays: Arrays, parameters: Mapping[str, float] = {}, *, coupled: bool = False, **options: Any
-) -> ComponentFmu:
-    """Return an initialized Structure whose arrays were set one by one (FMI 3.0)."""
-    own = dict(options)
-    initialize = own.pop("initialize", True)
-    fmu = ComponentFmu("Structure", parameters, initialize=False, **own)
-    fmu.set("modes", np.size(arrays["mode.angular_frequency"]))
-    fmu.set("coupled", coupled)
-    for name, values in arrays.items():
-        set_array(fmu, name, values)
-    if initialize:
-        fmu.initialize()
-    return fmu
+class StructureFmu(ComponentFmu):
+    """One initialized instance that records its impacts and sticks; its time is the end of the last step."""
 
+    def __init__(self, component: str, parameters: Mapping[str, float], start_time: float = 0.0) -> None:
+        self._taken: list[np.ndarray] = []
+        recording = {**parameters, "record.impacts": True}
+        super().__init__(component, recording, start_time=start_time, early_return=True)
 
-def set_array(fmu: ComponentFmu, name: str, values: ArrayLike) -> None:
-    """Set an array of the Structure from its part in use; the rest is 0."""
-    part = np.asarray(values, dtype=float)
-    sizes = {"mode.contact_shape": (CONTACTS, MODES), "mode.damping": (MODES, MODES)}
-    whole = np.zeros(sizes.get(name, (MODES,)))
-    whole[tuple(map(slice, part.shape))] = part
-    fmu.fmu.setFloat64([fmu.reference(name)], whole.ravel().tolist())
+    def advance(self, end: float) -> StructureFmu:
+        """Advance to `end`, over early returns, and take the record."""
+        while self.time < end:
+            self.step(end - self.time)
+            self._taken.append(self.rows())
+        return self
+
+    def recorded(self, kind: float) -> np.ndarray:
+        """Return the rows of one kind, shape (n, 8)."""
+        table = np.concatenate(self._taken)
+        return table[table[:, 0] == kind]
+
+    @property
+    def impacts(self) -> np.ndarray:
+        """Time, phase, velocity before, impulse and contact of each impact, shape (n, 5)."""
+        return self.recorded(ROW_IMPACT)[:, 1:6]
+
+    @property
+    def sticks(self) -> np.ndarray:
+        """Start, end and contact of each stick that has ended, shape (n, 3)."""
+        return self.recorded(ROW_STICK)[:, 1:4]

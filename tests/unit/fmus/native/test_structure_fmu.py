@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from support.component_fmu import HERTZ, KELVIN_VOIGT, LOWER, UPPER, VERSIONS, ComponentFmu, each, stop
-from support.structure_fmu import CONTACTS, MODES, modes_of, structure_fmu
+from support.modal_fmu import CONTACTS, MODES, modes_of, structure_fmu
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.export import export_fmu
