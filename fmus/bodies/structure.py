@@ -13,7 +13,10 @@ from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints, row_of,
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Numbers, contacts_of
 from vibroimpact.fmus.errors import VibroimpactError
 
-OF_THE_RUN = ("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_")
+OF_THE_RUN = (
+    *("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_"),
+    *("mode.displacement_start", "mode.velocity_start"),
+)
 """Prefixes of parameter names that do not change the modes."""
 OF_A_STOP = (".position", ".restitution", ".yield_velocity")
 """Suffixes of parameter names that do not change the modes."""

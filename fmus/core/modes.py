@@ -241,6 +241,43 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
     return ChainModes(frequencies, ratios, shapes, end == 0)
 
 
+def spring_modes(springs: Array) -> tuple[Array, Array]:
+    """Return the angular frequencies above 0, ascending, and the unit vectors of a structure of springs.
+
+    Parameters
+    ----------
+    springs : array, shape (spring, coordinate)
+        Row of each spring: sqrt(stiffness / mass) at each coordinate, with the sign of its elongation; 1 to 64
+        coordinates. The stiffness matrix over the masses is the transpose of this matrix times itself.
+
+    Returns
+    -------
+    frequencies : array, shape (mode,)
+        rad/s; as many as the springs hold.
+    vectors : array, shape (mode, coordinate)
+
+    Raises
+    ------
+    UsageError
+        A number is not finite, or there are more than 64 coordinates.
+
+    Examples
+    --------
+    >>> frequencies, vectors = spring_modes(np.array([[3.0, 0.0], [0.0, 2.0]]))
+    >>> print(frequencies, abs(vectors).tolist())
+    [2. 3.] [[0.0, 1.0], [1.0, 0.0]]
+    """
+    rows = np.ascontiguousarray(springs, dtype=np.float64)
+    count, columns = rows.shape
+    values, vectors = np.empty(columns), np.empty((columns, columns))
+    rank = _library().vi_door_spring_modes(count, columns, rows, values, vectors)
+    if rank < 0:
+        raise UsageError(
+            f"spring_modes: expected finite numbers of 1 to 64 coordinates, got {columns} of them."
+        )
+    return values[:rank].copy(), vectors[:rank].copy()
+
+
 def _row(points: float | Numbers) -> Array:
     return np.array(np.atleast_1d(np.asarray(points, dtype=np.float64)).ravel())
 
@@ -254,6 +291,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_beam_shapes.argtypes = [integer, integer, integer, numbers, integer, numbers]
     library.vi_door_beam_residual.argtypes = [integer, integer, integer, numbers, numbers, numbers]
     library.vi_door_chain_modes.argtypes = [integer, *[numbers] * 6]
+    library.vi_door_spring_modes.argtypes = [integer, integer, *[numbers] * 3]
     library.vi_door_beam_residual_shapes.argtypes = [
         integer,
         integer,

@@ -23,10 +23,25 @@ BEAM |= {
     "contact[1].location": 0.8,
     "forcing.amplitude": 0.5,
 }
+STRUCTURE = {
+    "mode.angular_frequency[1]": 1.5,
+    "mode.angular_frequency[2]": 4.0,
+    "mode.damping_ratio[1]": 0.02,
+}
+STRUCTURE |= {
+    "mode.damping_ratio[2]": 0.01,
+    "mode.forcing[1]": 0.7,
+    "mode.forcing[2]": -0.3,
+    "mode.force[1]": 0.7,
+}
+STRUCTURE |= {"mode.force[2]": -0.3, "mode.observed_shape[1]": 0.5, "mode.observed_shape[2]": 0.9}
+STRUCTURE |= {"mode.contact_shape[1,1]": 0.8, "mode.contact_shape[1,2]": -0.6, "forcing.amplitude": 0.5}
+STRUCTURE |= {"mode.displacement_start[1]": 0.1}
 BODIES: dict[str, tuple[dict[str, float], dict[str, int]]] = {
     "Oscillator": (OSCILLATOR, {}),
     "Chain": (CHAIN, {"masses": 2, "modes": 0, "observed_mass": 2, "contact[1].mass_number": 2}),
     "Beam": (BEAM, {"modes": 3, "boundary": 1, "forcing.kind": 1}),
+    "Structure": (STRUCTURE, {"modes": 2, "coupled": False}),
 }
 
 
@@ -70,7 +85,8 @@ def test_a_stop_meets_the_mass_that_it_limits_and_on_a_beam_that_of_its_modes() 
 
 @pytest.mark.parametrize("fmu", BODIES)
 def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> None:
-    key = {"Oscillator": "stiffness", "Chain": "stiffness[1]", "Beam": "length"}[fmu]
+    others = {"Beam": "length", "Structure": "mode.angular_frequency[1]"}
+    key = ({"Oscillator": "stiffness", "Chain": "stiffness[1]"} | others)[fmu]
     values = np.array([0.7, 0.9, 0.7])
     together = at_points(body(fmu), {key: values}).in_state_coordinates()
     for point, value in enumerate(values):
