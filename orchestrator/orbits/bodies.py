@@ -31,9 +31,9 @@ def impacting_body(scene: Scene) -> ImpactingBody:
     if body.flaw:
         refuse_orbits(scene, [seen_of_flaw(scene, body.flaw)])
     found = body.mass_normalised()
-    for number, contact in enumerate(found.contacts, start=1):
+    for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
         if not contact.shape @ contact.shape > 0.0:
-            refuse_orbits(scene, [Seen("held", f"stop[{number}]", "one that is held")])
+            refuse_orbits(scene, [Seen("held", key, "one that is held")])
     return found
 
 
