@@ -44,6 +44,8 @@ class Structure:
     """Matrix from modes to the displacements in the state, shape (element, mode)."""
     from_state: Floats
     """Inverse of `to_state`, shape (mode, element)."""
+    coupling: Floats | None = None
+    """Damping that couples the modes, 1/s, shape (mode, mode); None where each mode has its own."""
 
 
 class StructurePoints(BodyPoints):
@@ -54,7 +56,7 @@ class StructurePoints(BodyPoints):
 
     @abstractmethod
     def structure_of(self, numbers: Numbers) -> Structure | None:
-        """Return the modes of one point; None if damping couples them, or nothing ties the body to the ground."""
+        """Return the modes of one point; None if nothing ties the body to the ground."""
 
     @property
     @abstractmethod
@@ -71,13 +73,13 @@ class StructurePoints(BodyPoints):
         ), which
 
     def _structure_or_none(self, numbers: Numbers) -> Structure:
-        """Return the modes of one point; all NaN if it has none."""
+        """Return the modes of one point; all NaN if it has none, or if damping couples them."""
         try:
             with np.errstate(all="ignore"):
                 found = self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
             return self._no_structure()  # the body itself reports the problem
-        return self._no_structure() if found is None else found
+        return self._no_structure() if found is None or found.coupling is not None else found
 
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
@@ -121,7 +123,7 @@ class StructurePoints(BodyPoints):
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
         numbers = self.floats
         found = self.structure_of(numbers)
-        assert found is not None, "a body without a flaw"
+        assert found is not None, "a body tied to the ground"
         root = np.sqrt(found.mass)
         amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
         if "forcing.amplitude" in numbers:
@@ -135,6 +137,7 @@ class StructurePoints(BodyPoints):
             numbers.get("forcing.phase", 0.0),
             contacts_of(found.contacts / root, numbers, self.integers),
             found.observed / root,
+            found.coupling,
         )
 
 

@@ -58,7 +58,6 @@ LIMITS = {
     "places": Limit(
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
-    "coupled": Limit(orbits="damping that does not couple the modes where orbits are followed"),
     "spring": Limit(orbits="a spring where orbits are followed"),
     "loose": Limit(orbits="bodies that springs tie to the ground"),
     "held": Limit(orbits="a point that moves"),
@@ -153,12 +152,9 @@ def _yields_in_lanes(scene: Scene) -> bool:
     )
 
 
-def seen_of_flaw(scene: Scene, flaw: str) -> Seen:
-    """Return the feature that keeps a scene's body from flying in modes: see `flaw` of `BodyPoints`."""
+def seen_of_loose(scene: Scene) -> Seen:
+    """Return the feature that keeps orbits from a scene's body, which is loose: see `is_loose` of `BodyPoints`."""
     several = isinstance(scene.body, StructureBody)
-    if flaw == "coupled":
-        got = "one that does. Dampings in proportion to the stiffnesses do not"
-        return Seen("coupled", "body" if several else "body.dampings", got)
     loose = Seen("loose", "body" if several else "body.stiffnesses", "one that is loose")
     return loose if scene.body.IS_STRUCTURE else Seen("spring", "body.stiffness", "none")
 

@@ -86,7 +86,7 @@ VI_DOOR int vi_door_beam_residual_shapes(int boundary, int natural, int points, 
 }
 
 VI_DOOR int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
-                                double natural[], double damping_ratio[], double shape[])
+                                double natural[], double damping_ratio[], double shape[], double coupling[])
 {
     vi_chain chain;
     vi_chain_modes modes;
@@ -105,6 +105,7 @@ VI_DOOR int vi_door_chain_modes(int masses, const double mass[], const double st
     memcpy(damping_ratio, modes.damping_ratio, (size_t)masses * sizeof damping_ratio[0]);
     for (int i = 0; i < masses; ++i) {
         memcpy(shape + (ptrdiff_t)i * masses, modes.shape[i], (size_t)masses * sizeof shape[0]);
+        memcpy(coupling + (ptrdiff_t)i * masses, modes.damping[i], (size_t)masses * sizeof coupling[0]);
     }
     return modes.classical ? 0 : 1;
 }

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints
+from vibroimpact.fmus.core.modes import chain_modes
 
 STOP = {"contact[1].position": 0.3, "contact[1].restitution": 0.8}
 FORCE = {"forcing.angular_frequency": 2.0, "forcing.phase": 0.1}
@@ -95,15 +96,27 @@ def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> Non
             assert getattr(together, name)[..., point].tobytes() == getattr(alone, name)[..., 0].tobytes()
 
 
-def test_a_chain_that_does_not_fly_in_modes_says_why_and_is_left_by_lanes() -> None:
-    tied = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
-    assert body("Chain").flaw == "", "its dampings are in proportion to its stiffnesses"
-    assert body("Chain", far_damping=0.5).flaw == "coupled"
-    loose = body("Chain", **tied)
-    assert loose.flaw == "loose"
-    assert np.isnan(at_points(loose, {"forcing.phase": np.zeros(2)}).in_state_coordinates().stiffness).all()
-    assert body("Oscillator", stiffness=0.0).flaw == "loose"
-    assert body("Beam").flaw == ""
+def test_a_chain_with_coupled_damping_or_without_a_tie_is_left_by_lanes() -> None:
+    none = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
+    tied = body("Chain")
+    assert tied.mass_normalised().coupling is None, "its dampings are in proportion to its stiffnesses"
+    coupled, loose = body("Chain", far_damping=0.5), body("Chain", **none)
+    for each in (coupled, loose):
+        points = at_points(each, {"forcing.phase": np.zeros(2)}).in_state_coordinates()
+        assert np.isnan(points.stiffness).all()
+    assert (tied.is_loose, coupled.is_loose, loose.is_loose) == (False, False, True)
+    assert body("Oscillator", stiffness=0.0).is_loose
+    assert not body("Beam").is_loose
+
+
+def test_the_damping_between_the_modes_of_a_chain_is_that_of_its_dashpots() -> None:
+    coupled = body("Chain", far_damping=0.5).mass_normalised()
+    modes = chain_modes([1.0, 2.0], [3.0, 1.0, 0.5], [0.06, 0.02, 0.5])
+    dashpots = np.array([[0.08, -0.02], [-0.02, 0.52]])
+    np.testing.assert_allclose(coupled.coupling, modes.shapes.T @ dashpots @ modes.shapes, atol=1e-15)
+    np.testing.assert_allclose(
+        2.0 * coupled.damping_ratios * coupled.frequencies, np.diag(coupled.coupling), rtol=1e-15
+    )
 
 
 def test_a_state_is_told_in_mass_normalised_modes_with_its_kinetic_energy() -> None:
