@@ -101,6 +101,14 @@ static void couple(uint64_t *seed, orbit_case *drawn)
     for (int j = 0; j < modes; ++j) {
         drawn->damping_ratio[j] = damping[j * modes + j] / (2.0 * drawn->natural[j]);
     }
+    if (choice(seed, 3) == 0) { /* next to critical damping of one mode, or at it */
+        const double off[] = {0.0, 1e-12, 1e-9, 1e-6, 1e-3};
+        for (int i = 1; i < modes; ++i) {
+            damping[i] = damping[i * modes] = 0.0;
+        }
+        damping[0] = 2.0 * drawn->natural[0] * (1.0 + off[choice(seed, 5)]);
+        drawn->damping_ratio[0] = damping[0] / (2.0 * drawn->natural[0]);
+    }
     CHECK(vi_door_orbit_couple(modes, body->angular_frequency, body->natural, damping, body->cosine, body->sine,
                                &coupling, &work) == 0,
           "%d modes", modes);

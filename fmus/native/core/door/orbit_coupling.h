@@ -10,7 +10,8 @@
 
 typedef struct {
     vi_pressed_body body;        /* without contacts; its coupling[][] is the damping */
-    vi_pressed_modes terms;      /* terms of its free motion; none where the damping is next to critical */
+    vi_pressed_modes terms;      /* terms of its free motion; none next to critical damping, where they would cancel */
+    double fastest;              /* bound of all rates, 1/s */
     vi_complex steady[VI_MODES]; /* response to the force: displacement Re(steady e^(i phase)) */
 } vi_orbit_coupling;
 
@@ -23,6 +24,14 @@ VI_DOOR size_t vi_door_orbit_coupling_work_size(void);
 VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const double natural[], const double coupling[],
                                  const double cosine[], const double sine[], vi_orbit_coupling *found,
                                  vi_coupled_work *work);
+
+/* Free motion for `u` seconds by power series over short steps: it needs no terms. */
+void vi_orbit_series(const vi_orbit_coupling *coupling, double u, double x[], double v[]);
+
+/* Find displacements and velocities just after a unit impulse that recurs after each `length` seconds, by the series;
+ * impulse[contacts][modes]. False where an undamped motion grows without bound. */
+bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], double length,
+                               double state[][VI_STATES]);
 
 /* e^(rate u) of each term. */
 void vi_orbit_turns(const vi_orbit_coupling *coupling, double u, vi_complex turn[]);

@@ -1,6 +1,7 @@
 #include "door/orbit_maximum.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "motion/majorant.h"
 
@@ -34,7 +35,7 @@ static void begin(flight *own, const vi_orbit_response *response, int contact, c
         own->x[j] = state[j] - own->x[j];
         own->v[j] = state[body->modes + j] - own->v[j];
     }
-    if (!body->coupling) {
+    if (!body->coupling || body->coupling->terms.terms == 0) {
         return;
     }
     const vi_pressed_modes *terms = &body->coupling->terms;
@@ -63,6 +64,33 @@ static seen coupled_motion(const flight *own, double u)
         sum.acceleration += a.re;
         sum.bound += vi_complex_size(rate) * vi_complex_size(a);
     }
+    return sum;
+}
+
+/* The same next to critical damping, by series. The third derivative is (D D s - W s).v + (D s).W x at the contact's
+ * shape s, and v.v + x.W x never grows. */
+static seen series_motion(const flight *own, double u)
+{
+    const vi_orbit_response *response = own->response;
+    const vi_orbit_body *body = response->body;
+    const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
+    double x[VI_MODES], v[VI_MODES], drag[VI_MODES], once[VI_MODES], twice[VI_MODES], square = 0.0, energy = 0.0;
+    memcpy(x, own->x, (size_t)body->modes * sizeof *x);
+    memcpy(v, own->v, (size_t)body->modes * sizeof *v);
+    vi_orbit_free(response, u, x, v);
+    vi_orbit_drag(response, v, drag);
+    vi_orbit_drag(response, shape, once);
+    vi_orbit_drag(response, once, twice);
+    seen sum = {0.0, 0.0, 0.0, 0.0};
+    for (int j = 0; j < body->modes; ++j) {
+        const double stiffness = response->mode[j].stiffness, along = twice[j] - stiffness * shape[j];
+        sum.beyond += shape[j] * x[j];
+        sum.velocity += shape[j] * v[j];
+        sum.acceleration -= shape[j] * (stiffness * x[j] + drag[j]);
+        square += along * along + stiffness * once[j] * once[j];
+        energy += v[j] * v[j] + stiffness * x[j] * x[j];
+    }
+    sum.bound = sqrt(square * energy);
     return sum;
 }
 
@@ -96,7 +124,9 @@ static seen look(const flight *own, double u)
     const vi_orbit_body *body = response->body;
     const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
     const double w = body->angular_frequency, angle = own->phase + w * u, c = cos(angle), s = sin(angle);
-    seen sum = body->coupling ? coupled_motion(own, u) : free_motion(own, u);
+    seen sum = !body->coupling                     ? free_motion(own, u)
+               : body->coupling->terms.terms == 0 ? series_motion(own, u)
+                                                   : coupled_motion(own, u);
     double cosine = 0.0, sine = 0.0;
     for (int j = 0; j < body->modes; ++j) {
         sum.beyond += shape[j] * response->level[j];

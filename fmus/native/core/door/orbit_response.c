@@ -3,10 +3,14 @@
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "motion/magnitude.h"
 
 static const double TURN = 6.283185307179586;
+/* Fastest rate, over the angular frequency of the force, above which coupled modes are not followed by series: a period
+ * then takes more than 1e6 steps. */
+static const double MOST_OF_SERIES = 1e5;
 
 static bool is_body(const vi_orbit_body *body)
 {
@@ -58,12 +62,25 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
     return isfinite(start[0] + start[1]);
 }
 
+/* Does the damping couple the modes, and are the terms of their motion known? */
+static bool by_terms(const vi_orbit_body *body)
+{
+    return body->coupling && body->coupling->terms.terms > 0;
+}
+
+/* Does the damping couple the modes, next to critical damping? */
+static bool by_series(const vi_orbit_body *body)
+{
+    return body->coupling && body->coupling->terms.terms == 0;
+}
+
 int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
 {
     if (!is_body(body)) {
         return VI_ORBIT_REFUSED;
     }
-    if (body->coupling && body->coupling->terms.terms == 0) {
+    if (body->coupling && body->coupling->terms.terms == 0
+        && !(body->coupling->fastest < MOST_OF_SERIES * body->angular_frequency)) {
         return VI_ORBIT_CRITICAL;
     }
     response->body = body;
@@ -106,7 +123,12 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
             return VI_ORBIT_RESONANT;
         }
     }
-    for (int k = 0; body->coupling && k < body->contacts; ++k) {
+    if (by_series(body)
+        && !vi_orbit_recurring_states(body->coupling, body->contacts, body->impulse, response->length,
+                                      response->state)) {
+        return VI_ORBIT_RESONANT;
+    }
+    for (int k = 0; by_terms(body) && k < body->contacts; ++k) {
         const double *impulse = body->impulse + (ptrdiff_t)k * body->modes;
         if (!vi_orbit_recurring_parts(body->coupling, impulse, response->length, response->part[k])) {
             return VI_ORBIT_RESONANT;
@@ -120,15 +142,21 @@ static void carry_coupled(const vi_orbit_response *response, double u, int colum
     const vi_orbit_coupling *coupling = response->body->coupling;
     const int modes = response->body->modes;
     vi_complex turn[VI_TERMS], part[VI_TERMS];
-    vi_orbit_turns(coupling, u, turn);
+    if (by_terms(response->body)) {
+        vi_orbit_turns(coupling, u, turn);
+    }
     for (int c = 0; c < columns; ++c) {
         double x[VI_MODES], v[VI_MODES];
         for (int j = 0; j < modes; ++j) {
             x[j] = change[j][c];
             v[j] = change[modes + j][c];
         }
-        vi_pressed_parts(&coupling->terms, x, v, part);
-        vi_orbit_turned_sum(coupling, part, turn, x, v);
+        if (by_terms(response->body)) {
+            vi_pressed_parts(&coupling->terms, x, v, part);
+            vi_orbit_turned_sum(coupling, part, turn, x, v);
+        } else {
+            vi_orbit_series(coupling, u, x, v);
+        }
         for (int j = 0; j < modes; ++j) {
             change[j][c] = x[j];
             change[modes + j][c] = v[j];
@@ -164,10 +192,14 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k)
 void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
-    if (body->coupling) {
+    if (by_terms(body)) {
         vi_complex turn[VI_TERMS];
         vi_orbit_turns(body->coupling, u, turn);
         vi_orbit_turned_sum(body->coupling, response->part[contact], turn, x, v);
+    } else if (by_series(body)) {
+        memcpy(x, response->state[contact], (size_t)body->modes * sizeof x[0]);
+        memcpy(v, response->state[contact] + body->modes, (size_t)body->modes * sizeof v[0]);
+        vi_orbit_series(body->coupling, u, x, v);
     }
     for (int j = 0; j < body->modes; ++j) {
         if (body->coupling) {
@@ -194,7 +226,11 @@ void vi_orbit_drag(const vi_orbit_response *response, const double v[], double d
 void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
-    if (body->coupling) {
+    if (by_series(body)) {
+        vi_orbit_series(body->coupling, u, x, v);
+        return;
+    }
+    if (by_terms(body)) {
         vi_complex turn[VI_TERMS], part[VI_TERMS];
         vi_orbit_turns(body->coupling, u, turn);
         vi_pressed_parts(&body->coupling->terms, x, v, part);

@@ -17,7 +17,7 @@ enum {
     VI_ORBIT_REFUSED = 1,  /* numbers outside their range */
     VI_ORBIT_RESONANT = 2, /* an undamped mode's response to the force, or to its impacts, is unbounded */
     VI_ORBIT_SINGULAR = 3, /* no velocities solve the equations for these phases */
-    VI_ORBIT_CRITICAL = 4  /* coupled modes are next to critical damping: their terms would cancel */
+    VI_ORBIT_CRITICAL = 4  /* coupled modes next to critical damping, and far more rates than the force: no series */
 };
 
 /* A body of mass-normalised modes; shapes are [contact][mode]. */
@@ -51,6 +51,7 @@ typedef struct {
     double steady_cos[VI_MODES], steady_sin[VI_MODES], level[VI_MODES];
     double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
     vi_complex part[VI_PORTS][VI_TERMS]; /* coupled: terms just after such an impulse at each contact */
+    double state[VI_PORTS][VI_ORBIT_STATES]; /* the same without terms: displacements and velocities */
 } vi_orbit_response;
 
 /* Find the modes and their steady responses only. Returns one of VI_ORBIT_*. */
