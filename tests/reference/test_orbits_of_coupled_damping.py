@@ -16,7 +16,7 @@ STEP = 1e-5
 #: Masses, springs, dashpots; the last spring and dashpot tie the far end to the ground.
 TWO = [1.0, 1.0], [1.0, 1.0, 0.0], [0.0, 0.3, 0.05]
 THREE = [1.0, 2.0, 0.5], [3.0, 1.0, 2.0, 0.0], [0.0, 0.05, 0.4, 0.1]
-STRONG = [1.0, 2.0, 0.5], [3.0, 1.0, 2.0, 0.0], [0.1, 0.0, 9.0, 0.0]
+STRONG = [1.0, 2.0, 0.5], [3.0, 1.0, 2.0, 0.0], [0.1, 9.0, 0.1, 0.0]
 BARE = [1.0, 1.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.2]
 CHAINS = {"two masses": TWO, "three masses": THREE, "overdamped": STRONG, "one dashpot": BARE}
 
