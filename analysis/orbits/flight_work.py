@@ -77,11 +77,10 @@ def flight_work(
 def coupled_flight_work(
     natural: Floats, coupling: Floats, angular_frequency: float, lengths: Floats, start: Floats
 ) -> FlightWork:
-    """Return the same for modes that the damping couples, from the integral of z z' over each flight.
+    """Return the same for modes that the damping couples, from the integral M of z z' over each flight.
 
-    The state z has w q of all modes, q' of all modes, cos(phase) and sin(phase), and z' = A z. So the integral M obeys
-    M' = A M + M A' + z_0 z_0' at the start. Over a short step it is a power series, and over two equal steps M + E M E'.
-    The damping between the modes (1/s) has shape (modes, modes), and the start is that of `flight_work`.
+    The state z has w q of all modes, q' of all modes, cos(phase) and sin(phase), and obeys z' = A z. Over a short step
+    M is a power series. Over two equal steps it is M + E M E', with the flow E of the first step. The damping between the modes (1/s) has shape (modes, modes); other arguments are those of `flight_work`.
 
     >>> start = np.array([[[1.0, 0.0, 0.0, 0.0]]])
     >>> done = coupled_flight_work(np.array([1.0]), np.array([[0.0]]), 1.0, np.array([2.0 * np.pi]), start)

@@ -233,9 +233,7 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
     shapes, coupling = np.empty((count, count)), np.empty((count, count))
     fits = stiffness.size == damping.size == count + 1
     end = (
-        _library().vi_door_chain_modes(
-            count, mass, stiffness, damping, frequencies, ratios, shapes, coupling
-        )
+        _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes, coupling)
         if fits
         else -1
     )

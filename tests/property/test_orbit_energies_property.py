@@ -17,7 +17,7 @@ ROUNDING = 1e-12
 
 @st.composite
 def chains(draw: st.DrawFn) -> ImpactingBody:
-    """Draw chains of up to six masses, with a stop on one of them; the damping is in proportion, or couples the modes."""
+    """Draw chains of up to six masses, with a stop on one of them; the damping may couple the modes."""
     count = draw(st.integers(1, 6))
     numbers = st.floats(0.2, 5.0)
     masses, springs, loads = (

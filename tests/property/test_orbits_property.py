@@ -53,7 +53,9 @@ class Chain:
         force = self.force @ self.modes.shapes
         frequencies, ratios = self.modes.frequencies, self.modes.damping_ratios
         coupling = None if self.modes.is_classical else self.modes.coupling
-        return ImpactingBody(frequencies, ratios, force, 0.0 * force, self.w, 0.0, (contact,), shape, coupling)
+        return ImpactingBody(
+            frequencies, ratios, force, 0.0 * force, self.w, 0.0, (contact,), shape, coupling
+        )
 
     def fly(self, state: np.ndarray, phase: float, u: float) -> np.ndarray:
         """Return the state after the time `u`."""

@@ -6,8 +6,8 @@
 
 #include "modes/coupled_response.h"
 
-/* Largest square of a unit vector of the symmetric matrix z' = M z, relative to its own square, for which terms are
- * used: terms up to this many times the motion cancel. Bodies of many modes keep terms, since series take long. */
+/* Largest |z|^2 of a vector with z.z = 1 of the symmetric matrix for which terms are used (equations.md 4.7). Above,
+ * terms cancel, and a series takes their place. Bodies of many modes keep their terms, since series take long. */
 static const double LARGEST_VECTOR = 10.0;
 enum { MANY_MODES = 16, SERIES_TERMS = 18 };
 /* Step of the series times the fastest rate: the first term left out is .5^18 / 18!, far below rounding. */

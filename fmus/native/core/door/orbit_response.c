@@ -8,8 +8,8 @@
 #include "motion/magnitude.h"
 
 static const double TURN = 6.283185307179586;
-/* Fastest rate, over the angular frequency of the force, above which coupled modes are not followed by series: a period
- * then takes more than 1e6 steps. */
+/* Fastest rate of coupled modes over the angular frequency of the force. Above, no series follows them: a period would
+ * take more than 1e6 steps. */
 static const double MOST_OF_SERIES = 1e5;
 
 static bool is_body(const vi_orbit_body *body)
