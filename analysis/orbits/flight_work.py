@@ -80,7 +80,8 @@ def coupled_flight_work(
     """Return the same for modes that the damping couples, from the integral M of z z' over each flight.
 
     The state z has w q of all modes, q' of all modes, cos(phase) and sin(phase), and obeys z' = A z. Over a short step
-    M is a power series. Over two equal steps it is M + E M E', with the flow E of the first step. The damping between the modes (1/s) has shape (modes, modes); other arguments are those of `flight_work`.
+    M is a power series. Over two equal steps it is M + E M E', with the flow E of the first step. The damping between
+    the modes (1/s) has shape (modes, modes); other arguments are those of `flight_work`.
 
     >>> start = np.array([[[1.0, 0.0, 0.0, 0.0]]])
     >>> done = coupled_flight_work(np.array([1.0]), np.array([[0.0]]), 1.0, np.array([2.0 * np.pi]), start)
