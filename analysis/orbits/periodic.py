@@ -184,8 +184,8 @@ def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, 
         raise OrbitError("orbit: expected an orbit that is isolated, got a family: the body loses no energy.")
     if found.end is OrbitEnd.critical:
         raise OrbitError(
-            "orbit: expected coupled modes that are not next to critical damping, where their terms cancel, got one. "
-            "Change a dashpot by a millionth."
+            "orbit: expected coupled modes away from critical damping, or slower than 1e5 times the force, got others. "
+            "Change a dashpot by a thousandth."
         )
     if found.end is not OrbitEnd.done:
         raise OrbitError(
