@@ -27,12 +27,14 @@ class AssembledPoints(StructurePoints):
         def row(name: str) -> Floats:
             return row_of(numbers, f"mode.{name}", count)
 
-        if self.integers["coupled"] or not numbers["mode.angular_frequency[1]"] > 0.0:
+        if not numbers["mode.angular_frequency[1]"] > 0.0:
             return None
+        frequencies, coupling = row("angular_frequency"), self._coupling(numbers)
+        ratios = row("damping_ratio") if coupling is None else coupling.diagonal() / (2.0 * frequencies)
         same = np.eye(count)
         return Structure(
-            row("angular_frequency"),
-            row("damping_ratio"),
+            frequencies,
+            ratios,
             1.0,
             row("forcing")[:, None],
             row("force"),
@@ -40,7 +42,16 @@ class AssembledPoints(StructurePoints):
             self._contact_shapes(numbers),
             same,
             same,
+            coupling,
         )
+
+    def _coupling(self, numbers: Numbers) -> Floats | None:
+        """Return the modal damping matrix, 1/s, shape (mode, mode); None where each mode has its own damping."""
+        count = self.integers["modes"]
+        if not self.integers["coupled"]:
+            return None
+        each = range(1, count + 1)
+        return np.array([[numbers[f"mode.damping[{i},{j}]"] for j in each] for i in each])
 
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state, which are mass-normalised: see `BodyPoints`."""
@@ -67,11 +78,9 @@ class AssembledPoints(StructurePoints):
         return False
 
     @property
-    def flaw(self) -> str:
-        """Whether the damping couples the modes ("coupled"), or a mode has no spring ("loose")."""
-        if self.integers["coupled"]:
-            return "coupled"
-        return "" if self.floats["mode.angular_frequency[1]"] > 0.0 else "loose"
+    def is_loose(self) -> bool:
+        """Whether a mode has no spring: nothing ties a group of the masses to the ground."""
+        return not self.floats["mode.angular_frequency[1]"] > 0.0
 
 
 def without_arrays(numbers: Numbers) -> tuple[dict[str, float], dict[str, Floats]]:
