@@ -20,17 +20,18 @@ class AssembledPoints(StructurePoints):
         modes = self.integers["modes"]
         return modes, modes, 1
 
-    def structure_of(self, numbers: Numbers) -> Structure | None:
+    def structure_of(self, numbers: Numbers) -> Structure:
         """Return the modes of one point: see `StructurePoints`."""
         count = self.integers["modes"]
 
         def row(name: str) -> Floats:
             return row_of(numbers, f"mode.{name}", count)
 
-        if not numbers["mode.angular_frequency[1]"] > 0.0:
-            return None
         frequencies, coupling = row("angular_frequency"), self._coupling(numbers)
-        ratios = row("damping_ratio") if coupling is None else coupling.diagonal() / (2.0 * frequencies)
+        ratios = row("damping_ratio")
+        if coupling is not None:
+            moves = frequencies > 0.0
+            ratios = np.where(moves, coupling.diagonal() / (2.0 * np.where(moves, frequencies, 1.0)), 0.0)
         same = np.eye(count)
         return Structure(
             frequencies,

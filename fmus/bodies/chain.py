@@ -21,12 +21,10 @@ class ChainPoints(StructurePoints):
         masses = self.integers["masses"]
         return self.integers["modes"] or masses, masses, masses
 
-    def structure_of(self, numbers: Numbers) -> Structure | None:
+    def structure_of(self, numbers: Numbers) -> Structure:
         """Return the modes of one point: see `StructurePoints`."""
         kept, masses, _ = self.sizes
         modes = self._modes(numbers)
-        if not modes.frequencies[0] > 0.0:
-            return None
         shapes = modes.shapes[:, :kept]
         return Structure(
             modes.frequencies[:kept],

@@ -55,8 +55,8 @@ class StructurePoints(BodyPoints):
     """Prefix of the names of start values, which set masses or modes."""
 
     @abstractmethod
-    def structure_of(self, numbers: Numbers) -> Structure | None:
-        """Return the modes of one point; None if nothing ties the body to the ground."""
+    def structure_of(self, numbers: Numbers) -> Structure:
+        """Return the modes of one point; a frequency of 0 where nothing ties masses to the ground."""
 
     @property
     @abstractmethod
@@ -79,7 +79,7 @@ class StructurePoints(BodyPoints):
                 found = self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
             return self._no_structure()  # the body itself reports the problem
-        return self._no_structure() if found is None or found.coupling is not None else found
+        return found if found.coupling is None else self._no_structure()
 
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
@@ -123,7 +123,6 @@ class StructurePoints(BodyPoints):
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
         numbers = self.floats
         found = self.structure_of(numbers)
-        assert found is not None, "a body tied to the ground"
         root = np.sqrt(found.mass)
         amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
         if "forcing.amplitude" in numbers:

@@ -223,7 +223,7 @@ def _defective_orbits() -> Found:
         (orbit,) = closed_form(impacting_body(scene))
         assert record.impacts is not None
         seen = record.impacts[:, [IMPACT_PHASE, IMPACT_VELOCITY]]
-        errors.append(largest(relative(seen, [[orbit.phases[0], orbit.velocities[0]]])))
+        errors.append(largest(relative(seen, np.array([[orbit.phases[0], orbit.velocities[0]]]))))
     off = np.array(errors)
     words = "damping off by -1e-4, -1e-8, -1e-12, 0, 1e-12, ..."
     return Found(largest(off), Curve(np.arange(7.0), off, words, "relative error of the impact (-)"))

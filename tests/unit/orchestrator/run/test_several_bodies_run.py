@@ -238,6 +238,25 @@ def test_points_in_lanes_are_those_of_fused_runs(sweep: dict[str, list[float]], 
     assert lanes.final_state.values == pytest.approx(fused.final_state.values, abs=1e-11)
 
 
+def test_a_ball_that_is_free_in_a_cavity_moves_in_lanes_as_in_fused_runs() -> None:
+    changes = {
+        "body[1].displacement_start": 0.02,
+        "body[2].velocity_start": 0.5,
+        "record": {"transient_periods": 1, "recorded_periods": 4},
+    }
+    plain = Scene.from_file(EXAMPLES / "impact_damper_cavity.toml").with_values(changes)
+    scene = plain.with_sweep(
+        {"contact[1].restitution": [0.6, 0.8, 0.95], "forcing.amplitude": [0.001, 0.002]}
+    )
+    assert goes_by_lanes(scene)
+    lanes, fused = vi.run(scene), vi.run(scene.with_values({"execution.how": "fused"}))
+    assert (lanes.impact_count > 4).all()
+    assert lanes.impact_count.equals(fused.impact_count)
+    for name in ("final_state", "impact_velocity", "displacement_max", "strobe_velocity"):
+        assert lanes[name].values == pytest.approx(fused[name].values, abs=1e-9), name
+    assert (lanes.final_state.values != fused.final_state.values).any()  # lanes have left no point
+
+
 def test_a_branch_carries_the_modes_from_point_to_point() -> None:
     axis = {"start": 1.0, "stop": 1.1, "points": 4, "path": "up"}
     scene = Scene.from_dict(TABLES).with_sweep({"forcing.angular_frequency": axis})
@@ -250,14 +269,26 @@ def test_a_branch_carries_the_modes_from_point_to_point() -> None:
 @pytest.mark.parametrize("damping", [0.03, 0.2])
 def test_the_orbit_of_a_structure_is_the_motion_of_its_run(damping: float) -> None:
     long = {"transient_periods": 300, "recorded_periods": 4}
-    scene = Scene.from_dict(
-        TABLES | {"record": long, "link": [TABLES["link"][0] | {"damping": damping}]}
-    )
+    scene = Scene.from_dict(TABLES | {"record": long, "link": [TABLES["link"][0] | {"damping": damping}]})
     assert scene.body.is_coupled == (damping == 0.2)
     motion = vi.run(scene)
     stable = [orbit for orbit in vi.find_orbits(scene) if orbit.is_stable]
     velocities = np.sort(np.unique(motion.impact_velocity.values.round(8)))
     assert [np.sort(orbit.velocities).round(8).tolist() for orbit in stable] == [velocities.tolist()]
+
+
+def test_a_dashpot_between_bodies_leaves_orbits_and_exponents() -> None:
+    link = TABLES["link"][0] | {"damping": 0.2}
+    long = {"transient_periods": 300, "recorded_periods": 150}
+    scene = Scene.from_dict(TABLES | {"link": [link], "record": long})
+    (orbit,) = vi.find_orbits(scene, 2, 1)
+    assert orbit.is_stable
+    # the exponents of a periodic run, per impact, are those of the multipliers
+    expected = np.log(np.abs(orbit.multipliers)) / len(orbit.phases)
+    assert vi.lyapunov(vi.run(scene)).lyapunov_exponent.values == pytest.approx(expected, abs=1e-7)
+    # det of the monodromy: r^2 at each impact, and the trace of the damping in between
+    trace = np.trace(scene.body.assembly.damping) * orbit.body.period
+    assert expected.sum() == pytest.approx(2.0 * np.log(0.7) - trace / 2.0, abs=1e-10)
 
 
 @pytest.mark.parametrize(
