@@ -11,6 +11,7 @@ import numpy as np
 
 from vibroimpact.fmus.bodies.beam import BeamPoints
 from vibroimpact.fmus.bodies.impacting_body import Floats, Integers, Numbers
+from vibroimpact.fmus.bodies.structure import DIAGONAL
 from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes, spring_modes
 from vibroimpact.fmus.errors import UsageError
 
@@ -18,8 +19,6 @@ TAKES_PART = 1e-8
 """Displacement times sqrt(mass) above which a coordinate sets the sign of a mode, as in a chain."""
 COMMUTES = 32.0 * float(np.finfo(np.float64).eps)
 """Entry of C M^-1 K - K M^-1 C, relative to the moduli of its terms, up to which it is rounding."""
-DIAGONAL = 1e-9
-"""Off-diagonal modal damping, relative to the two diagonal terms, up to which the damping leaves modes uncoupled."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,7 @@ class ChainPoints(StructurePoints):
         kept, masses, _ = self.sizes
         modes = self._modes(numbers)
         shapes = modes.shapes[:, :kept]
+        is_one_spring = kept == 1 and modes.frequencies[0] > 0.0
         return Structure(
             modes.frequencies[:kept],
             modes.damping_ratios[:kept],
@@ -36,7 +37,7 @@ class ChainPoints(StructurePoints):
             shapes[self._hit].reshape(-1, kept),
             shapes,
             shapes.T * row_of(numbers, "mass", masses),
-            None if modes.is_classical or kept == 1 else modes.coupling[:kept, :kept],
+            None if modes.is_classical or is_one_spring else modes.coupling[:kept, :kept],
         )
 
     def _modes(self, numbers: Numbers) -> ChainModes:

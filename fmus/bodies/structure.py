@@ -20,6 +20,8 @@ OF_THE_RUN = (
 """Prefixes of parameter names that do not change the modes."""
 OF_A_STOP = (".position", ".restitution", ".yield_velocity")
 """Suffixes of parameter names that do not change the modes."""
+DIAGONAL = 1e-9
+"""Off-diagonal modal damping, relative to the two diagonal terms, up to which the damping leaves modes uncoupled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,23 @@ class Structure:
     from_state: Floats
     """Inverse of `to_state`, shape (mode, element)."""
     coupling: Floats | None = None
-    """Damping that couples the modes, 1/s, shape (mode, mode); None where each mode has its own."""
+    """Damping that couples the modes, or damps one without a spring, 1/s, shape (mode, mode); None: ratios alone."""
+
+    @property
+    def decays(self) -> Floats:
+        """Half the damping of each mode by itself, 1/s, shape (mode,)."""
+        if self.coupling is None:
+            return self.frequencies * self.damping_ratios
+        return np.asarray(0.5 * self.coupling.diagonal())
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether modes damp each other."""
+        if self.coupling is None:
+            return False
+        own = self.coupling.diagonal()
+        off = np.abs(self.coupling - np.diag(own))
+        return bool((off > DIAGONAL * (own[:, None] + own)).any())
 
 
 class StructurePoints(BodyPoints):
@@ -79,7 +97,7 @@ class StructurePoints(BodyPoints):
                 found = self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
             return self._no_structure()  # the body itself reports the problem
-        return found if found.coupling is None else self._no_structure()
+        return self._no_structure() if found.is_coupled else found
 
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
@@ -107,7 +125,7 @@ class StructurePoints(BodyPoints):
         with np.errstate(all="ignore"):
             return ModalPoints(
                 stiffness=each(*(structure.frequencies**2 for structure in structures)),
-                decay=each(*(structure.frequencies * structure.damping_ratios for structure in structures)),
+                decay=each(*(structure.decays for structure in structures)),
                 force=weighted(load, rows_of(columns, "forcing.amplitude", loads)),
                 held=each(*(structure.held for structure in structures)) * columns.get("force", none),
                 shape=contacts,

@@ -104,6 +104,8 @@ def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_without_a_tie_by_
     at_two = {"forcing.phase": np.zeros(2)}
     assert np.isnan(at_points(coupled, at_two).in_state_coordinates().stiffness).all()
     assert (at_points(loose, at_two).in_state_coordinates().stiffness[0] == 0.0).all()
+    dragged = body("Chain", **none | {"damping[1]": 0.1, "far_damping": 0.2, "damping[2]": 0.0})
+    assert at_points(dragged, at_two).in_state_coordinates().decay[:, 0] == pytest.approx([0.05, 0.05])
     assert (tied.is_loose, coupled.is_loose, loose.is_loose) == (False, False, True)
     assert body("Oscillator", stiffness=0.0).is_loose
     assert not body("Beam").is_loose

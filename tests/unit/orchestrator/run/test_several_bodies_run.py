@@ -238,8 +238,10 @@ def test_points_in_lanes_are_those_of_fused_runs(sweep: dict[str, list[float]], 
     assert lanes.final_state.values == pytest.approx(fused.final_state.values, abs=1e-11)
 
 
-def test_a_ball_that_is_free_in_a_cavity_moves_in_lanes_as_in_fused_runs() -> None:
+@pytest.mark.parametrize("damping", [0.0, 0.002])
+def test_a_ball_that_is_free_in_a_cavity_moves_in_lanes_as_in_fused_runs(damping: float) -> None:
     changes = {
+        "body[2].damping": damping,
         "body[1].displacement_start": 0.02,
         "body[2].velocity_start": 0.5,
         "record": {"transient_periods": 1, "recorded_periods": 4},
