@@ -18,11 +18,11 @@ _ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
 
 
 class ShownStop(NamedTuple):
-    """A stop of a scene: position (m), side (+1 upper, -1 lower), and the point that it limits."""
+    """A stop or contact of a scene: position (m), side (+1 upper, -1 lower), and the points that it limits."""
 
     position: float
     side: float
-    point: float | None
+    point: float | str | tuple[str, ...] | None
 
 
 def table(scene: dict[str, Any], name: str) -> dict[str, Any]:
@@ -43,19 +43,24 @@ def column_of(key: str, names: Sequence[str]) -> str | None:
 
 
 def stops(dataset: xr.Dataset) -> list[ShownStop]:
-    """Return the stops of the scene; empty where their positions were swept or are unknown."""
+    """Return the stops of the scene, then the contacts of its bodies; empty if positions were swept or are unknown."""
     scene = scene_of(dataset.attrs)
-    if any(key.endswith((".position", ".side", ".location", ".mass")) for key in swept_keys(scene)):
+    places = (".position", ".side", ".location", ".mass", ".clearance")
+    if any(key.endswith(places) for key in swept_keys(scene)):
         return []
+    contacts = scene.get("contact", []) if "body" in scene else []
     try:
-        return [_stop(stop, table(scene, "body")) for stop in scene.get("stop", [])]
+        stops = [_stop(stop, table(scene, "body")) for stop in scene.get("stop", [])]
+        return stops + [
+            ShownStop(float(each.get("clearance", 0.0)), 1.0, tuple(each["between"])) for each in contacts
+        ]
     except (KeyError, TypeError, ValueError, AttributeError):
         return []
 
 
 def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
-    """Return one stop; its point is a mass of a chain, or a place on a beam."""
-    point: float | None = None
+    """Return one stop; its point is a mass of a chain, a place on a beam, or a point of one of several bodies."""
+    point: float | str | None = written.get("at")
     if body.get("kind") == "chain":
         point = written.get("mass", len(body["masses"]))
     elif body.get("kind") == "beam":
@@ -74,7 +79,7 @@ def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
         tip = body.get("boundary", "clamped-free") == "clamped-free"
         observed = table(scene, "sensor").get("location", 1.0 if tip else first)
     else:
-        observed = None
+        observed = scene["stop"][0].get("at") if scene.get("stop") else None
     return [stop for stop in found if stop.point == observed]
 
 

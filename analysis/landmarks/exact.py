@@ -116,7 +116,8 @@ class ImpactOscillator:
         """
         scene = parse_toml(text)
         stops = scene.get("stop", [])
-        kind = scene["body"].get("kind", "oscillator") if "body" in scene else "none"
+        body = scene.get("body")
+        kind = body.get("kind", "oscillator") if isinstance(body, dict) else "none"
         if kind != "oscillator" or len(stops) != 1 or "forcing" not in scene:
             raise DatasetError(
                 "scene: expected a forced oscillator with one stop, got another scene. "

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.flight_work import FlightWork, flight_work
+from vibroimpact.analysis.orbits.flight_work import FlightWork, coupled_flight_work, flight_work
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
 from vibroimpact.fmus.bodies.impacting_body import Contact, Floats
 from vibroimpact.fmus.errors import UsageError
@@ -198,6 +198,10 @@ class OrbitEnergies:
         start[..., 2] = np.cos(orbit.phases)[:, None] * body.force
         start[..., 3] = np.sin(orbit.phases)[:, None] * body.force
         lengths = (ends - orbit.phases) / body.angular_frequency
+        if body.coupling is not None:
+            return coupled_flight_work(
+                body.frequencies, body.coupling, body.angular_frequency, lengths, start
+            )
         return flight_work(body.frequencies, body.damping_ratios, body.angular_frequency, lengths, start)
 
     @property
@@ -207,9 +211,11 @@ class OrbitEnergies:
 
     @property
     def damping(self) -> Floats:
-        """Loss of each mode to damping in each flight, DE_j, shape (p, modes)."""
-        body = self.orbit.body
-        return np.asarray(2.0 * body.damping_ratios * body.frequencies * self._work.squared)
+        """Loss of each mode to damping in each flight, DE_j, shape (p, modes).
+
+        Where the damping couples the modes, it also passes energy between them: the loss of a mode may be negative.
+        """
+        return self._work.damping
 
     @property
     def mean_kinetic(self) -> Floats:

@@ -146,15 +146,12 @@ def _of_orbit(recorded: RecordedOrbit) -> Exponents:
 def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
     if body.frequencies.size == 1:
         return 1 + SETTLING
-    ratios = body.damping_ratios
-    slow = body.frequencies * np.where(
-        ratios <= 1.0, ratios, ratios - np.sqrt(np.maximum(ratios**2 - 1.0, 0.0))
-    )
-    if not slow.min() > 0.0:
+    slow = body.slowest_decay
+    if not slow > 0.0:
         raise ExponentError(
             "lyapunov: expected damping of all modes, without which a state is never forgotten, got none."
         )
-    forgotten = impacts.times[0] - np.log(FORGOTTEN) / slow.min()
+    forgotten = impacts.times[0] - np.log(FORGOTTEN) / slow
     return int(np.searchsorted(impacts.times, forgotten)) + SETTLING
 
 

@@ -8,6 +8,7 @@ difference of rates occurs.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,9 @@ class FlightWork(NamedTuple):
     forcing: Floats
     """Integral of f cos(phase) q', J, shape (...)."""
     squared: Floats
-    """Integral of q'^2, J s, shape (...); times 2 z w it is the damping loss."""
+    """Integral of q'^2, J s, shape (...)."""
+    damping: Floats
+    """Loss to damping, J, shape (...): the integral of q' times the damping force on the mode."""
 
 
 def flight_work(
@@ -67,7 +70,65 @@ def flight_work(
     state = start.reshape(-1, 4)
     end = state + np.einsum("nij,nj->ni", moved, state)
     forcing, squared = np.einsum("ni,knij,nj->kn", state, forms, state)
-    return FlightWork(end[:, :2].reshape(*shape, 2), forcing.reshape(shape), squared.reshape(shape))
+    damping = 2.0 * damping_ratio * natural * squared.reshape(shape)
+    return FlightWork(end[:, :2].reshape(*shape, 2), forcing.reshape(shape), squared.reshape(shape), damping)
+
+
+def coupled_flight_work(
+    natural: Floats, coupling: Floats, angular_frequency: float, lengths: Floats, start: Floats
+) -> FlightWork:
+    """Return the same for modes that the damping couples, from the integral M of z z' over each flight.
+
+    The state z has w q of all modes, q' of all modes, cos(phase) and sin(phase), and obeys z' = A z. Over a short step
+    M is a power series. Over two equal steps it is M + E M E', with the flow E of the first step. The damping between
+    the modes (1/s) has shape (modes, modes); other arguments are those of `flight_work`.
+
+    >>> start = np.array([[[1.0, 0.0, 0.0, 0.0]]])
+    >>> done = coupled_flight_work(np.array([1.0]), np.array([[0.0]]), 1.0, np.array([2.0 * np.pi]), start)
+    >>> round(float(done.squared[0, 0] / np.pi), 12), bool(np.allclose(done.end, [1.0, 0.0]))
+    (1.0, True)
+    """
+    flights = [
+        _coupled_flight(natural, coupling, angular_frequency, float(u), each)
+        for u, each in zip(lengths, start, strict=True)
+    ]
+    return FlightWork(*(np.array(column) for column in zip(*flights, strict=True)))
+
+
+def _coupled_flight(
+    natural: Floats, coupling: Floats, angular_frequency: float, length: float, start: Floats
+) -> FlightWork:
+    """Return one flight, with arrays of shape (mode,)."""
+    count = natural.size
+    matrix = np.zeros((2 * count + 2, 2 * count + 2))
+    moving = slice(count, 2 * count)
+    matrix[:count, moving], matrix[moving, :count] = np.diag(natural), -np.diag(natural)
+    matrix[moving, moving] = -coupling
+    # the last two are cos and sin of the phase since the impact, times 1 N kg^(-1/2)
+    matrix[moving, -2], matrix[moving, -1] = start[:, 2], -start[:, 3]
+    matrix[-2, -1], matrix[-1, -2] = -angular_frequency, angular_frequency
+    begin = np.concatenate([start[:, 0], start[:, 1], [1.0, 0.0]])
+    rate = float(np.abs(matrix[: 2 * count, : 2 * count]).sum(axis=1).max())
+    halvings = math.ceil(math.log2(max(max(rate, angular_frequency) * length / SHORT, 1.0)))
+    step = math.ldexp(length, -halvings)
+    moved, term = np.zeros_like(matrix), np.eye(len(matrix))
+    derivative = np.outer(begin, begin)
+    form = np.zeros_like(matrix)
+    for order in range(1, TERMS + 1):
+        term = step * (term @ matrix) / order
+        moved += term
+        form += step * derivative / order
+        turned = step * (matrix @ derivative)
+        derivative = (turned + turned.T) / order
+    for _ in range(halvings):
+        flow = np.eye(len(matrix)) + moved
+        form += flow @ form @ flow.T
+        moved = 2.0 * moved + moved @ moved
+    end = begin + moved @ begin
+    squares = form[moving, moving]
+    forcing = start[:, 2] * form[-2, moving] - start[:, 3] * form[-1, moving]
+    damping = (coupling * squares).sum(axis=1)
+    return FlightWork(np.stack([end[:count], end[moving]], axis=1), forcing, np.diag(squares).copy(), damping)
 
 
 def _matrix(w: Floats, z: Floats, angular_frequency: float) -> Floats:

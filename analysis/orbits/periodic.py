@@ -182,6 +182,11 @@ def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, 
         )
     if found.end is OrbitEnd.singular:
         raise OrbitError("orbit: expected an orbit that is isolated, got a family: the body loses no energy.")
+    if found.end is OrbitEnd.critical:
+        raise OrbitError(
+            "orbit: expected coupled modes away from critical damping, or slower than 1e5 times the force, got others. "
+            "Change a dashpot by a thousandth."
+        )
     if found.end is not OrbitEnd.done:
         raise OrbitError(
             f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}."
@@ -321,7 +326,18 @@ def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
     start = _steady(body, orbit.phases[flight])
     now = _steady(body, phases)
     x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
+    moved, faster = _free(body, u, x, v)
+    return (moved + now[0]) @ body.observed, (faster + now[1]) @ body.observed
+
+
+def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Return displacements and velocities of the modes, free from (x, v) for u seconds, shape (time, mode)."""
     w, z = body.frequencies, body.damping_ratios
+    if body.coupling is not None:
+        rates, vectors = body.complex_modes
+        parts = np.linalg.solve(vectors, np.concatenate([w * x, v], axis=1).T)
+        later = (vectors @ (parts * np.exp(rates * u).T)).real.T
+        return later[:, : w.size] / w, later[:, w.size :]
     decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w
     # exponentials that decay, never a cosh that overflows: equations.md 1.2
     fast = np.where(z > 1.0, -(decay + rate), -decay - 1j * rate)
@@ -330,13 +346,10 @@ def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
     apart = np.where(rate == 0.0, 1.0, slow - fast)
     c = 0.5 * (left + gone)
     s = np.where(rate == 0.0, u * left, (left - gone) / apart)
-    moved = ((c + decay * s) * x + s * v).real + now[0]
-    faster = (-(w**2) * s * x + (c - decay * s) * v).real + now[1]
-    return moved @ body.observed, faster @ body.observed
+    return ((c + decay * s) * x + s * v).real, (-(w**2) * s * x + (c - decay * s) * v).real
 
 
 def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
-    w, rate = body.angular_frequency, body.frequencies
-    answer = body.force / (rate**2 - w**2 + 2j * body.damping_ratios * rate * w)
-    turned = answer * np.exp(1j * phases)[:, None]
-    return turned.real + body.held / rate**2, (1j * w * turned).real
+    w = body.angular_frequency
+    turned = body.steady(w) * np.exp(1j * phases)[:, None]
+    return turned.real + body.held / body.frequencies**2, (1j * w * turned).real

@@ -104,6 +104,14 @@ def gain(axes: Axes) -> None:
     )
 
 
+def structure(axes: Axes) -> None:
+    """Draw two masses that a spring joins, and a ball between them."""
+    for x in (0.9, 7.0):
+        axes.add_patch(Rectangle((x, 2.8), 2.1, 4.4, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75))
+    spring(axes, 3.0, 7.0, 6.2, turns=3)
+    axes.add_patch(Circle((5.8, 4.0), 1.0, facecolor=GREY, edgecolor=RED, lw=LINE * 0.75))
+
+
 def sensor(axes: Axes) -> None:
     """Draw a probe before a body that moves."""
     axes.add_patch(Rectangle((0.9, 3.9), 4.0, 2.2, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
@@ -152,7 +160,7 @@ def analog_input(axes: Axes) -> None:
 
 
 ICONS = (
-    *(oscillator, chain, beam, impact_stop, replay, gain),
+    *(oscillator, chain, beam, structure, impact_stop, replay, gain),
     *(sensor, load_cell, exciter, noise, analog_input),
 )
 

@@ -98,9 +98,9 @@ class BeamPoints(StructurePoints):
         return found | ({"forcing_location": where[0]} if self.is_pushed() else {})
 
     @property
-    def flaw(self) -> str:
-        """Empty: beams have no flaw."""
-        return ""
+    def is_loose(self) -> bool:
+        """False: a boundary ties each beam to the ground."""
+        return False
 
 
 def _mass_of(numbers: Numbers) -> float:

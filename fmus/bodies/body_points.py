@@ -91,7 +91,7 @@ class BodyPoints(ABC):
 
     @abstractmethod
     def mass_normalised(self) -> ImpactingBody:
-        """Return a body without a flaw as mass-normalised modes under its harmonic force: equations.md 5.2, 6.4."""
+        """Return a body tied to the ground as mass-normalised modes under its harmonic force: equations.md 5.2, 6.4."""
 
     @property
     @abstractmethod
@@ -104,8 +104,8 @@ class BodyPoints(ABC):
 
     @property
     @abstractmethod
-    def flaw(self) -> str:
-        """Reason why the body cannot fly in modes: "coupled" by its damping, or "loose"; empty without one."""
+    def is_loose(self) -> bool:
+        """Whether nothing ties the body to the ground."""
 
     # ---- contacts, in the coordinates of the state ----
 

@@ -21,13 +21,12 @@ class ChainPoints(StructurePoints):
         masses = self.integers["masses"]
         return self.integers["modes"] or masses, masses, masses
 
-    def structure_of(self, numbers: Numbers) -> Structure | None:
+    def structure_of(self, numbers: Numbers) -> Structure:
         """Return the modes of one point: see `StructurePoints`."""
         kept, masses, _ = self.sizes
         modes = self._modes(numbers)
-        if not modes.is_classical or not modes.frequencies[0] > 0.0:
-            return None
         shapes = modes.shapes[:, :kept]
+        is_one_spring = kept == 1 and modes.frequencies[0] > 0.0
         return Structure(
             modes.frequencies[:kept],
             modes.damping_ratios[:kept],
@@ -38,6 +37,7 @@ class ChainPoints(StructurePoints):
             shapes[self._hit].reshape(-1, kept),
             shapes,
             shapes.T * row_of(numbers, "mass", masses),
+            None if modes.is_classical or is_one_spring else modes.coupling[:kept, :kept],
         )
 
     def _modes(self, numbers: Numbers) -> ChainModes:
@@ -84,9 +84,6 @@ class ChainPoints(StructurePoints):
         return tuple(f"{what}[{hit + 1}]" for hit in self._hit)
 
     @property
-    def flaw(self) -> str:
-        """Whether the damping couples the modes ("coupled"), or nothing ties the chain to the ground ("loose")."""
-        modes = self._modes(self.floats)
-        if not modes.is_classical:
-            return "coupled"
-        return "" if modes.frequencies[0] > 0.0 else "loose"
+    def is_loose(self) -> bool:
+        """Whether nothing ties the chain to the ground."""
+        return not self._modes(self.floats).frequencies[0] > 0.0

@@ -49,10 +49,12 @@ class Contact:
 class ImpactingBody:
     """A body of mass-normalised modes: q'' + 2 z w q' + w^2 q = force cos(phase) + held.
 
+    Damping that couples the modes takes the place of 2 z w: a matrix.
+
     Attributes
     ----------
     frequencies, damping_ratios : array, shape (modes,)
-        Natural angular frequencies, rad/s; damping ratios.
+        Natural angular frequencies, rad/s; damping ratios, of the diagonal where the damping couples the modes.
     force, held : array, shape (modes,)
         Modal amplitude of the harmonic force, and modal constant force, N kg^(-1/2).
     angular_frequency, phase : float
@@ -60,6 +62,8 @@ class ImpactingBody:
     contacts : tuple of Contact
     observed : array, shape (modes,)
         Shape of the point that figures show, kg^(-1/2).
+    coupling : array, shape (modes, modes), or None
+        Damping that couples the modes, 1/s, symmetric; None where each mode has its own.
     """
 
     frequencies: Floats
@@ -70,6 +74,7 @@ class ImpactingBody:
     phase: float
     contacts: tuple[Contact, ...]
     observed: Floats
+    coupling: Floats | None = None
 
     @property
     def period(self) -> float:
@@ -92,15 +97,62 @@ class ImpactingBody:
             direction=np.array([contact.direction for contact in self.contacts]),
             position=np.array([contact.position for contact in self.contacts]),
             restitution=np.array([contact.restitution for contact in self.contacts]),
+            coupling=self.coupling,
         )
+
+    @cached_property
+    def rates(self) -> NDArray[np.complex128]:
+        """Rates of the free motions e^(rate t), 1/s, shape (2 modes,): equations.md 1.2, 4.7."""
+        if self.coupling is None:
+            decay = self.frequencies * self.damping_ratios
+            swing = self.frequencies * np.sqrt(self.damping_ratios.astype(np.complex128) ** 2 - 1.0)
+            # the slow rate of an overdamped mode from the fast one: their difference would cancel
+            fast = -decay - swing
+            return np.concatenate([fast, self.frequencies**2 / fast])
+        return self.complex_modes[0]
+
+    @cached_property
+    def complex_modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Rates, 1/s, shape (2 modes,), and vectors (w q, q') in columns, of modes that the damping couples."""
+        spring = np.diag(self.frequencies)
+        motion = np.block([[np.zeros_like(spring), spring], [-spring, -np.asarray(self.coupling)]])
+        rates, vectors = np.linalg.eig(motion)
+        return rates.astype(np.complex128), vectors.astype(np.complex128)
+
+    @cached_property
+    def slowest_decay(self) -> float:
+        """Rate at which the free motion that lasts longest decays, 1/s; 0 or less where one does not decay."""
+        return -float(self.rates.real.max())
+
+    def steady(self, angular_frequency: float | Floats) -> NDArray[np.complex128]:
+        """Return the steady displacements Re(q e^(i phase)) of the modes, kg^(1/2) m: equations.md 1.3, 4.7.
+
+        Parameters
+        ----------
+        angular_frequency : float or array
+            Angular frequency of the force, rad/s.
+
+        Returns
+        -------
+        array, shape (..., modes)
+            Infinite or NaN where an undamped mode is in resonance.
+        """
+        w = np.asarray(angular_frequency, dtype=np.float64)[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if self.coupling is None:
+                drag = 2j * self.damping_ratios * self.frequencies * w
+                return np.asarray(self.force / (self.frequencies**2 - w**2 + drag))
+        stiffness = (self.frequencies**2 - w**2)[..., None] * np.eye(self.frequencies.size)
+        try:
+            answer = np.linalg.solve(stiffness + 1j * w[..., None] * self.coupling, self.force[:, None])
+        except np.linalg.LinAlgError:
+            return np.full((*w.shape[:-1], self.force.size), np.nan + 0j)
+        return np.asarray(answer[..., 0])
 
     @cached_property
     def scale(self) -> float:
         """Size of the displacements at the contacts, m; rounding errors are relative to it."""
-        steady = self.force / np.hypot(
-            self.frequencies**2 - self.angular_frequency**2,
-            2.0 * self.damping_ratios * self.frequencies * self.angular_frequency,
-        )
+        steady = np.abs(self.steady(self.angular_frequency))
         of_contacts = [
             abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts
         ]

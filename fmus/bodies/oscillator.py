@@ -56,9 +56,9 @@ class OscillatorPoints(BodyPoints):
         return np.asarray(displacements * np.sqrt(self.floats["mass"]))
 
     @property
-    def flaw(self) -> str:
-        """Whether the oscillator has no spring ("loose")."""
-        return "" if self.floats["stiffness"] > 0.0 else "loose"
+    def is_loose(self) -> bool:
+        """Whether the oscillator has no spring."""
+        return not self.floats["stiffness"] > 0.0
 
     def contact_shapes(self) -> Floats:
         """Return a shape of 1 for each contact."""

@@ -13,10 +13,15 @@ from vibroimpact.fmus.bodies.body_points import BodyPoints, ModalPoints, row_of,
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody, Numbers, contacts_of
 from vibroimpact.fmus.errors import VibroimpactError
 
-OF_THE_RUN = ("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_")
+OF_THE_RUN = (
+    *("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_"),
+    *("mode.displacement_start", "mode.velocity_start"),
+)
 """Prefixes of parameter names that do not change the modes."""
 OF_A_STOP = (".position", ".restitution", ".yield_velocity")
 """Suffixes of parameter names that do not change the modes."""
+DIAGONAL = 1e-9
+"""Off-diagonal modal damping, relative to the two diagonal terms, up to which the damping leaves modes uncoupled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,24 @@ class Structure:
     """Matrix from modes to the displacements in the state, shape (element, mode)."""
     from_state: Floats
     """Inverse of `to_state`, shape (mode, element)."""
+    coupling: Floats | None = None
+    """Damping that couples the modes, or damps one without a spring, 1/s, shape (mode, mode); None: ratios alone."""
+
+    @property
+    def decays(self) -> Floats:
+        """Half the damping of each mode by itself, 1/s, shape (mode,)."""
+        if self.coupling is None:
+            return self.frequencies * self.damping_ratios
+        return np.asarray(0.5 * self.coupling.diagonal())
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether modes damp each other."""
+        if self.coupling is None:
+            return False
+        own = self.coupling.diagonal()
+        off = np.abs(self.coupling - np.diag(own))
+        return bool((off > DIAGONAL * (own[:, None] + own)).any())
 
 
 class StructurePoints(BodyPoints):
@@ -50,8 +73,8 @@ class StructurePoints(BodyPoints):
     """Prefix of the names of start values, which set masses or modes."""
 
     @abstractmethod
-    def structure_of(self, numbers: Numbers) -> Structure | None:
-        """Return the modes of one point; None if damping couples them, or nothing ties the body to the ground."""
+    def structure_of(self, numbers: Numbers) -> Structure:
+        """Return the modes of one point; a frequency of 0 where nothing ties masses to the ground."""
 
     @property
     @abstractmethod
@@ -68,13 +91,13 @@ class StructurePoints(BodyPoints):
         ), which
 
     def _structure_or_none(self, numbers: Numbers) -> Structure:
-        """Return the modes of one point; all NaN if it has none."""
+        """Return the modes of one point; all NaN if it has none, or if damping couples them."""
         try:
             with np.errstate(all="ignore"):
                 found = self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
             return self._no_structure()  # the body itself reports the problem
-        return self._no_structure() if found is None else found
+        return self._no_structure() if found.is_coupled else found
 
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
@@ -102,7 +125,7 @@ class StructurePoints(BodyPoints):
         with np.errstate(all="ignore"):
             return ModalPoints(
                 stiffness=each(*(structure.frequencies**2 for structure in structures)),
-                decay=each(*(structure.frequencies * structure.damping_ratios for structure in structures)),
+                decay=each(*(structure.decays for structure in structures)),
                 force=weighted(load, rows_of(columns, "forcing.amplitude", loads)),
                 held=each(*(structure.held for structure in structures)) * columns.get("force", none),
                 shape=contacts,
@@ -124,7 +147,6 @@ class StructurePoints(BodyPoints):
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""
         numbers = self.floats
         found = self.structure_of(numbers)
-        assert found is not None, "a body without a flaw"
         root = np.sqrt(found.mass)
         amplitudes = row_of(numbers, "forcing.amplitude", found.load.shape[1])
         if "forcing.amplitude" in numbers:
@@ -138,6 +160,7 @@ class StructurePoints(BodyPoints):
             numbers.get("forcing.phase", 0.0),
             contacts_of(found.contacts / root, numbers, self.integers),
             found.observed / root,
+            found.coupling,
         )
 
 

@@ -193,6 +193,8 @@ class ChainModes:
         Damping ratios; the diagonal terms alone where the damping couples the modes.
     shapes : array, shape (masses, masses)
         Displacement of each mass (rows) for a unit of each mode, kg^(-1/2).
+    coupling : array, shape (masses, masses)
+        Damping between the modes, 1/s: diagonal, but for rounding, where `is_classical`.
     is_classical : bool
         Whether the damping leaves the modes uncoupled.
     """
@@ -200,6 +202,7 @@ class ChainModes:
     frequencies: Array
     damping_ratios: Array
     shapes: Array
+    coupling: Array
     is_classical: bool
 
 
@@ -226,10 +229,11 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
     """
     mass, stiffness, damping = _row(masses), _row(stiffnesses), _row(dampings)
     count = mass.size
-    frequencies, ratios, shapes = np.empty(count), np.empty(count), np.empty((count, count))
+    frequencies, ratios = np.empty(count), np.empty(count)
+    shapes, coupling = np.empty((count, count)), np.empty((count, count))
     fits = stiffness.size == damping.size == count + 1
     end = (
-        _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes)
+        _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes, coupling)
         if fits
         else -1
     )
@@ -238,7 +242,44 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
             "chain_modes: expected 1 to 64 masses > 0 and one spring and dashpot more, >= 0, "
             f"got {mass}, {stiffness} and {damping}."
         )
-    return ChainModes(frequencies, ratios, shapes, end == 0)
+    return ChainModes(frequencies, ratios, shapes, coupling, end == 0)
+
+
+def spring_modes(springs: Array) -> tuple[Array, Array]:
+    """Return the angular frequencies above 0, ascending, and the unit vectors of a structure of springs.
+
+    Parameters
+    ----------
+    springs : array, shape (spring, coordinate)
+        Row of each spring: sqrt(stiffness / mass) at each coordinate, with the sign of its elongation; 1 to 64
+        coordinates. The stiffness matrix over the masses is the transpose of this matrix times itself.
+
+    Returns
+    -------
+    frequencies : array, shape (mode,)
+        rad/s; as many as the springs hold.
+    vectors : array, shape (mode, coordinate)
+
+    Raises
+    ------
+    UsageError
+        A number is not finite, or there are more than 64 coordinates.
+
+    Examples
+    --------
+    >>> frequencies, vectors = spring_modes(np.array([[3.0, 0.0], [0.0, 2.0]]))
+    >>> print(frequencies, abs(vectors).tolist())
+    [2. 3.] [[0.0, 1.0], [1.0, 0.0]]
+    """
+    rows = np.ascontiguousarray(springs, dtype=np.float64)
+    count, columns = rows.shape
+    values, vectors = np.empty(columns), np.empty((columns, columns))
+    rank = _library().vi_door_spring_modes(count, columns, rows, values, vectors)
+    if rank < 0:
+        raise UsageError(
+            f"spring_modes: expected finite numbers of 1 to 64 coordinates, got {columns} of them."
+        )
+    return values[:rank].copy(), vectors[:rank].copy()
 
 
 def _row(points: float | Numbers) -> Array:
@@ -253,7 +294,8 @@ def _library() -> ctypes.CDLL:
     library.vi_door_beam_modes.argtypes = [integer, integer, numbers, numbers]
     library.vi_door_beam_shapes.argtypes = [integer, integer, integer, numbers, integer, numbers]
     library.vi_door_beam_residual.argtypes = [integer, integer, integer, numbers, numbers, numbers]
-    library.vi_door_chain_modes.argtypes = [integer, *[numbers] * 6]
+    library.vi_door_chain_modes.argtypes = [integer, *[numbers] * 7]
+    library.vi_door_spring_modes.argtypes = [integer, integer, *[numbers] * 3]
     library.vi_door_beam_residual_shapes.argtypes = [
         integer,
         integer,

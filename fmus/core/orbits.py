@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, Structure, c_double, c_int32, c_void_p
+from ctypes import POINTER, Structure, c_double, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
@@ -25,6 +25,7 @@ class OrbitEnd(IntEnum):
     refused = 1
     resonant = 2
     singular = 3
+    critical = 4
 
 
 class BODY(Structure):
@@ -39,6 +40,7 @@ class BODY(Structure):
         ("contacts", c_int32),
         ("angular_frequency", c_double),
         *((name, c_void_p) for name in ARRAYS),
+        ("coupling", c_void_p),
     ]
 
 
@@ -59,13 +61,30 @@ class OrbitBody:
         Displacement of each contact for unit modal displacements; modal velocities that give the contact 1 m/s.
     direction, position, restitution : array, shape (contacts,)
         +1 for a stop above, -1 below; position, m; coefficient of restitution.
+    coupling : array, shape (modes, modes), optional
+        Damping that couples the modes, 1/s; it replaces the damping ratios.
     """
 
-    def __init__(self, angular_frequency: float, **arrays: Array) -> None:
+    def __init__(self, angular_frequency: float, *, coupling: Array | None = None, **arrays: Array) -> None:
         self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
         contacts, self.modes = self._arrays["shape"].shape
         addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
-        self.address = BODY(self.modes, contacts, angular_frequency, *addresses)
+        self._terms = None if coupling is None else self._coupled(angular_frequency, coupling)
+        terms = None if self._terms is None else self._terms.ctypes.data
+        self.address = BODY(self.modes, contacts, angular_frequency, *addresses, terms)
+
+    def _coupled(self, angular_frequency: float, coupling: Array) -> Array:
+        """Return the complex modes in the form of C, as bytes in an array of numbers."""
+        library = _library()
+        found = np.empty(library.vi_door_orbit_coupling_size() // 8 + 1)
+        work = np.empty(library.vi_door_orbit_coupling_work_size() // 8 + 1)
+        damping = _numbers(coupling, (self.modes, self.modes))
+        given = (self._arrays["natural"], damping, self._arrays["cosine"], self._arrays["sine"], found, work)
+        end = library.vi_door_orbit_couple(
+            self.modes, angular_frequency, *(each.ctypes.data for each in given)
+        )
+        _check(OrbitEnd.refused if end else OrbitEnd.done)
+        return found
 
     def evaluate(self, contacts: NDArray[np.int32], phases: Array, periods: int) -> Evaluation:
         """Return velocities and distances for given phases of the impacts: equations.md 4.7.
@@ -158,6 +177,9 @@ def _check(end: int) -> None:
 def _library() -> ctypes.CDLL:
     library = core_library()
     body, train = POINTER(BODY), POINTER(_Train)
+    library.vi_door_orbit_coupling_size.restype = c_size_t
+    library.vi_door_orbit_coupling_work_size.restype = c_size_t
+    library.vi_door_orbit_couple.argtypes = [c_int32, c_double, *[c_void_p] * 6]
     # plain addresses: converting arrays runs Python code, where Ctrl-C would turn into an error of an argument
     library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
     library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]

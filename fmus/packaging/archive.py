@@ -341,6 +341,16 @@ def value_references(fmu: UnpackedFmu) -> dict[str, int]:
     }
 
 
+def array_shapes(fmu: UnpackedFmu) -> dict[str, tuple[int, ...]]:
+    """Return the dimensions of each array variable of an FMU of this package, for FMI 3.0."""
+    variables = _description(fmu.source, fmu.folder).iterfind("ModelVariables/*")
+    shapes = {
+        one.get("name", ""): tuple(int(each.get("start", "")) for each in one.findall("Dimension"))
+        for one in variables
+    }
+    return {name: shape for name, shape in shapes.items() if shape}
+
+
 @lru_cache(maxsize=64)
 def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     """Return the facts in an FMU's description; the digest is part of the cache key, so that contents are read once."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,8 +24,12 @@ SLOWEST, FASTEST = 1e-100, 1e100
 Starts = Mapping[str, Number]
 
 
-def default_experiment(component: str, starts: Starts, stop_time: float | None = None) -> Experiment:
+def default_experiment(
+    component: str, starts: Starts, stop_time: float | None = None, natural: Sequence[float] = ()
+) -> Experiment:
     """Return the default experiment of a body, from all its start values by variable name.
+
+    `natural` are its natural angular frequencies where they do not follow from these, rad/s.
 
     Without a stop time (s) it has `PERIODS` periods of the slowest natural frequency or of the forcing, whichever is
     slower. It has `STEPS_PER_PERIOD` steps in the fastest period, and at most `MOST_STEPS` in total; both times are
@@ -33,10 +37,12 @@ def default_experiment(component: str, starts: Starts, stop_time: float | None =
     """
     try:
         with np.errstate(all="ignore"):
-            natural = NATURAL[component](starts) if component in NATURAL else []
+            own = NATURAL[component](starts) if component in NATURAL else []
     except (OverflowError, ZeroDivisionError):
-        natural = []
-    angular = [w for w in (*natural, abs(float(starts.get("forcing.angular_frequency", 0.0)))) if w > 0.0]
+        own = []
+    angular = [
+        w for w in (*natural, *own, abs(float(starts.get("forcing.angular_frequency", 0.0)))) if w > 0.0
+    ]
     if not angular or not (min(angular) > SLOWEST and max(angular) < FASTEST):
         return Experiment() if stop_time is None else Experiment(stop_time, stop_time / MOST_STEPS)
     stop = _rounded(PERIODS * 2.0 * math.pi / min(angular)) if stop_time is None else stop_time

@@ -32,6 +32,7 @@ from vibroimpact.fmus.packaging.description import (
 from vibroimpact.fmus.packaging.experiment import default_experiment
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
+from vibroimpact.fmus.packaging.structure_file import STRUCTURE_MEMBER, natural_frequencies
 from vibroimpact.fmus.shipped import component_name
 
 #: Member with the start values that differ from the component's own; its format is in resources.h.
@@ -64,6 +65,7 @@ def export_fmu(
     stop_time: float | None = None,
     platform: str | None = None,
     units: Mapping[str, UnitDefinition] | None = None,
+    structure: bytes | None = None,
     note: Note = lambda _: None,
 ) -> Path:
     """Write an FMU of a component of the package.
@@ -97,6 +99,9 @@ def export_fmu(
         this platform and those whose libraries a release contains.
     units : mapping of str to UnitDefinition, optional
         Units, by variable name, for variables without a unit of their own: those of a Gain.
+    structure : bytes, optional
+        Modes of a Structure: `structure_file`. `modes` and `contacts` should be their numbers. Without it, the body is
+        an oscillator of mass 1 and stiffness 1.
     note : callable
         Function that gets a line about each compilation for another machine, and each warning of the library.
 
@@ -133,14 +138,15 @@ def export_fmu(
         if not full:
             shown = _lean_counts(original, own_starts) | counts
         component = with_starts(original.with_repeats(shown), own_starts)
-        experiment = default_experiment(full_name, _numbers(component), stop_time)
-        suitable = default_experiment(full_name, _numbers(component))
+        natural = natural_frequencies(structure) if structure is not None else ()
+        experiment = default_experiment(full_name, _numbers(component), stop_time, natural)
+        suitable = default_experiment(full_name, _numbers(component), natural=natural)
         if not full:
             edition = edition_of(experiment)
             component = lean(component, external=external, enumerations=enumerations)
         component = with_units(component, units or {})
         _refuse_starts_beyond(component, own_starts)
-        resources = {}
+        resources = {} if structure is None else {STRUCTURE_MEMBER: structure}
         if own_starts:
             resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
         tried = replace(experiment, stop_time=min(experiment.stop_time, suitable.stop_time))
@@ -148,7 +154,7 @@ def export_fmu(
         return members_of(contents)
 
     given = dict(starts or {})
-    displaced = [] if full else _displacements(original, given)
+    displaced = [] if full or structure is not None else _displacements(original, given)
     write_fmu(target, _first_taken([*(given | one for one in displaced), given], members_with))
     return target
 

@@ -10,9 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.analysis.orbits import closed_form
 from vibroimpact.fmus.core.modes import beam_modes
 from vibroimpact.orchestrator.hard_cases.case import Curve, Floats, Found, HardCase, largest, relative
-from vibroimpact.orchestrator.hard_cases.runs import IMPACT_TIME, IMPACT_VELOCITY, PLAIN, restitution, run
+from vibroimpact.orchestrator.hard_cases.runs import (
+    IMPACT_PHASE,
+    IMPACT_TIME,
+    IMPACT_VELOCITY,
+    PLAIN,
+    restitution,
+    run,
+)
+from vibroimpact.orchestrator.orbits import impacting_body
+from vibroimpact.orchestrator.scene import Scene
 
 THEME = "Finding the contact"
 LEVELS = 10.0 ** -np.arange(2.0, 13.0)
@@ -195,6 +205,30 @@ def _near_defective() -> Found:
     return Found(largest(off), Curve(np.arange(7.0), off, words, "relative error of impacts (-)"))
 
 
+def _defective_orbits() -> Found:
+    """Periodic orbits of the chain with Jordan blocks, and close to it, where exponentials of the modes cancel."""
+    k, w = COUPLING, 0.9
+    errors = []
+    for offset in OFFSETS:
+        dampings = [2.0 * k * (1.0 + float(offset)), 0.0]
+        springs = {"stiffnesses": [1.0 + k**2 - k, k], "far_stiffness": 1.0 - k}
+        tables: dict[str, Any] = {
+            "body": {"kind": "chain", "masses": [1.0, 1.0], "dampings": dampings, **springs},
+            "forcing": {"amplitude": [0.0, 1.0], "angular_frequency": w},
+            "stop": [restitution(0.6, 0.7, mass=1)],
+            "record": {"transient_periods": 400, "recorded_periods": 1},
+        }
+        record = run(**tables)
+        scene = Scene.from_dict({"scene": {"units": "nondimensional"}, **tables}, "hard case")
+        (orbit,) = closed_form(impacting_body(scene))
+        assert record.impacts is not None
+        seen = record.impacts[:, [IMPACT_PHASE, IMPACT_VELOCITY]]
+        errors.append(largest(relative(seen, np.array([[orbit.phases[0], orbit.velocities[0]]]))))
+    off = np.array(errors)
+    words = "damping off by -1e-4, -1e-8, -1e-12, 0, 1e-12, ..."
+    return Found(largest(off), Curve(np.arange(7.0), off, words, "relative error of the impact (-)"))
+
+
 def _off_series(
     stiffness: Floats, damping: float, stop: float, body: dict[str, Any], force: float | list[float]
 ) -> float:
@@ -317,5 +351,15 @@ CASES = (
         "relative error of times and speeds",
         1.2e-13,
         _near_defective,
+    ),
+    HardCase(
+        "defective-orbits",
+        THEME,
+        "P(1,1) of the chain with Jordan blocks, and with dampings off by 1e-12 to 1e-4",
+        "the impact of the orbit, computed without a run",
+        "a run of 400 periods",
+        "relative error of phase and speed",
+        3.3e-13,
+        _defective_orbits,
     ),
 )

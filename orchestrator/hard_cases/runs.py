@@ -14,7 +14,8 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
 
-IMPACT_TIME, IMPACT_VELOCITY, IMPACT_IMPULSE, IMPACT_RESTITUTION, IMPACT_DURATION = 0, 2, 3, 5, 6
+IMPACT_TIME, IMPACT_PHASE, IMPACT_VELOCITY = 0, 1, 2
+IMPACT_IMPULSE, IMPACT_RESTITUTION, IMPACT_DURATION = 3, 5, 6
 """Columns of the impacts of a record."""
 STICK_START, STICK_END = 0, 1
 """Columns of the sticks of a record."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ImpactingBody
-from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen, seen_of_flaw
+from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen, seen_of_loose
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
 
@@ -28,12 +28,12 @@ def impacting_body(scene: Scene) -> ImpactingBody:
     """
     refuse_orbits(scene, seen(scene))
     body = body_points(scene)
-    if body.flaw:
-        refuse_orbits(scene, [seen_of_flaw(scene, body.flaw)])
+    if body.is_loose:
+        refuse_orbits(scene, [seen_of_loose(scene)])
     found = body.mass_normalised()
-    for number, contact in enumerate(found.contacts, start=1):
+    for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
         if not contact.shape @ contact.shape > 0.0:
-            refuse_orbits(scene, [Seen("held", f"stop[{number}]", "one that is held")])
+            refuse_orbits(scene, [Seen("held", key, "one that is held")])
     return found
 
 

@@ -134,7 +134,7 @@ def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSetti
     scene, keys = result.followed.scene, (result.followed.parameter, result.second)
     value = float(scene.value(result.second))
     follower = LocusFollower(
-        lambda *both: impacting_body(scene.at(dict(zip(keys, both, strict=True)))), first, second
+        lambda *both: _body_along(scene, dict(zip(keys, both, strict=True))), first, second
     )
     for number, branch in enumerate(result.followed.branches, start=1):
         for point in branch.points:
@@ -327,11 +327,19 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
         if value not in kept:
             if len(kept) > 8:
                 kept.clear()
-            kept[value] = impacting_body(scene.at({parameter: value}))
+            kept[value] = _body_along(scene, {parameter: value})
         return kept[value]
 
-    body_at(value)  # a wrong key is refused before any orbit is followed
+    impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
     return body_at
+
+
+def _body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
+    """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
+    try:
+        return impacting_body(scene.at(values))
+    except UsageError as problem:
+        raise OrbitError(str(problem)) from problem
 
 
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:

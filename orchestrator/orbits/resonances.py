@@ -192,14 +192,11 @@ def _curves(
         yield "displacement_range", dataset["displacement_range"].transpose(*order).values.reshape(-1, count)
     yield "impact_velocity", largest_impact_velocity(dataset).transpose(*order).values.reshape(-1, count)
     kinetic = exchanged["mean_kinetic_energy"].transpose("mode", *order).values
+    steady = np.abs(body.steady(frequency))
     is_free = (exchanged["reason"].transpose(*order).values == NO_IMPACTS).reshape(-1, count)
     for mode, values in enumerate(kinetic):
-        w, z = body.frequencies[mode], body.damping_ratios[mode]
-        # the steady response, equations.md 1.3; NaN where an undamped mode resonates
-        stiffness = np.abs(w**2 - frequency**2 + 2j * z * w * frequency)
-        speed = np.divide(
-            frequency * body.force[mode], stiffness, out=np.full(count, np.nan), where=stiffness > 0.0
-        )
+        # NaN where an undamped mode resonates
+        speed = np.where(np.isfinite(steady[:, mode]), frequency * steady[:, mode], np.nan)
         yield f"mean_kinetic_energy_{mode + 1}", np.where(is_free, 0.25 * speed**2, values.reshape(-1, count))
 
 

@@ -149,8 +149,7 @@ class Transients(Study[Floats]):
     @property
     def linear_contraction(self) -> float:
         """Factor per period of the body without impacts, in its slowest mode."""
-        decay = float((self.body.damping_ratios * self.body.frequencies).min())
-        return math.exp(-decay * self.body.period)
+        return math.exp(-self.body.slowest_decay * self.body.period)
 
     def made(self) -> xr.Dataset:
         """Return the distances, and the end of each start."""

@@ -15,7 +15,7 @@ from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RE
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
-STRUCTURES = ("Chain", "Beam")
+STRUCTURES = ("Chain", "Beam", "Structure")
 """Bodies that follow their energies only on request."""
 BODIES = ("Oscillator", *STRUCTURES)
 _PLACE = r"(\[\d+\])?"

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from vibroimpact.fmus.bodies.assembled import without_arrays
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.packaging.structure_file import structure_file
 from vibroimpact.orchestrator.run.parameters import exported_floats, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 
@@ -61,12 +63,16 @@ def export_scene(
             f"{scene.source}: exciter.distance: expected a force that does not depend on the displacement, as an FMU "
             "of a body has it, got one that falls with the distance. Leave it out, or connect an Exciter to the FMU."
         )
+    integers = integer_parameters(scene)
+    starts, arrays = without_arrays(exported_floats(scene))
+    structure = structure_file(arrays, coupled=bool(integers["coupled"])) if arrays else None
     return export_fmu(
         scene.body.FMU,
         output,
         contacts=len(scene.stops),
         fmi=fmi,
-        starts={**exported_floats(scene), **integer_parameters(scene)},
+        starts={**starts, **integers},
+        structure=structure,
         full=full,
         external=external,
         enumerations=enumerations,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import runs, stepping
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.packaging.archive import unpack, value_references
+from vibroimpact.fmus.packaging.archive import array_shapes, unpack, value_references
 from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
@@ -68,10 +69,11 @@ class BodyDriver(RecordedBody):
     ) -> None:
         self.fmu = unpack(fmu_path(body, "3.0"))
         self.references = value_references(self.fmu)
+        self._shapes = array_shapes(self.fmu)
         self.instance = Instance3(self.fmu, "body", early_return=True, wrap=wrap and wrap("body"))
         super().__init__(self._group)
-        self._floats = self._group("Float64", tuple(floats))
         self.float_names = tuple(floats)
+        self._floats, self._places = self._parameters(self.float_names)
         self._held: tuple[str, ...] | None = None  # outputs of the last block without a record
         self.integers = []
         for kind, is_boolean in (("Int64", False), ("Boolean", True)):
@@ -82,7 +84,34 @@ class BodyDriver(RecordedBody):
                 self.integers.append(group)
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
-        return self.instance.group(kind, [self.references[name] for name in names], size=size)
+        count = size or sum(map(self._size, names))
+        return self.instance.group(kind, [self.references[name] for name in names], size=count)
+
+    def _size(self, variable: str) -> int:
+        return math.prod(self._shapes.get(variable, ()))
+
+    @property
+    def sets_arrays(self) -> bool:
+        """Whether some real parameters are elements of arrays of the FMU, which are set as a whole."""
+        return any(name not in self.references for name in self.float_names)
+
+    def _parameters(self, names: Sequence[str]) -> tuple[VariableGroup, NDArray[np.int64]]:
+        """Return the group of the variables that hold parameters, and the place of each parameter in its buffer.
+
+        A parameter is a variable, or an element of an array: `mode.contact_shape[2,1]`.
+        """
+        first: dict[str, int] = {}
+        places, size = [], 0
+        for name in names:
+            variable, element = name, 0
+            if name not in self.references:
+                variable, _, numbers = name.removesuffix("]").rpartition("[")
+                index = tuple(int(number) - 1 for number in numbers.split(","))
+                element = int(np.ravel_multi_index(index, self._shapes[variable]))
+            if variable not in first:
+                first[variable], size = size, size + self._size(variable)
+            places.append(first[variable] + element)
+        return self._group("Float64", tuple(first)), np.array(places, dtype=np.int64)
 
     @property
     def time(self) -> float:
@@ -102,7 +131,7 @@ class BodyDriver(RecordedBody):
         instance = self.instance
         instance.log.take()  # discard messages of the run before
         instance.reset()
-        self._floats.values[:] = [floats[name] for name in self.float_names]
+        self._floats.values[self._places] = [floats[name] for name in self.float_names]
         self._floats.set()
         for integers in self.integers:
             integers.set()

@@ -17,6 +17,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.called_effects import called_by_numbers
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.record import OBSERVED
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -30,7 +31,7 @@ class Limit:
     """The users that cannot take one feature of a scene."""
 
     lanes: bool = False
-    """Whether lanes cannot run the scene at all; coupled or missing modes are left out point by point instead."""
+    """Whether lanes cannot run the scene at all; modes that are coupled are left out point by point instead."""
     orbits: str = ""
     """Feature that a search for orbits expects instead; empty where it takes this one."""
     pushed: str = ""
@@ -57,11 +58,12 @@ LIMITS = {
     "places": Limit(
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
-    "coupled": Limit(orbits="damping that does not couple the modes where orbits are followed"),
     "spring": Limit(orbits="a spring where orbits are followed"),
-    "loose": Limit(orbits="a chain tied to the ground"),
+    "loose": Limit(orbits="bodies that springs tie to the ground"),
     "held": Limit(orbits="a point that moves"),
-    "force": Limit(pushed="a Beam takes one force, where it is forced, and its stops are not all there"),
+    "force": Limit(
+        pushed="a body with one force takes it where it is forced, and its stops are not all there"
+    ),
 }
 
 
@@ -81,11 +83,11 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("forcing", "forcing", "none")
     if not scene.stops:
         yield Seen("stop", "stop", "none")
-    for number, stop in enumerate(scene.stops, start=1):
+    for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
-            yield Seen("law", f"stop[{number}].law", f'"{stop.law}"')
+            yield Seen("law", f"{key}.law", f'"{stop.law}"')
         elif stop.yield_velocity > 0.0:
-            yield Seen("yield_velocity", f"stop[{number}].yield_velocity", f"{stop.yield_velocity:g}")
+            yield Seen("yield_velocity", f"{key}.yield_velocity", f"{stop.yield_velocity:g}")
     if scene.falling_force:
         yield Seen("distance", "exciter.distance", "a force that falls with the distance")
     if not scene.is_one_body:
@@ -150,12 +152,10 @@ def _yields_in_lanes(scene: Scene) -> bool:
     )
 
 
-def seen_of_flaw(scene: Scene, flaw: str) -> Seen:
-    """Return the feature that keeps a scene's body from flying in modes: see `flaw` of `BodyPoints`."""
-    if flaw == "coupled":
-        got = "one that does. Dampings in proportion to the stiffnesses do not"
-        return Seen("coupled", "body.dampings", got)
-    loose = Seen("loose", "body.stiffnesses", "one that is loose")
+def seen_of_loose(scene: Scene) -> Seen:
+    """Return the feature that keeps orbits from a scene's body, which is loose: see `is_loose` of `BodyPoints`."""
+    several = isinstance(scene.body, StructureBody)
+    loose = Seen("loose", "body" if several else "body.stiffnesses", "one that is loose")
     return loose if scene.body.IS_STRUCTURE else Seen("spring", "body.stiffness", "none")
 
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints, Columns
 from vibroimpact.fmus.core.contact_laws import contact_laws
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.fields import fmu_variables_of
+from vibroimpact.orchestrator.scene.fields import named_numbers
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import Exciter
@@ -59,25 +58,6 @@ def exported_floats(scene: Scene) -> dict[str, float]:
         return parameters
     forces = [name for name in parameters if name.startswith("forcing.amplitude")]
     return parameters | dict.fromkeys(forces, 0.0) | {"forcing.base_acceleration": forcing.scalar_amplitude}
-
-
-def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
-    """Return the numbers of a table of a scene by their variable names in the FMU, SI.
-
-    Fields without a value and without a default are left out. `size` is the number of elements of each array (masses or
-    modes). A single number holds for all elements; missing elements at the end of a list are 0.
-    """
-    parameters: dict[str, float] = {}
-    for variable in fmu_variables_of(type(table)):
-        value = getattr(table, variable.key)
-        if value is None or (variable.is_told_if_given and variable.attribute not in table.model_fields_set):
-            continue
-        if not variable.is_array:
-            parameters[variable.name] = value
-            continue
-        each = value + (0.0,) * (size - len(value)) if isinstance(value, tuple) else (value,) * size
-        parameters |= {f"{variable.name}[{number}]": one for number, one in enumerate(each, start=1)}
-    return parameters
 
 
 def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float]) -> dict[str, float]:

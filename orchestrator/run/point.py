@@ -116,7 +116,7 @@ class PointRunner(Runner):
             sampled=self._plan.variables,
             state=state_variables(scene),
             energies=self._plan.energies,
-            slowest=scene.body.IS_STRUCTURE,
+            slowest=scene.body.SLOWEST if scene.body.IS_STRUCTURE else "",
         )
         self._built_for = built_for(scene)
 
@@ -176,7 +176,7 @@ class PointRunner(Runner):
 
 def built_for(scene: Scene) -> tuple[object, ...]:
     """Return the numbers for which a scene's components are made, and which parameters cannot change later."""
-    return scene.body.size, scene.body.kept_modes, scene.execution.macro_step
+    return scene.body.size, scene.body.kept_modes, scene.body.is_coupled, scene.execution.macro_step
 
 
 def driver_of(
@@ -249,7 +249,7 @@ class _Run:
         pressed = [(contact, start) for contact, start in resting if self._load(contact) > 0.0]
         idle = [contact for contact, _ in resting if contact not in dict(pressed)]
         stuck = bool(pressed) and self._rests_for_ever(pressed)
-        remarks = [no_load_message(idle[0])] if idle and not stuck else []
+        remarks = [no_load_message(self.scene.stop_keys[idle[0] - 1])] if idle and not stuck else []
         if self.plan.feels_contacts:
             durations = self.driver.impacts()[:, _DURATION]
             rate, has_peaks = self.scene.sampling_rate, self.scene.record.impacts

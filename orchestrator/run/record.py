@@ -231,13 +231,13 @@ class RecordedBody(ABC):
         sampled: Sequence[str] = (),
         state: Sequence[str] = (),
         energies: bool = False,
-        slowest: bool = False,
+        slowest: str = "",
     ) -> None:
         """Choose the variables of the body that are read; other variables cost no calls.
 
         `contacts` is the number of ports in use, `sampled` are the variables of a time series. `state` has the
         variables of the whole state, where it is more than the observed point. With `energies` the body follows its
-        energies during a recording; with `slowest` its lowest natural frequency is read.
+        energies during a recording; `slowest` is the variable that has, or begins with, its lowest frequency.
         """
         ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
         self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
@@ -247,7 +247,7 @@ class RecordedBody(ABC):
         self._sampled, self._sampled_names = self._some("Float64", sampled), tuple(sampled)
         self._state = self._some("Float64", state)
         self._energies = self._some("Boolean", ["record.energies"] if energies else [])
-        self._slowest = self._some("Float64", ["natural_angular_frequency[1]"] if slowest else [])
+        self._slowest = self._some("Float64", [slowest] if slowest else [])
 
     def _some(self, kind: str, names: Sequence[str]) -> VariableGroup | None:
         return self._group_of(kind, names, None) if names else None

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from vibroimpact.orchestrator.importer.specification import PairSpec, StopContactSpec
-from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers
+from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers, shipped_kind
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.time_series import follow_energies
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
@@ -47,6 +48,9 @@ def engine(scene: Scene, execution: str = "auto") -> str:
 
 def _body(scene: Scene) -> str:
     body = scene.body
+    if isinstance(body, StructureBody):
+        count = f"{body.size} mode{'' if body.size == 1 else 's'}"
+        return f"{body.FMU}, {', '.join(body.names)}: {count} of all of them"
     if not body.IS_STRUCTURE:
         yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
         how = "as a structure because a stop yields" if yields else "closed form between impacts"
@@ -78,14 +82,23 @@ def natural_frequencies(scene: Scene) -> str:
 
 
 def laws(scene: Scene) -> dict[str, str]:
-    """Return the contact law of each stop of the short form, by the key of the stop."""
-    return {f"stop[{number}]": stop.law for number, stop in enumerate(scene.stops, start=1)}
+    """Return the contact law of each stop and contact of the short form, by its key."""
+    return dict(zip(scene.stop_keys, (stop.law for stop in scene.stops), strict=True))
 
 
 def contacts(scene: Scene) -> dict[str, str]:
     """Return the partners of each contact of a general scene in words, by the key of the contact."""
     meetings = enumerate(scene.meetings, start=1)
     return {f"contact[{number}]": _met(contact) for number, contact in meetings}
+
+
+def fused_form(scene: Scene) -> str:
+    """Return a remark on the fused form of a scene of own bodies that meet each other only; empty for other scenes."""
+    own = all(shipped_kind(component) in ("Oscillator", "Chain", "Beam") for component in scene.components)
+    others = scene.connections or scene.events or scene.stop_contacts
+    if scene.is_one_body or not own or others or not scene.pairs:
+        return ""
+    return "these bodies and contacts are one structure, too, and faster as [[body]] and [[contact]]"
 
 
 def _met(contact: StopContactSpec | PairSpec) -> str:

@@ -54,6 +54,6 @@ def late_message(deadline: float | None, time: float) -> str:
     return f"deadline: {deadline} s passed at time {time:.17g}"
 
 
-def no_load_message(contact: int) -> str:
-    """Return the message of a run that ends at rest on a stop (1-based) without a load on the stop."""
-    return f"rests on stop[{contact}] without load"
+def no_load_message(stop: str) -> str:
+    """Return the message of a run that ends at rest on a stop, given by its key, without a load on the stop."""
+    return f"rests on {stop} without load"

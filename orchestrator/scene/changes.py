@@ -182,8 +182,10 @@ def _leave_out_alternatives(document: dict[str, Any], changes: Sequence[Change])
     for change in changes:
         table, name = change.path[:-1], change.path[-1]
         other = ALTERNATIVES.get(name) if isinstance(name, str) else None
-        if table in (("body",), ("forcing",)) and other is not None and (*table, other) not in keys:
+        if table[:1] in (("body",), ("forcing",)) and other is not None and (*table, other) not in keys:
             owner = document[str(table[0])]
+            if len(table) == 2 and isinstance(owner, list) and isinstance(table[1], int):
+                owner = owner[table[1]]
             if isinstance(owner, dict):  # a later change may have replaced the table
                 owner.pop(other, None)
 

@@ -36,8 +36,8 @@ class ComponentTable(SceneTable):
             "a path of an FMU file, or the name of a shipped component",
             hint='For example "ball.fmu".',
             doc="a path that ends in `.fmu`, relative to the folder of the scene file; or a shipped component: "
-            '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, `"LoadCell"`, `"Exciter"`, '
-            '`"Noise"`, `"AnalogInput"`, in any spelling',
+            '`"Oscillator"`, `"Chain"`, `"Beam"`, `"Structure"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, '
+            '`"LoadCell"`, `"Exciter"`, `"Noise"`, `"AnalogInput"`, in any spelling',
         ),
     ]
     fmi: Annotated[

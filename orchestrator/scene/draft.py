@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, LinkTable, StructureBody
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
-from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
+from vibroimpact.orchestrator.scene.keys import MODES, Key, number_of, numeric_key
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
 from vibroimpact.orchestrator.scene.models import (
+    CONTACT_MODELS,
     STOP_MODELS,
+    Contact,
     Execution,
     Forcing,
+    OwnStop,
     Record,
     SceneHeader,
-    Stop,
 )
 from vibroimpact.orchestrator.scene.problems import (
     KeyPath,
@@ -31,6 +33,13 @@ from vibroimpact.orchestrator.scene.problems import (
 )
 from vibroimpact.orchestrator.scene.replay_models import Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
+from vibroimpact.orchestrator.scene.several_bodies import (
+    axes_of_part,
+    is_structure,
+    named_bodies,
+    of_part,
+    part_documents,
+)
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
@@ -96,14 +105,21 @@ class Reading(NamedTuple):
 
 
 class Draft(DraftTables):
-    """A scene of one body during the checks; swept keys need not be written."""
+    """A scene of the short form during the checks; swept keys need not be written.
+
+    Among several bodies each is a draft of its own in `parts`; `names`, `links` and `meetings` are of their tables.
+    """
 
     def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
         super().__init__(with_swept_keys(document, axes))
         self.axes = axes
-        self.body: Body | None = self._body()
+        self.names: tuple[str | None, ...] = ()
+        self.parts: tuple[Draft, ...] = ()
+        self.links: tuple[LinkTable | None, ...] = ()
+        self.meetings: tuple[Contact | None, ...] = ()
+        self.body: Body | None = self._structure() if self.is_structure else self._body()
         self.forcing = self.table(Forcing, "forcing")
-        self.stops: tuple[Stop | None, ...] = tuple(
+        self.stops: tuple[OwnStop | None, ...] = tuple(
             self.variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
         )
         self.record = self.table(Record, "record", {})
@@ -121,6 +137,32 @@ class Draft(DraftTables):
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
         return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
+
+    @property
+    def is_structure(self) -> bool:
+        """Whether the scene has several bodies, or joins points of one."""
+        return is_structure(self.document)
+
+    def _structure(self) -> StructureBody | None:
+        documents = part_documents(self.document, self.problems)
+        self.parts = tuple(
+            Draft(part, axes_of_part(number, self.axes)) for number, part in enumerate(documents, start=1)
+        )
+        for number, draft in enumerate(self.parts, start=1):
+            self.problems += [of_part(number, problem) for problem in draft.problems]
+        self.names = named_bodies(self.document, self.problems)
+        self.links = tuple(self.read(LinkTable, *entry) for entry in self.entries("link"))
+        self.meetings = tuple(
+            self.variant(CONTACT_MODELS, "law", "restitution", *entry) for entry in self.entries("contact")
+        )
+        bodies = [draft.body for draft in self.parts]
+        names = [name for name in self.names if name is not None]
+        links = [link for link in self.links if link is not None]
+        whole = len(names) == len(bodies) and len(links) == len(self.links)
+        parts = tuple(body for body in bodies if body is not None and not isinstance(body, StructureBody))
+        if not whole or not parts or len(parts) < len(self.names):
+            return None
+        return StructureBody.model_construct(names=tuple(names), parts=parts, links=tuple(links))
 
     @property
     def sweeps_modes(self) -> bool:
@@ -143,9 +185,20 @@ class Draft(DraftTables):
             if axis.key == text:
                 return axis.lowest, axis.highest
         key = numeric_key(text)
-        owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
-        number = number_of(owner, key)
+        number = number_of(self._owner(key), key)
         return None if number is None else (number, number)
+
+    def _owner(self, key: Key) -> object:
+        """Return the table of a key; None if it is invalid."""
+        if key.place is None:
+            return getattr(self, key.table)
+        arrays: dict[str, Sequence[object]] = {
+            "stop": self.stops,
+            "contact": self.meetings,
+            "link": self.links,
+            "body": [draft.body for draft in self.parts],
+        }
+        return arrays[key.table][key.place]
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -217,3 +217,22 @@ def fmu_variables_of(model: type[BaseModel]) -> tuple[FmuVariable, ...]:
         for name, field in model.model_fields.items()
         if (rule := _written_rule(field)).fmu
     )
+
+
+def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
+    """Return the numbers of a table of a scene by their variable names in the FMU, SI.
+
+    Fields without a value and without a default are left out. `size` is the number of elements of each array (masses or
+    modes). A single number holds for all elements; missing elements at the end of a list are 0.
+    """
+    parameters: dict[str, float] = {}
+    for variable in fmu_variables_of(type(table)):
+        value = getattr(table, variable.key)
+        if value is None or (variable.is_told_if_given and variable.attribute not in table.model_fields_set):
+            continue
+        if not variable.is_array:
+            parameters[variable.name] = value
+            continue
+        each = value + (0.0,) * (size - len(value)) if isinstance(value, tuple) else (value,) * size
+        parameters |= {f"{variable.name}[{number}]": one for number, one in enumerate(each, start=1)}
+    return parameters

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
 from vibroimpact.orchestrator.scene.fields import field_name, field_of, is_whole, known_keys, numeric_keys
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing
+from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS, Execution, Forcing
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),
@@ -24,26 +24,32 @@ _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "noise": (Noise,),
     "daq": (Daq,),
     "stop": tuple(STOP_MODELS.values()),
+    "link": (LinkTable,),
+    "contact": tuple(CONTACT_MODELS.values()),
     "execution": (Execution,),
 }
 CHAIN_TABLES = ("load_cell", "exciter", "noise", "daq")
 """Tables of a measuring chain, except `sensor`, which other scenes have, too."""
 SINGLE_TABLES = ("body", "forcing", "sensor", *CHAIN_TABLES)
-"""Tables with numbers that a scene has at most once."""
+"""Tables with numbers that a scene has at most once; it has several of `body` only as `[[body]]`."""
+ARRAY_TABLES = ("body", "stop", "link", "contact")
+"""Tables with numbers of which a scene may have several: `[[body]]`, `[[stop]]`."""
 SWEEPABLE: dict[str, tuple[str, ...]] = {
     table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
     for table, models in _MODELS.items()
 }
 """The numbers that a sweep may vary, by table."""
 MODES = "body.modes"
-START_STATE = ("body.displacement_start", "body.velocity_start")
+START_STATE = (".displacement_start", ".velocity_start")
+"""Last parts of the keys of a start state."""
 
 # The second key of each pair overrides the first in its model, so setting the first must clear the second.
 OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
 ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
 """Alternative keys of one table for the same quantity; a scene gives one of each pair."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
-_KEY = re.compile(rf"(?:({'|'.join(SINGLE_TABLES)}|execution)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
+_OWNER = rf"(?:({'|'.join(SINGLE_TABLES)}|execution)|({'|'.join(ARRAY_TABLES)}){_NUMBER})"
+_KEY = re.compile(rf"{_OWNER}\.([a-z_]+)(?:{_NUMBER})?")
 
 
 class Key(NamedTuple):
@@ -85,9 +91,9 @@ def parse_key(text: str) -> Key | None:
     match = _KEY.fullmatch(text)
     if match is None:
         return None
-    table, stop, number, name, element = match.groups()
+    table, array, number, name, element = match.groups()
     return Key(
-        table or stop, int(number) - 1 if number else None, name, int(element) - 1 if element else None
+        table or array, int(number) - 1 if number else None, name, int(element) - 1 if element else None
     )
 
 

@@ -9,7 +9,8 @@ The tables of a measuring chain, a replay and a sweep are in `measuring_models`,
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, get_args
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
@@ -92,6 +93,13 @@ def location_rule(doc: str, default: str) -> Rule:
     return Rule(hint=hint, doc=doc, default=default)
 
 
+Point = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]*$")]
+POINT_RULE = Rule(
+    "a point of a body, in quotes",
+    item="a point of a body, in quotes",
+    hint='For example "ball", "chain.2" or "beam.tip".',
+)
+
 _CONSTANT = "Use 0 for a constant force."
 
 
@@ -143,6 +151,14 @@ class Forcing(SceneTable):
             'point of a beam where a `"force"` acts; not a supported end', "the free tip, or the middle"
         ),
     ] = None
+    at: Annotated[
+        Point | None,
+        replace(
+            POINT_RULE,
+            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`',
+            default="required there",
+        ),
+    ] = None
     mode: Annotated[
         ModeNumber | None,
         Rule(
@@ -169,6 +185,8 @@ class Forcing(SceneTable):
 class StopTable(SceneTable):
     """Base of `[[stop]]`: the place of a stop."""
 
+    between: ClassVar[tuple[str, ...]] = ()
+
     position: Annotated[Finite, Rule(unit="m", fmu="contact[k].position")]
     side: Annotated[
         Literal["upper", "lower"],
@@ -188,10 +206,49 @@ class StopTable(SceneTable):
             "the tip; required where the far end is supported",
         ),
     ] = None
+    at: Annotated[
+        Point | None,
+        replace(
+            POINT_RULE,
+            doc='several bodies: the point that the stop limits, such as `"ball"` or `"chain.2"`',
+            default="required there",
+        ),
+    ] = None
 
 
-class RestitutionStop(StopTable):
-    """`[[stop]]`: a rigid stop; an impact multiplies the velocity by -restitution."""
+class ContactTable(SceneTable):
+    """Base of `[[contact]]` of a scene with `[[body]]`: two points that hit each other.
+
+    The displacement of a contact is the first point's minus the second's, with a stop above it at the clearance.
+    """
+
+    side: ClassVar[Literal["upper"]] = "upper"
+    mass: ClassVar[None] = None
+    location: ClassVar[None] = None
+    at: ClassVar[None] = None
+
+    between: Annotated[
+        tuple[Point, ...],
+        Field(strict=False, min_length=2, max_length=2),
+        replace(
+            POINT_RULE,
+            expected='two points of bodies such as ["ball", "beam.tip"]',
+            doc="two points, of two bodies or of one; the gap is the clearance, plus the displacement of the second "
+            "point, minus the displacement of the first",
+        ),
+    ]
+    clearance: Annotated[
+        Finite, Rule(unit="m", fmu="contact[k].position", doc="gap while both displacements are 0")
+    ] = 0.0
+
+    @property
+    def position(self) -> float:
+        """Position of the stop that limits the relative displacement, m: the clearance."""
+        return self.clearance
+
+
+class RestitutionLaw(SceneTable):
+    """A rigid contact; an impact multiplies the velocity by -restitution."""
 
     law: Annotated[Literal["restitution"], Rule()] = "restitution"
     restitution: Annotated[
@@ -212,8 +269,8 @@ class RestitutionStop(StopTable):
     ] = 0.0
 
 
-class KelvinVoigtStop(StopTable):
-    """`[[stop]]`: a spring and a dashpot in parallel, which never pull."""
+class KelvinVoigtLaw(SceneTable):
+    """A spring and a dashpot in parallel, which never pull."""
 
     law: Annotated[Literal["kelvin_voigt"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m", fmu="contact[k].stiffness")]
@@ -229,20 +286,52 @@ class KelvinVoigtStop(StopTable):
     ] = 0.0
 
 
-class HertzStop(StopTable):
-    """`[[stop]]`: an elastic ball, force = stiffness penetration^1.5."""
+class HertzLaw(SceneTable):
+    """An elastic ball, force = stiffness penetration^1.5."""
 
     law: Annotated[Literal["hertz"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m^1.5", fmu="contact[k].stiffness")]
 
 
-class HuntCrossleyStop(StopTable):
-    """`[[stop]]`: force = stiffness penetration^exponent (1 + damping rate); it never pulls."""
+class HuntCrossleyLaw(SceneTable):
+    """Force = stiffness penetration^exponent (1 + damping rate); it never pulls."""
 
     law: Annotated[Literal["hunt_crossley"], Rule()]
     stiffness: Annotated[Positive, Rule(unit="N/m^exponent", fmu="contact[k].stiffness")]
     damping: Annotated[NotNegative, Rule(unit="s/m", hint=FEEDS_ENERGY, fmu="contact[k].damping")] = 0.0
     exponent: Annotated[Finite, Field(ge=1, le=10), Rule(fmu="contact[k].exponent")] = 1.5
+
+
+class RestitutionStop(RestitutionLaw, StopTable):
+    """`[[stop]]`: a rigid stop."""
+
+
+class KelvinVoigtStop(KelvinVoigtLaw, StopTable):
+    """`[[stop]]`: a spring beside a dashpot."""
+
+
+class HertzStop(HertzLaw, StopTable):
+    """`[[stop]]`: an elastic ball."""
+
+
+class HuntCrossleyStop(HuntCrossleyLaw, StopTable):
+    """`[[stop]]`: a ball that loses energy."""
+
+
+class RestitutionContact(RestitutionLaw, ContactTable):
+    """`[[contact]]`: two rigid points."""
+
+
+class KelvinVoigtContact(KelvinVoigtLaw, ContactTable):
+    """`[[contact]]`: a spring beside a dashpot between two points."""
+
+
+class HertzContact(HertzLaw, ContactTable):
+    """`[[contact]]`: two elastic spheres."""
+
+
+class HuntCrossleyContact(HuntCrossleyLaw, ContactTable):
+    """`[[contact]]`: two spheres that lose energy."""
 
 
 class TimeSeries(SceneTable):
@@ -384,12 +473,20 @@ class Execution(SceneTable):
     ] = None
 
 
-Stop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop
+OwnStop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop
+Contact = RestitutionContact | KelvinVoigtContact | HertzContact | HuntCrossleyContact
+Stop = OwnStop | Contact
+"""Everything that limits a motion: a stop, or another point of the bodies."""
 
-STOP_MODELS: dict[str, type[Stop]] = {
-    get_args(model.model_fields["law"].annotation)[0]: model for model in get_args(Stop)
+STOP_MODELS: dict[str, type[OwnStop]] = {
+    get_args(model.model_fields["law"].annotation)[0]: model for model in get_args(OwnStop)
 }
 """Models of `[[stop]]` by contact law; the core has each law under the same name."""
+
+CONTACT_MODELS: dict[str, type[Contact]] = {
+    get_args(model.model_fields["law"].annotation)[0]: model for model in get_args(Contact)
+}
+"""Models of `[[contact]]` of a scene with `[[body]]`, by contact law."""
 
 LAWS_THAT_YIELD = listed(
     [f'"{law}"' for law, model in STOP_MODELS.items() if model is not RestitutionStop], "or"

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from itertools import chain
+from operator import is_
 from pathlib import Path
 from typing import Any, Literal, Self, cast
 
@@ -24,7 +25,7 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.scene.body_models import Body
+from vibroimpact.orchestrator.scene.body_models import Body, LinkTable, OneBody, StructureBody
 from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, is_step
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.keys import (
@@ -42,9 +43,17 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import (
+    ContactTable,
+    Execution,
+    Forcing,
+    Record,
+    SceneTable,
+    Stop,
+)
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
+from vibroimpact.orchestrator.scene.several_bodies import is_left_out
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
 _NAMED_BY_FORM = ("bodies", "contacts", "connections", "events", "declared_units", "doubts", "remarks")
@@ -81,6 +90,9 @@ class Parts(SceneTable):
         document: dict[str, Any] = serialized(self)
         parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
         if self.is_one_body:
+            for table in (document["forcing"], *parts["contacts"]):
+                if table and table.get("at", "") is None:
+                    del table["at"]  # so that campaigns of versions without it go on
             return document | {"body": parts["bodies"][0], "stops": parts["contacts"], "general": None}
         document["record"]["time_series"] = None
         return document | {"body": None, "stops": [], "general": self._components_document()}
@@ -113,7 +125,7 @@ class Parts(SceneTable):
 
     @property
     def is_one_body(self) -> bool:
-        """Whether the scene has one body of the package with its own stops, not components of any FMUs."""
+        """Whether the scene has one body, or one structure, of the package with its stops, not components."""
         return not isinstance(self.bodies[0], ComponentSpec)
 
     @property
@@ -141,8 +153,15 @@ class Parts(SceneTable):
 
     @property
     def stops(self) -> tuple[Stop, ...]:
-        """The stops of the body; none in a scene of components."""
+        """The stops of the body, then the contacts of its points; none in a scene of components."""
         return cast(tuple[Stop, ...], self.contacts) if self.is_one_body else ()
+
+    @property
+    def stop_keys(self) -> tuple[str, ...]:
+        """The key of the table of each of `stops`: `stop[1]`, `contact[1]`."""
+        own = sum(not isinstance(stop, ContactTable) for stop in self.stops)
+        numbers = range(1, len(self.stops) + 1)
+        return tuple(f"stop[{n}]" if n <= own else f"contact[{n - own}]" for n in numbers)
 
     @property
     def meetings(self) -> tuple[StopContactSpec | PairSpec, ...]:
@@ -281,9 +300,20 @@ class Parts(SceneTable):
             if parts.element is not None:
                 self._number(key, parts, owner)
             tables[parts.owner] = owner.model_copy(update=replacement(owner, parts, value))
-        others = {name: tables.pop(name) for name in (*SINGLE_TABLES, "execution")}
-        bodies = (others.pop("body"),)
-        return self.model_copy(update={**others, "bodies": bodies, "contacts": tuple(tables.values())})
+        others = {name: tables.pop(name) for name in (*SINGLE_TABLES[1:], "execution")}
+        contacts = tuple(tables[name] for name in self.stop_keys)
+        return self.model_copy(update={**others, "bodies": (self._body_of(tables),), "contacts": contacts})
+
+    def _body_of(self, tables: Mapping[str, BaseModel | None]) -> Body:
+        """Return the body whose numbers are in tables by their names in keys."""
+        body = self.body
+        if not isinstance(body, StructureBody):
+            return cast(Body, tables["body"])
+        parts = [cast(OneBody, tables[f"body[{n}]"]) for n in range(1, len(body.parts) + 1)]
+        links = [cast(LinkTable, tables[f"link[{n}]"]) for n in range(1, len(body.links) + 1)]
+        if all(map(is_, (*parts, *links), (*body.parts, *body.links))):
+            return body  # with the modes that it has found
+        return body.with_numbers(parts, links)
 
     def _of_components_at(self, values: Mapping[str, float]) -> Self:
         new = self._component_numbers().at(values)
@@ -309,13 +339,16 @@ class Parts(SceneTable):
         if not self.is_one_body:
             return self._component_numbers().numbers()
         tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
-        return chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
+        found = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
+        return ((key, number) for key, number in found if not is_left_out(key))
 
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables with numbers, by their name in keys."""
-        stops: dict[str, BaseModel | None] = {
-            f"stop[{n}]": stop for n, stop in enumerate(self.stops, start=1)
-        }
-        tables = {name: getattr(self, name) for name in SINGLE_TABLES if name != "body"}
-        body = {"body": self.body} if self.is_one_body else {}
-        return {**stops, **body, **tables, "execution": self.execution}
+        found: dict[str, BaseModel | None] = dict(zip(self.stop_keys, self.stops, strict=True))
+        if self.is_one_body and isinstance(self.body, StructureBody):
+            found |= {f"body[{n}]": part for n, part in enumerate(self.body.parts, start=1)}
+            found |= {f"link[{n}]": link for n, link in enumerate(self.body.links, start=1)}
+        elif self.is_one_body:
+            found["body"] = self.body
+        found |= {name: getattr(self, name) for name in SINGLE_TABLES if name != "body"}
+        return {**found, "execution": self.execution}

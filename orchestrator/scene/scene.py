@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.scene.keys import coordinate_name, is_missing, wit
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
+from vibroimpact.orchestrator.scene.several_bodies import with_one_body
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.tables import read_tables
 from vibroimpact.orchestrator.scene.views import ViewedScene
@@ -48,10 +49,10 @@ class Scene(ViewedScene, Parts):
         Title of the scene; may be empty.
     units : {"SI", "nondimensional"}
         System of units of all numbers.
-    bodies : tuple of OscillatorBody, ChainBody or BeamBody, or of ComponentSpec
-        One body of the package; or the components, of any FMUs, in the order of the file.
-    contacts : tuple of stops, or of StopContactSpec and PairSpec
-        The stops of the body; or the contacts between components. In the order of the file.
+    bodies : tuple of OscillatorBody, ChainBody, BeamBody or StructureBody, or of ComponentSpec
+        One body of the package, or several as one structure; or the components, of any FMUs, in the order of the file.
+    contacts : tuple of stops and contacts, or of StopContactSpec and PairSpec
+        The stops of the body, then contacts of its points; or contacts between components. In the order of the file.
     connections : tuple of ConnectionSpec
         Connections from outputs to inputs of components.
     events : tuple of EventSpec
@@ -299,7 +300,7 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     changed: tuple[str, ...] = ()
     if changes:
         written, changed = changed_document(written, changes)
-    document = with_resting_start(written) if for_orbits else written
+    document = with_one_body(with_resting_start(written) if for_orbits else written)
     fields, problems = read_tables(document, Path(source).parent)
     if problems:
         raise SceneError(lines_of(problems, source, changed))

@@ -18,8 +18,15 @@ from vibroimpact.orchestrator.scene.fields import (
     known_keys,
     rule_of,
 )
-from vibroimpact.orchestrator.scene.keys import SINGLE_TABLES, SWEEPABLE, model_of, numeric_key, parse_key
-from vibroimpact.orchestrator.scene.models import STOP_MODELS
+from vibroimpact.orchestrator.scene.keys import (
+    ARRAY_TABLES,
+    SINGLE_TABLES,
+    SWEEPABLE,
+    model_of,
+    numeric_key,
+    parse_key,
+)
+from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -27,6 +34,7 @@ from vibroimpact.orchestrator.scene.problems import (
     quoted,
     value_problem,
 )
+from vibroimpact.orchestrator.scene.several_bodies import is_left_out
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.sweep_axes import FORMS, SAMPLE, axes_of, read_axis_table
 from vibroimpact.orchestrator.scene.sweep_models import AxisTable
@@ -86,19 +94,22 @@ def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
 
 
 def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the tables with numbers, by name; the array `stop` as `stop[1]`, `stop[2]`, ..."""
+    """Yield the tables with numbers, by name; an array such as `stop` as `stop[1]`, `stop[2]`, ..."""
     for name in SINGLE_TABLES:
-        if name in document:
+        if name in document and not isinstance(document[name], list):
             yield name, document[name]
     yield "execution", document.get("execution", {})
-    for number in range(1, _stop_count(document) + 1):
-        yield f"stop[{number}]", document["stop"][number - 1]
+    for name in ARRAY_TABLES:
+        for number in range(1, _count(document, name) + 1):
+            yield f"{name}[{number}]", document[name][number - 1]
 
 
 def _keys_in(name: str, table: Any) -> Iterator[str]:
     model = _model_of(name, table)
     for word in SWEEPABLE[name.partition("[")[0]]:
         if model is not None and word not in known_keys(model):
+            continue
+        if is_left_out(f"{name}.{word}"):
             continue
         written = table.get(word) if isinstance(table, dict) else None
         if isinstance(written, list):
@@ -110,28 +121,31 @@ def _keys_in(name: str, table: Any) -> Iterator[str]:
 def _model_of(name: str, table: Any) -> type[BaseModel] | None:
     """Return the model of a table; None if its kind or law is unknown."""
     written = table if isinstance(table, dict) else {}
-    if name == "body":
+    table = name.partition("[")[0]
+    if table == "body":
         return BODY_MODELS.get(str(written.get("kind", "oscillator")))
-    if name.startswith("stop"):
-        return STOP_MODELS.get(str(written.get("law", "restitution")))
-    return model_of(name)
+    if table in ("stop", "contact"):
+        models: Mapping[str, type[BaseModel]] = STOP_MODELS if table == "stop" else CONTACT_MODELS
+        return models.get(str(written.get("law", "restitution")))
+    return model_of(table)
 
 
-def _stop_count(document: Mapping[str, Any]) -> int:
-    stops = document.get("stop", [])
-    return len(stops) if isinstance(stops, list) else 0
+def _count(document: Mapping[str, Any], name: str) -> int:
+    tables = document.get(name, [])
+    return len(tables) if isinstance(tables, list) else 0
 
 
 def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list[str]) -> str:
     if isinstance(entry, dict) and text in SWEEPABLE and entry:
         return f'Put the whole key in quotes: "{text}.{next(iter(entry))}".'
     table = text.partition(".")[0].partition("[")[0]
-    if table == "stop" and table in document:
-        key, count = parse_key(text), _stop_count(document)
+    if table in ARRAY_TABLES and isinstance(document.get(table), list):
+        key, count = parse_key(text), _count(document, table)
         if key is None or key.place is None or key.place >= count:
-            return f'Indices start at 1 and this scene has {count} [[stop]]: for example "stop[1].position".'
+            example = f"{table}[1].{SWEEPABLE[table][0]}"
+            return f'Indices start at 1 and this scene has {count} [[{table}]]: for example "{example}".'
     if table in SWEEPABLE and table not in (*document, "execution"):
-        return f"This scene has no {'[[stop]]' if table == 'stop' else f'[{table}]'}."
+        return f"This scene has no {f'[[{table}]]' if table in ARRAY_TABLES[1:] else f'[{table}]'}."
     return _element_hint(text, document, known) or _nearest_key(text, known)
 
 

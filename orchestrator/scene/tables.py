@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene.rules.scene import rule_problems
 from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep
 
-_SHORT_TABLES = ("body", "forcing", "stop", "sensor", "replay")
+_SHORT_TABLES = ("body", "link", "forcing", "stop", "sensor", "replay")
 _GENERAL_TABLES = ("component", "connection", "contact", "event")
 _COMMON_TABLES = ("record", "sweep", "execution")
 
@@ -23,9 +23,11 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
     """Return the parts of a scene, empty if there is a problem, and all problems of its tables."""
     general = [name for name in _GENERAL_TABLES if name in document]
     short = [name for name in _SHORT_TABLES if name in document]
+    if general == ["contact"] and "body" in document:
+        general, short = [], [*short, "contact"]  # points of bodies of the short form
     if general and short:
         return {}, [_mixed_problem(general, short)]
-    own = _GENERAL_TABLES if general else (*_SHORT_TABLES, *CHAIN_TABLES)
+    own = _GENERAL_TABLES if general else (*_SHORT_TABLES, "contact", *CHAIN_TABLES)
     unknown = list(_table_problems(document, ("scene", *own, *_COMMON_TABLES)))
     if general:
         # the import of model descriptions takes time, and the short form does not need it
@@ -57,7 +59,7 @@ def _parts(draft: Draft) -> dict[str, Any]:
     assert draft.record is not None
     return {
         "bodies": (draft.body,),
-        "contacts": draft.stops,
+        "contacts": (*draft.stops, *draft.meetings),
         "record": _applicable(draft.record),
         "sweep": draft.axes + (draft.replay.axes if draft.replay else ()),
         **{

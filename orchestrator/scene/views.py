@@ -43,11 +43,13 @@ def _parts(document: Mapping[str, Any]) -> str:
     """
     if "component" in document:
         said = [f"components {', '.join(document['component'])}"]
+    elif isinstance(document["body"], list):
+        said = [f"bodies {', '.join(str(body['name']) for body in document['body'])}"]
     else:
         said = [str(document["body"].get("kind", "oscillator"))]
     said += ["forced"] if "forcing" in document else []
     said += ["driven by recordings"] if "replay" in document else []
-    for name in ("stop", "contact", "connection"):
+    for name in ("link", "stop", "contact", "connection"):
         count = len(document.get(name, ()))
         said += [f"{count} {name}{'' if count == 1 else 's'}"] if count else []
     return ", ".join(said)

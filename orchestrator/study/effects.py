@@ -122,9 +122,11 @@ def effects_of(scene: Scene) -> list[Effect]:
 def _found(scene: Scene) -> Iterator[Effect | None]:
     if scene.is_one_body:
         yield from _of_numbers(scene)
-        for number, (key, law) in enumerate(laws(scene).items()):
-            yield _without(scene, f"{law} stop", key, _removes("stop", number))
-        if scene.body.ELEMENT == "mode" and scene.body.size > 1:
+        links = range(1, len(parse_toml(scene.text).get("link", ())) + 1)
+        for key, what in (laws(scene) | {f"link[{number}]": "" for number in links}).items():
+            table, _, place = key.removesuffix("]").partition("[")
+            yield _without(scene, f"{what} {table}".strip(), key, _removes(table, int(place) - 1))
+        if scene.body.ELEMENT == "mode" and hasattr(scene.body, "modes") and scene.body.size > 1:
             half = scene.body.size // 2
             yield _without(
                 scene, f"modes {half + 1} to {scene.body.size}", "body.modes", _sets("body", "modes", half)

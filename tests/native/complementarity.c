@@ -65,10 +65,12 @@ static void check_order(uint64_t *seed, int n, double g[VI_PORTS][VI_PORTS], con
     }
 }
 
+enum { PROBLEMS = VI_PORTS > 8 ? 500 : 50000 };
+
 static void random_problems(uint64_t *seed)
 {
     double g[VI_PORTS][VI_PORTS], b[VI_PORTS], p[VI_PORTS];
-    for (int run = 0; run < 50000; ++run) {
+    for (int run = 0; run < PROBLEMS; ++run) {
         const int n = 1 + (int)choice(seed, VI_PORTS);
         const double largest = random_matrix(seed, n, VI_PORTS, g), scale = pow(10.0, uniform(seed, -12.0, 12.0));
         const double own = choice(seed, 2) == 0 ? 1.0 : 1e-4;
@@ -86,7 +88,7 @@ static void random_problems(uint64_t *seed)
 static void redundant_contacts(uint64_t *seed)
 {
     double g[VI_PORTS][VI_PORTS], b[VI_PORTS], p[VI_PORTS];
-    for (int run = 0; run < 50000; ++run) {
+    for (int run = 0; run < PROBLEMS; ++run) {
         const int n = 2 + (int)choice(seed, VI_PORTS - 1), rank = 1 + (int)choice(seed, (unsigned)n - 1u);
         random_matrix(seed, n, rank, g);
         double c[VI_PORTS];

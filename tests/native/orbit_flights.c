@@ -3,6 +3,8 @@
 #include "door/orbits.h"
 
 #include <math.h>
+#include <stdbool.h>
+#include <string.h>
 
 #include "check.h"
 #include "door/orbit_maximum.h"
@@ -20,6 +22,11 @@ typedef struct {
     int32_t contact[IMPACTS];
     double phase[IMPACTS];
 } orbit_case;
+
+/* Damping between the modes of the present case, with its complex modes. */
+static double damping[MODES * MODES];
+static vi_orbit_coupling coupling;
+static vi_coupled_work work;
 
 static double random_ratio(uint64_t *seed)
 {
@@ -74,9 +81,92 @@ static void draw(uint64_t *seed, orbit_case *drawn)
     }
 }
 
+/* Let dashpots between random points couple the modes. */
+static void couple(uint64_t *seed, orbit_case *drawn)
+{
+    vi_orbit_body *body = &drawn->body;
+    const int modes = body->modes;
+    for (int j = 0; j < modes * modes; ++j) {
+        damping[j] = 0.0;
+    }
+    for (int dashpot = 0; dashpot < 1 + (int)choice(seed, MODES); ++dashpot) {
+        double at[MODES];
+        for (int j = 0; j < modes; ++j) {
+            at[j] = uniform(seed, -1.0, 1.0);
+        }
+        for (int j = 0; j < modes * modes; ++j) {
+            damping[j] += at[j / modes] * at[j % modes];
+        }
+    }
+    for (int j = 0; j < modes; ++j) {
+        drawn->damping_ratio[j] = damping[j * modes + j] / (2.0 * drawn->natural[j]);
+    }
+    if (choice(seed, 3) == 0) { /* next to critical damping of one mode, or at it */
+        const double off[] = {0.0, 1e-12, 1e-9, 1e-6, 1e-3};
+        for (int i = 1; i < modes; ++i) {
+            damping[i] = damping[i * modes] = 0.0;
+        }
+        damping[0] = 2.0 * drawn->natural[0] * (1.0 + off[choice(seed, 5)]);
+        drawn->damping_ratio[0] = damping[0] / (2.0 * drawn->natural[0]);
+    }
+    CHECK(vi_door_orbit_couple(modes, body->angular_frequency, body->natural, damping, body->cosine, body->sine,
+                               &coupling, &work) == 0,
+          "%d modes", modes);
+    body->coupling = &coupling;
+}
+
+/* Coefficient n + 1 of the powers of time in the motion of coupled modes, from the coefficient n. */
+static void next_coefficient(const vi_orbit_body *body, double n, double x[], double v[], double force[])
+{
+    const int modes = body->modes;
+    double faster[MODES];
+    for (int j = 0; j < modes; ++j) {
+        faster[j] = force[j] - body->natural[j] * body->natural[j] * x[j];
+        for (int i = 0; i < modes; ++i) {
+            faster[j] -= damping[j * modes + i] * v[i];
+        }
+    }
+    for (int j = 0; j < modes; ++j) {
+        x[j] = v[j] / (n + 1.0);
+        v[j] = faster[j] / (n + 1.0);
+    }
+}
+
+/* The same for modes that are coupled, by power series over short steps. */
+static void fly_coupled(const vi_orbit_body *body, const double state[], double phase, double u, double end[])
+{
+    const int modes = body->modes, steps = 1 + (int)(u * 24.0);
+    const double w = body->angular_frequency, h = u / steps;
+    memcpy(end, state, (size_t)(2 * modes) * sizeof *end);
+    for (int step = 0; step < steps; ++step) {
+        double x[MODES], v[MODES], power = h, turned = 1.0; /* h^(n + 1), w^n / n! */
+        memcpy(x, end, (size_t)modes * sizeof *x);
+        memcpy(v, end + modes, (size_t)modes * sizeof *v);
+        for (int n = 0; n < 30; ++n) {
+            double force[MODES];
+            const double angle = phase + w * h * step + 0.25 * TURN * n; /* each derivative turns by a quarter */
+            for (int j = 0; j < modes; ++j) {
+                force[j] = turned * (body->cosine[j] * cos(angle) + body->sine[j] * sin(angle))
+                           + (n == 0 ? body->held[j] : 0.0);
+            }
+            next_coefficient(body, n, x, v, force);
+            for (int j = 0; j < modes; ++j) {
+                end[j] += x[j] * power;
+                end[modes + j] += v[j] * power;
+            }
+            turned *= w / (n + 1.0);
+            power *= h;
+        }
+    }
+}
+
 /* Fly all modes from `state` at `phase` for u seconds, on the core's exact flow. */
 static void fly(const vi_orbit_body *body, const double state[], double phase, double u, double end[])
 {
+    if (body->coupling) {
+        fly_coupled(body, state, phase, u, end);
+        return;
+    }
     for (int j = 0; j < body->modes; ++j) {
         const double natural = body->natural[j], c = body->cosine[j], s = body->sine[j];
         const double angle = phase - atan2(s, c);
@@ -219,7 +309,7 @@ static void check_maximum(const orbit_case *drawn, const double state[])
     }
 }
 
-static int check_random_orbits(uint64_t *seed, int count)
+static int check_random_orbits(uint64_t *seed, int count, bool coupled)
 {
     int evaluated = 0;
     for (int each = 0; each < count; ++each) {
@@ -227,6 +317,9 @@ static int check_random_orbits(uint64_t *seed, int count)
         double velocity[IMPACTS], distance[IMPACTS], slopes[IMPACTS * IMPACTS], faster[IMPACTS * IMPACTS];
         double state[IMPACTS * 2 * MODES], monodromy[4 * MODES * MODES];
         draw(seed, &drawn);
+        if (coupled) {
+            couple(seed, &drawn);
+        }
         const int end = vi_door_orbit(&drawn.body, &drawn.train, velocity, distance, slopes, faster);
         CHECK(end == VI_ORBIT_DONE, "case %d: %d", each, end);
         if (largest(velocity, drawn.train.impacts) > 1e3) {
@@ -235,7 +328,7 @@ static int check_random_orbits(uint64_t *seed, int count)
         ++evaluated;
         CHECK(vi_door_orbit_motion(&drawn.body, &drawn.train, velocity, state, monodromy) == VI_ORBIT_DONE, "motion");
         check_flights(&drawn, velocity, distance, state);
-        if (each % 4 == 0) {
+        if (each % (coupled ? 40 : 4) == 0) {
             check_maximum(&drawn, state);
         }
     }
@@ -310,8 +403,8 @@ static void check_refusals(uint64_t *seed)
 int main(void)
 {
     uint64_t seed = 17;
-    const int evaluated = check_random_orbits(&seed, 600);
-    CHECK(evaluated > 400, "only %d", evaluated);
+    const int evaluated = check_random_orbits(&seed, 600, false), coupled = check_random_orbits(&seed, 150, true);
+    CHECK(evaluated > 400 && coupled > 120, "only %d and %d", evaluated, coupled);
     orbit_case one;
     do {
         draw(&seed, &one);

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from support.kept import compiler_identity, content_of, digest, kept, remove_unused
 from support.places import ROOT
 
-from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers, is_part
+from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers, is_part, sizes
 from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, find_compiler
 from vibroimpact.fmus.packaging.description import read_component
 
@@ -33,9 +33,8 @@ PROBE = "int main(int count, char **names) { (void)names; return count - 1; }\n"
 LONGEST = ("one_mode.c", "budget.c", "pressed_flow.c")
 #: Longest run time of one test under the sanitizers, s; a longer test fails.
 LIMIT = 600.0
-#: Tests of bodies of one mode; they run on a core compiled for one mode, like the Oscillator's.
-OF_ONE_MODE = ("one_mode.c",)
-ONE_MODE = ("-DVI_MODES=2", "-DVI_PORTS=2", "-DVI_ONLY_MODES=1")
+#: Tests of bodies of one mode or of many contacts. Each runs on a core compiled for them, like that of a component.
+OWN_CORES = {"one_mode.c": "oscillator", "many_contacts.c": "structure"}
 ENVIRONMENT = {**os.environ, "UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1"}
 
 
@@ -92,21 +91,31 @@ def supported_sanitizers(compiler: Sequence[str]) -> tuple[str, ...]:
 def options_for(sanitizers: Sequence[str]) -> tuple[str, ...]:
     """Return the compiler options for the core and the tests."""
     options = [*LANGUAGE, *WARNINGS, "-Werror", "-g1", "-O1"]
-    options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", fmi_headers())]
+    options += [
+        f"-I{folder}"
+        for folder in (NATIVE / "core", NATIVE / "adapters", NATIVE / "structure", fmi_headers())
+    ]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
     return tuple(options)
 
 
-def core_sources(of_one_mode: bool) -> list[Path]:
-    """Return the sources of the core; for one mode, only the Oscillator's."""
-    oscillator = read_component(NATIVE / "oscillator" / "variables.toml")
-    core = NATIVE / "core"
-    return [
-        path
-        for path in sorted(core.rglob("*.c"))
-        if not of_one_mode or is_part(oscillator, path.relative_to(core))
-    ]
+@dataclass(frozen=True)
+class CoreKind:
+    """Sources of a core, and definitions of its sizes."""
+
+    sources: tuple[Path, ...]
+    sizes: tuple[str, ...] = ()
+
+
+def core_of(folder: str) -> CoreKind:
+    """Return the core of the component in a folder; for an empty name, the whole core."""
+    sources = tuple(sorted((NATIVE / "core").rglob("*.c")))
+    if not folder:
+        return CoreKind(sources)
+    component = read_component(NATIVE / folder / "variables.toml")
+    own = tuple(path for path in sources if is_part(component, path.relative_to(NATIVE / "core")))
+    return CoreKind(own, tuple(f"-D{name}={value}" for name, value in sizes(component).items()))
 
 
 def run(program: Path, name: str) -> None:
@@ -152,17 +161,18 @@ def in_order(tests: Iterable[Path]) -> list[Path]:
 def run_all(pool: ThreadPoolExecutor, compiler: tuple[str, ...], sanitizers: Sequence[str]) -> list[str]:
     """Compile and run all tests, print a line for each; return the names of failed tests."""
     options, failed = options_for(sanitizers), []
-    tools = {False: Toolchain(compiler, options), True: Toolchain(compiler, (*options, *ONE_MODE))}
-    objects = {kind: pool.map(tools[kind].object_of, core_sources(kind)) for kind in tools}
+    kinds = {folder: core_of(folder) for folder in ("", *OWN_CORES.values())}
+    tools = {folder: Toolchain(compiler, (*options, *kind.sizes)) for folder, kind in kinds.items()}
+    objects = {folder: pool.map(tools[folder].object_of, kind.sources) for folder, kind in kinds.items()}
     cores = {kind: list(found) for kind, found in objects.items()}
     running = {}
     for test in in_order(HERE.glob("*.c")):
-        kind = test.name in OF_ONE_MODE
+        kind = OWN_CORES.get(test.name, "")
         running[pool.submit(failure, test, tools[kind], cores[kind])] = test.name
     for future in as_completed(running):
         name, wrong = running[future], future.result()
-        kinds = ", ".join(sanitizers) or "no sanitizer"
-        print(f"{name} ({kinds}): {f'FAILED: {wrong}' if wrong else 'passed'}", flush=True)
+        used = ", ".join(sanitizers) or "no sanitizer"
+        print(f"{name} ({used}): {f'FAILED: {wrong}' if wrong else 'passed'}", flush=True)
         failed += [name] if wrong else []
     return failed
 

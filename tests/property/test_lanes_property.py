@@ -85,6 +85,41 @@ def test_every_instruction_set_and_every_cut_gives_the_same_bits(modes: int, con
         )
 
 
+@pytest.mark.parametrize(("modes", "contacts"), [(1, 2), (2, 1), (3, 2), (6, 3)])
+def test_modes_without_a_spring_do_in_lanes_what_the_scalar_engine_makes_of_them(
+    modes: int, contacts: int
+) -> None:
+    points = drawn(30, modes, contacts, seed=60 + 10 * modes + contacts)
+    points["stiffness"][0, :20] = points["stiffness"][-1, 15:25] = 0.0
+    loose = points["stiffness"] == 0.0
+    points["held"][loose] = 0.0
+    points["decay"][loose] *= np.broadcast_to(np.arange(30) % 2, loose.shape)[loose]
+    found = run(points, impact_limit=MOST)
+    places = np.flatnonzero(found.has_run & loose.any(axis=0))
+    assert len(places) >= 5
+    assert max(differences(points, found, int(place)) for place in places) <= FLIGHTS
+    for chosen in HERE:
+        assert run(points, impact_limit=MOST, instructions=chosen).same_as(found)
+
+
+def test_a_constant_force_on_a_mode_without_a_spring_brings_it_back_at_the_times_of_free_fall() -> None:
+    speed, restitution, load = 2.0, np.array([0.7, 0.8, 0.95]), 1.5
+    points = oscillators(
+        3, 0, 5, stiffness=0.0, decay=0.0, force=0.0, held=load, angular_frequency=TURN / 2.0, position=1.0,
+        restitution=restitution, start_q=0.0, start_p=-speed,
+    )  # fmt: skip
+    found = run(points)
+    first = math.hypot(speed, math.sqrt(2.0 * load))
+    assert found.has_run.all()
+    for rows, factor in zip(found.rows, restitution, strict=True):
+        impacts = rows[rows[:, 0] == IMPACT]
+        speeds = first * factor ** np.arange(len(impacts))
+        returns = np.cumsum(2.0 * speeds[1:] / load)
+        assert len(impacts) >= 3
+        assert impacts[:, 3] == pytest.approx(speeds, rel=1e-12)
+        assert impacts[:, 1] == pytest.approx((speed + first) / load + np.append(0.0, returns), rel=1e-13)
+
+
 @pytest.mark.parametrize(("contacts", "rigid"), YIELDING)
 def test_random_bodies_on_stops_that_yield_do_in_lanes_what_the_scalar_engine_makes_of_them(
     contacts: int, *, rigid: bool

@@ -22,24 +22,29 @@ STEP = 1e-6
 """Step of the central differences, over the size of the motion."""
 
 
+def matrix_of(elements: np.ndarray) -> np.ndarray:
+    """Return the matrix of the springs or the dashpots of a chain; its far end is free."""
+    between = elements[1:]
+    return np.diag(elements + np.append(between, 0.0)) - np.diag(between, 1) - np.diag(between, -1)
+
+
 class Chain:
-    """A chain with damping in proportion to the stiffness, whose last mass hits a stop above."""
+    """A chain whose last mass hits a stop above."""
 
     def __init__(
-        self, masses: list[float], springs: list[float], ratio: float, force: list[float], w: float
+        self, masses: list[float], springs: list[float], dashpots: list[float], force: list[float], w: float
     ) -> None:
         n = len(masses)
         self.masses, self.force, self.w = np.array(masses), np.array(force), w
-        wall = np.array(springs)
-        stiffness = np.diag(wall + np.append(wall[1:], 0.0)) - np.diag(wall[1:], 1) - np.diag(wall[1:], -1)
+        stiffness, damping = matrix_of(np.array(springs)), matrix_of(np.array(dashpots))
         inverse = np.diag(1.0 / self.masses)
         self.equations = np.zeros((2 * n + 2, 2 * n + 2))
         self.equations[:n, n : 2 * n] = np.eye(n)
         self.equations[n : 2 * n, :n] = -inverse @ stiffness
-        self.equations[n : 2 * n, n : 2 * n] = -ratio * inverse @ stiffness
+        self.equations[n : 2 * n, n : 2 * n] = -inverse @ damping
         self.equations[n : 2 * n, 2 * n] = inverse @ self.force
         self.equations[2 * n, 2 * n + 1], self.equations[2 * n + 1, 2 * n] = -w, w
-        self.modes = chain_modes(self.masses, np.append(wall, 0.0), np.append(ratio * wall, 0.0))
+        self.modes = chain_modes(self.masses, [*springs, 0.0], [*dashpots, 0.0])
 
     def body(self, position: float, restitution: float) -> ImpactingBody:
         """Return the chain in modal coordinates."""
@@ -47,7 +52,10 @@ class Chain:
         contact = Contact(shape, 1.0, position, restitution)
         force = self.force @ self.modes.shapes
         frequencies, ratios = self.modes.frequencies, self.modes.damping_ratios
-        return ImpactingBody(frequencies, ratios, force, 0.0 * force, self.w, 0.0, (contact,), shape)
+        coupling = None if self.modes.is_classical else self.modes.coupling
+        return ImpactingBody(
+            frequencies, ratios, force, 0.0 * force, self.w, 0.0, (contact,), shape, coupling
+        )
 
     def fly(self, state: np.ndarray, phase: float, u: float) -> np.ndarray:
         """Return the state after the time `u`."""
@@ -74,17 +82,19 @@ def chains(draw: st.DrawFn) -> Chain:
     masses, springs = ([draw(some) for _ in range(n)] for _ in range(2))
     force = [draw(st.floats(-1.0, 1.0)) for _ in range(n)]
     assume(max(map(abs, force)) > 0.1)
-    ratio = draw(st.one_of(st.floats(0.01, 0.3), st.floats(1.0, 4.0)))  # up to overdamped modes
-    return Chain(masses, springs, ratio, force, draw(st.floats(0.4, 2.5)))
+    damping = st.one_of(st.floats(0.01, 0.3), st.floats(1.0, 4.0))  # up to overdamped modes
+    ratio = draw(damping)
+    dashpots = [ratio * each for each in springs]
+    if draw(st.booleans()):  # damping that couples the modes, also undamped springs
+        dashpots = [draw(st.one_of(st.just(0.0), damping)) for _ in range(n)]
+        assume(max(dashpots) > 0.0)
+    return Chain(masses, springs, dashpots, force, draw(st.floats(0.4, 2.5)))
 
 
 def orbits(chain: Chain, share: float, restitution: float, periods: int) -> tuple[PeriodicOrbit, ...]:
     """Return the orbits of a chain whose stop is at a share of its steady amplitude."""
     free = chain.body(1.0, restitution)
-    response = free.force / (
-        free.frequencies**2 - chain.w**2 + 2j * free.damping_ratios * free.frequencies * chain.w
-    )
-    amplitude = abs(free.contacts[0].shape @ response)
+    amplitude = abs(free.contacts[0].shape @ free.steady(chain.w))
     assume(amplitude > 1e-3)
     found = closed_form(chain.body(share * amplitude, restitution), periods)
     # near a graze, multipliers grow without bound

@@ -196,4 +196,26 @@ BEAM = BodyScene(
     ],
     together={"length": -1.0, "damping_ratio[2]": -2.0, "contact[1].restitution": 3.0, "boundary": 9},
 )
-BODIES = (OSCILLATOR, CHAIN, BEAM)
+STRUCTURE = BodyScene(
+    "Structure",
+    {"forcing.amplitude": 0.5, "forcing.angular_frequency": 0.6},
+    position=0.1,
+    r=0.5,
+    end=60.0,
+    intervals=(0.1, 60.0),
+    fixed="forcing.phase",
+    load="force",
+    laws=[
+        {"forcing.angular_frequency": 0.2, "record.energies": True, **law}
+        for law in ({}, stop(0.1, law=KELVIN_VOIGT, stiffness=5.0))
+    ],
+    bad=[
+        *BAD_STRUCTURE,
+        ("modes", 0, "1 to 64"),
+        ("modes", 65, "1 to 64"),
+        ("forcing.base_acceleration", math.inf, "finite"),
+        ("force_rate", math.nan, "finite"),
+    ],
+    together={"forcing.phase": math.inf, "contact[1].restitution": 3.0, "contact[32].stiffness": -1.0},
+)
+BODIES = (OSCILLATOR, CHAIN, BEAM, STRUCTURE)

@@ -86,12 +86,13 @@ class ComponentFmu:
         event_mode: bool = False,
         early_return: bool = False,
         initialize: bool = True,
+        messages: list[str] | None = None,
     ) -> None:
         self.path = component if isinstance(component, Path) else fmu_path(component, version)
         folder, description = unpacked(self.path)
         self.version = version
         self.time = start_time
-        self.messages: list[str] = []
+        self.messages = [] if messages is None else messages
         self.needs_event = self.returned_early = False
         self._variables = {v.name: v for v in description.modelVariables}
         arguments: dict[str, Any] = {

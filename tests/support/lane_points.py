@@ -265,7 +265,11 @@ def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Struc
     """Run one of the points by the scalar engine of bodies of many modes, recorded from its start."""
     p = {name: array[..., place] for name, array in points.items()}
     natural = np.sqrt(p["stiffness"])
-    modes = Modes(natural, p["decay"] / natural, p["force"], float(p["angular_frequency"]), float(p["phase"]))
+    moves = natural > 0.0
+    ratio = np.where(moves, p["decay"] / np.where(moves, natural, 1.0), 0.0)
+    coupling = np.diag(2.0 * p["decay"]) if (p["decay"][~moves] > 0.0).any() else None
+    frequency, phase = float(p["angular_frequency"]), float(p["phase"])
+    modes = Modes(natural, ratio, p["force"], frequency, phase, coupling=coupling)
     stops = [
         Stop(
             p["shape"][k],

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from vibroimpact.orchestrator.scene import component_models, measuring_models, models, sweep_models
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE
 from vibroimpact.orchestrator.scene.replay_models import Replay
@@ -27,6 +27,8 @@ SHORT: Tables = {
     **{f"[body] kind = {kind}": model for kind, model in BODY_MODELS.items()},
     "[forcing]": models.Forcing,
     **{f"[[stop]] law = {law}": model for law, model in models.STOP_MODELS.items()},
+    "[[link]]": LinkTable,
+    **{f"[[contact]] of [[body]], law = {law}": model for law, model in models.CONTACT_MODELS.items()},
     "[sensor]": measuring_models.Sensor,
     "[load_cell]": measuring_models.LoadCell,
     "[exciter]": measuring_models.Exciter,

@@ -118,11 +118,6 @@ OF_AN_OSCILLATOR = [
         "[stop]",
         "stop: expected [[stop]] tables, got a table. Write [[stop]], with two brackets, for each stop.",
     ),
-    (
-        "[body]",
-        "[[body]]",
-        "body: expected a table, got an array of 1. Write [body], with single brackets, once.",
-    ),
 ]
 OF_A_CHAIN = [
     (

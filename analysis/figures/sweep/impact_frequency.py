@@ -65,7 +65,12 @@ def _shifted(dataset: xr.Dataset, swept: str, positions: Floats) -> tuple[Floats
     scene = scene_of(dataset.attrs)
     stops = scene.get("stop", [])
     body = table(scene, "body")
-    is_free = not table(scene, "forcing") and len(stops) == 1 and stops[0].get("side", "upper") == "upper"
+    is_free = (
+        isinstance(scene.get("body"), dict)
+        and not table(scene, "forcing")
+        and len(stops) == 1
+        and stops[0].get("side", "upper") == "upper"
+    )
     names = ("mass", "stiffness", "damping", "displacement_start", "velocity_start")
     if not (is_free and swept == "position" and body.get("kind", "oscillator") == "oscillator"):
         return None

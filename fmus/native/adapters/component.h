@@ -96,10 +96,11 @@ typedef struct {
     /* For a component that reads more resources than start values; otherwise all three are NULL. `open` reads them once
      * for an instance from the folder (NULL: no folder) and may allocate. It returns NULL, with the reason in
      * `message`, for invalid resources. `attach` hands them over after `defaults`, and with NULL before they are read.
-     * Resources are no part of the used size. */
+     * Resources are no part of the used size. `sized_by_resources`: this size follows from them. */
     void *(*open)(const char *folder, char message[VI_MESSAGE_LENGTH]);
     void (*attach)(void *self, const void *resources);
     void (*close)(void *resources);
+    bool sized_by_resources;
 
     /* NULL for a component of co-simulation only. */
     const vi_model_exchange *exchange;

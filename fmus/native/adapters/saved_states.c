@@ -82,7 +82,7 @@ bool vi_state_restore(vi_instance *instance, const char *function, const void *s
     if (saved == NULL || saved->size > vi_this_description.struct_size) {
         return vi_instance_fail(instance, function, "expected a saved state, got none");
     }
-    if (vi_this_component.attach != NULL && saved->size != used_size(instance)) {
+    if (vi_this_component.sized_by_resources && saved->size != used_size(instance)) {
         return vi_instance_fail(instance, function, "expected a state that fits the FMU's resources, got one of others");
     }
     if ((saved->exchange != 0) != instance->exchange) {

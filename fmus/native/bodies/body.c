@@ -56,6 +56,27 @@ static void sized(void *self, const char *block, int count)
     }
 }
 
+/* ---- resources: those of a body without a file are its table of functions, which tells that they are open ---- */
+
+static void *open_resources(const char *folder, char message[VI_MESSAGE_LENGTH])
+{
+    return form->open != NULL ? form->open(folder, message) : (void *)(uintptr_t)form;
+}
+
+static void attach(void *self, const void *resources)
+{
+    if (form->attach != NULL) {
+        form->attach(self, resources);
+    }
+}
+
+static void close_resources(void *resources)
+{
+    if (form->close != NULL) {
+        form->close(resources);
+    }
+}
+
 int vi_body_ports(const vi_body *c)
 {
     int ports = VI_PORTS;
@@ -365,5 +386,8 @@ const vi_component vi_this_component = {
     .used_size = used_size,
     .cache_size = CACHES,
     .sized = sized,
+    .open = open_resources,
+    .attach = attach,
+    .close = close_resources,
     .exchange = &vi_body_exchange,
 };

@@ -1,4 +1,4 @@
-/* The common part of Oscillator, Chain and Beam as components: stops and record, initialization, steps and energies.
+/* The common part of Oscillator, Chain, Beam and Structure as components: stops and record, initialization, steps and energies.
  * Such a component has its parameters, a vi_body at the end of its struct, and a table of its own functions,
  * `vi_this_body`, from which body.c makes `vi_this_component`. */
 #ifndef VIBROIMPACT_BODY_H
@@ -52,6 +52,10 @@ typedef struct {
     void (*defaults)(void *self);
     /* The model description has `count` of the repeated variables `block`; NULL: the component always has one mode. */
     void (*sized)(void *self, const char *block, int count);
+    /* Read further resources, as `vi_component` has it; all three are NULL for a body without. */
+    void *(*open)(const char *folder, char message[VI_MESSAGE_LENGTH]);
+    void (*attach)(void *self, const void *resources);
+    void (*close)(void *resources);
     /* Check the parameters, also with vi_body_check; set modes, shapes and impulses of `model`, and the modal start in
      * `state`. Returns false after complaining. */
     bool (*prepare)(void *self, char message[VI_MESSAGE_LENGTH]);

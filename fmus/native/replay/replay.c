@@ -113,4 +113,5 @@ const vi_component vi_this_component = {
     .open = open_recording,
     .attach = attach,
     .close = close_recording,
+    .sized_by_resources = true,
 };

@@ -211,6 +211,11 @@ class _LaneRun:
 
     # ---- points that the lanes leave out ----
 
+    @property
+    def _one_by_one(self) -> bool:
+        """Whether points that the lanes leave out need Python in between."""
+        return self._samples is not None or not self._loop.is_in_c
+
     def _left(self) -> Ints:
         return np.flatnonzero(self._state == core.PointState.is_left)
 
@@ -225,15 +230,15 @@ class _LaneRun:
         given = {
             int(place): self._given_state(place)
             for place in left
-            if self._samples is not None or self._values.starts or not own[place]
+            if self._one_by_one or self._values.starts or not own[place]
         }
         by_itself = [
             place
             for place, state in given.items()
-            if self._samples is not None or self._is_structure or (state is None and not own[place])
+            if self._one_by_one or self._is_structure or (state is None and not own[place])
         ]
         for place in by_itself:
-            if self._samples is not None and not self._loop.chained and time.perf_counter() > deadline:
+            if self._one_by_one and not self._loop.chained and time.perf_counter() > deadline:
                 return
             self._answer(np.array([place]), columns_of([self._alone(place, given[place])]))
         rest = left[~np.isin(left, by_itself)]

@@ -83,6 +83,7 @@ def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop 
         or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)
         or (chained and scene.body.IS_STRUCTURE and not by_lanes)
+        or (driver.sets_arrays and not by_lanes)
     ):
         return None
     return PointLoop(scene, driver, by_lanes=by_lanes)
@@ -98,12 +99,14 @@ class PointLoop:
         touch_downs = [f"{port}.{name}" for port in ports for name in TOUCH_DOWN]
         others = [f"{port}.{name}" for name in ("stick_start", "force") for port in ports]
         finals = (*OBSERVED, *state_variables(scene), *others, *touch_downs)
-        self.finals = (*finals, "natural_angular_frequency[1]") if scene.body.IS_STRUCTURE else finals
+        self.finals = (*finals, scene.body.SLOWEST) if scene.body.IS_STRUCTURE else finals
         self._kept: list[NDArray[Any]] = []  # keeps arrays alive while C reads them
         instance = driver.instance
         functions = [instance.address_of(name) for name in core.RunsFmu.FUNCTIONS]
         self.fmu = core.RunsFmu(instance.pointer, *functions, instance.log.environment)
-        self._plans = {forced: self._planned(ports, forced=forced) for forced in (False, True)}
+        self.is_in_c = not driver.sets_arrays  # the loop in C sets single variables
+        kinds = (False, True) if self.is_in_c else ()
+        self._plans = {forced: self._planned(ports, forced=forced) for forced in kinds}
 
     # ---- input of C ----
 
@@ -193,7 +196,10 @@ class PointLoop:
         names = self.driver.float_names
         table = np.empty((len(points), len(names)))
         for chosen, values in self._alike(points):
-            found = float_parameters(self.scene.at(values), None)
+            scene = self.scene.at(values)
+            if scene.body.is_coupled != self.scene.body.is_coupled:
+                raise ValueError("the body has other parameters")
+            found = float_parameters(scene, None)
             for column, name in enumerate(names):
                 table[chosen, column] = found[name]
         return table
@@ -203,7 +209,7 @@ class PointLoop:
 
         The points of a beam are grouped by body: see `TAKES_ARRAYS` of bodies.
         """
-        own = [key for key in points.values if key.startswith("body.")]
+        own = [key for key in points.values if key.startswith(("body", "link"))]
         if not own or self.scene.body.TAKES_ARRAYS:
             yield slice(None), points.values
             return

@@ -238,7 +238,7 @@ class LoopArrays:
             outcome[(outcome == Outcome.ok) & self._rests_for_ever(pressed, arrays)] = Outcome.stuck
             idle = arrays["stuck"] & ~pressed
             for place in np.flatnonzero((outcome == Outcome.ok) & idle.any(axis=1)):
-                message[place] = no_load_message(int(idle[place].argmax()) + 1)
+                message[place] = no_load_message(self._loop.scene.stop_keys[int(idle[place].argmax())])
         return outcome, message
 
     def _rests_for_ever(self, rests: NDArray[np.bool_], arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:

@@ -3,9 +3,22 @@
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
+from vibroimpact.orchestrator.scene.body_models.points import OneBody
+from vibroimpact.orchestrator.scene.body_models.structure import LinkTable, StructureBody
 
-Body = OscillatorBody | ChainBody | BeamBody
+Body = OscillatorBody | ChainBody | BeamBody | StructureBody
 
-BODY_MODELS: dict[str, type[Body]] = {"oscillator": OscillatorBody, "chain": ChainBody, "beam": BeamBody}
+BODY_MODELS: dict[str, type[OneBody]] = {"oscillator": OscillatorBody, "chain": ChainBody, "beam": BeamBody}
+"""Models of one `[body]` by kind."""
 
-__all__ = ["BODY_MODELS", "BeamBody", "Body", "ChainBody", "OscillatorBody", "Rayleigh"]
+__all__ = [
+    "BODY_MODELS",
+    "BeamBody",
+    "Body",
+    "ChainBody",
+    "LinkTable",
+    "OneBody",
+    "OscillatorBody",
+    "Rayleigh",
+    "StructureBody",
+]

@@ -46,6 +46,8 @@ class BodyTable(SceneTable):
     KEEPS_MODES: ClassVar[bool] = True
     ELEMENT: ClassVar[str] = "mass"
     STATE: ClassVar[str] = ""
+    # variable with the lowest natural frequency of a structure, which may be the first of an array
+    SLOWEST: ClassVar[str] = "natural_angular_frequency[1]"
     # whether arrays of numbers give the same bits of parameters as single numbers
     TAKES_ARRAYS: ClassVar[bool] = True
     # key of [[stop]] for its place on the body, and a hint for the key of another body
@@ -81,6 +83,11 @@ class BodyTable(SceneTable):
     @property
     def has_residual_vectors(self) -> bool:
         """Whether the last modes are residual vectors: the static flexibility of left-out modes at the stops."""
+        return False
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether the FMU gets a damping that couples the modes, in place of damping ratios."""
         return False
 
     @property

@@ -118,6 +118,11 @@ def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
         expected = f'"force" or "base_acceleration" for {body.NAME}'
         yield Problem("forcing.kind", expected, quoted(forcing.kind), "It is a load of a beam.")
         return
+    if forcing.at is not None:
+        hint = f"{body.PLACE_HINT or 'Remove at.'}".replace(
+            "Say which mass by mass.", "Give amplitude an array."
+        )
+        yield Problem("forcing.at", "at for several bodies", f"it beside {body.NAME}", hint)
     yield from _amplitude_problems(body, forcing)
     yield from _place_problems(draft, body, forcing)
 
@@ -163,7 +168,7 @@ def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
     if series is None or draft.body is None:
         return
     known = (
-        *sampled_names(draft.body, len(draft.stops), draft.forcing),
+        *sampled_names(draft.body, len(draft.stops) + len(draft.meetings), draft.forcing),
         *channel_names(draft.document),
     )
     for place, name in enumerate(series.variables, start=1):

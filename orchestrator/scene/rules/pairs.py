@@ -154,6 +154,8 @@ def _body_problem(facts: ComponentFacts, name: str, where: str) -> Problem | Non
 
 
 def _kind(facts: ComponentFacts) -> str:
+    if "mode.contact_shape" in facts.variables:
+        return "Structure"
     if f"contact[1].{_MASS_NUMBER}" in facts.variables:
         return "Chain"
     return "Beam" if f"contact[1].{_LOCATION}" in facts.variables else "Oscillator"
@@ -169,13 +171,14 @@ def _point_problem(component: DraftComponent, rest: str, where: str, point: str)
         "Oscillator": f'"{name}", "{name}.mass"',
         "Chain": f'"{name}.mass[1]", "{name}.mass[2]", ..., or "{name}" for the last mass',
         "Beam": f'"{name}.tip"',
+        "Structure": "the ports of its modes",
     }[kind]
     expected = f'one of {words}, or "{name}.contact[1]"'
     mass = _MASS.fullmatch(rest)
     if kind == "Chain" and mass:
         count = _masses(component)
         return None if int(mass[1]) <= count else Problem(where, f"a mass from 1 to {count}", quoted(point))
-    known = {"Oscillator": ("", "mass"), "Chain": ("",), "Beam": ("tip",)}[kind]
+    known = {"Oscillator": ("", "mass"), "Chain": ("",), "Beam": ("tip",), "Structure": ()}[kind]
     return None if rest in known else Problem(where, expected, quoted(point))
 
 

@@ -9,12 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
-from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
+from vibroimpact.orchestrator.scene.rules.body import (
+    BODY_RULES,
+    arrays_have_one_size,
+    beam_is_given_once,
+    sampled_variables_are_known,
+)
 from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
@@ -28,12 +34,9 @@ DraftRule = Callable[[Draft], Iterator[Problem]]
 def rule_problems(draft: Draft) -> list[Problem]:
     """Return all problems between the tables of a scene."""
     rules = (
-        _damping_is_given_once,
-        _damping_ratio_has_a_spring,
+        *(_several_bodies(draft) if draft.is_structure else (*_DAMPING_RULES, *BODY_RULES, *STOP_RULES)),
         _frequency_is_given_once,
         _units_agree,
-        *BODY_RULES,
-        *STOP_RULES,
         *_recording_rules(draft),
         _record_counts_what_there_is,
         _samples_fit,
@@ -44,8 +47,20 @@ def rule_problems(draft: Draft) -> list[Problem]:
     return [*problems, *sweep_problems(draft.axes)] if draft.axes else problems
 
 
+def _several_bodies(draft: Draft) -> Iterator[DraftRule]:
+    """Yield the rules of several bodies, imported only for scenes with them."""
+    from vibroimpact.orchestrator.scene.rules.structure import part_problems, structure_problems
+
+    yield partial(part_problems, rules=(*_DAMPING_RULES, arrays_have_one_size, beam_is_given_once))
+    yield structure_problems
+    yield sampled_variables_are_known
+
+
 def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
     """Yield the rules of a measuring chain, of a time series and of a replay, imported only for scenes with them."""
+    if draft.is_structure:
+        yield _time_series_has_a_rate
+        return
     if draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
         from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
 
@@ -84,6 +99,9 @@ def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
         yield Problem(
             "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
         )
+
+
+_DAMPING_RULES: tuple[DraftRule, ...] = (_damping_is_given_once, _damping_ratio_has_a_spring)
 
 
 def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
@@ -201,10 +219,16 @@ def sweep_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
         hint = 'Make the others "independent": they span the branches.'
         yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)
     for key in carried:
-        if key.partition("[")[0] in START_STATE:  # or an element of it
+        if key.endswith(START_STATE) or key.rpartition("[")[0].endswith(START_STATE):
             where = key_path(("sweep", key, "path"))
             hint = "Along a continuation each point starts from the state of the one before."
             yield Problem(where, '"independent" for a start state', "a continuation", hint)
+        if key.startswith(("body[", "link[")):
+            where = key_path(("sweep", key, "path"))
+            hint = (
+                "Such a number changes the modes, whose state a continuation carries: each point starts anew."
+            )
+            yield Problem(where, '"independent" for a number of several bodies', "a continuation", hint)
         if key == MODES:
             hint = "The state of some modes is none of more or fewer: each point starts anew."
             yield Problem(key_path(("sweep", key, "path")), '"independent" for modes', "a continuation", hint)

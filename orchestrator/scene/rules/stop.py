@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, StructureBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, Stop
@@ -35,7 +35,7 @@ def stops_are_on_the_body(draft: Draft) -> Iterator[Problem]:
 
 
 def _place_problems(draft: Draft, body: Body, stop: Stop, where: str) -> Iterator[Problem]:
-    for key, owner in (("mass", "a chain"), ("location", "a beam")):
+    for key, owner in (("mass", "a chain"), ("location", "a beam"), ("at", "several bodies")):
         if getattr(stop, key) is not None and key != body.PLACE:
             hint = body.PLACE_HINT or f"Remove {key}."
             yield Problem(f"{where}.{key}", f"{key} for {owner}", f"it beside {body.NAME}", hint)
@@ -133,7 +133,7 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
 def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
     """Return the key of the start displacement at a stop, and its lowest and highest value."""
     body, key = draft.body, "body.displacement_start"
-    if body is None:
+    if body is None or isinstance(body, StructureBody):
         return key, None
     if body.IS_STRUCTURE and not body.displacement_start:
         return key, (0.0, 0.0)

@@ -9,6 +9,7 @@ from numbers import Real
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
 from vibroimpact.orchestrator.study.errors import QUANTITIES
@@ -57,6 +58,15 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
         )
     if tolerance < LEAST_TOLERANCE:
         _refuse_tolerance(tolerance, LEAST_TOLERANCE, "as double precision has it")
+
+
+def refuse_several_bodies(scene: Scene) -> None:
+    """Raise UsageError for several bodies, which no other way simulates."""
+    if scene.is_one_body and isinstance(scene.body, StructureBody):
+        raise UsageError(
+            f"{scene.source}: body: expected one body, which has other ways to be simulated, got several. "
+            "They run fused, and are exact between impacts."
+        )
 
 
 def refuse_one_way(ways: Sequence[Way], scene: Scene) -> None:

@@ -37,6 +37,7 @@ from vibroimpact.orchestrator.study.accuracy.reach import (
 from vibroimpact.orchestrator.study.accuracy.refusals import (
     refuse_misuse,
     refuse_one_way,
+    refuse_several_bodies,
     refuse_vague_reference,
 )
 from vibroimpact.orchestrator.study.accuracy.results import dataset_of
@@ -132,6 +133,7 @@ class AccuracyOfScene(Study[Measured]):
         """
         refuse_misuse(self.tolerance, self.quantity, self.budget)
         self._spends = Budget(self.budget)
+        refuse_several_bodies(self.scene)
         self._alone = studied_scene(self.scene)
         refuse_one_way(ways_of(self._alone), self.scene)
         self._within = within_reach(self._alone, self._spends)

@@ -10,6 +10,8 @@ static const double REDUNDANT = 1e-13;
  * load. REFINEMENTS is the number of solutions; each solves for the residual of the last. */
 static const double SOFTENING = 1e-6;
 enum { REFINEMENTS = 4 };
+/* Most turns of the pivoting: those of its proof, 2^contacts, up to eight contacts; more contacts take a few each. */
+enum { MOST_TURNS = VI_PORTS <= 8 ? 1 << VI_PORTS : 32 * VI_PORTS };
 
 /* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
 static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
@@ -115,7 +117,7 @@ static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[V
         active[k] = b[k] > 0.0;
         scale = fmax(scale, fabs(b[k]));
     }
-    for (int turn = 0; turn < 1 << VI_PORTS; ++turn) {
+    for (int turn = 0; turn < MOST_TURNS; ++turn) {
         vi_solve_active(n, g, b, active, p);
         int wrong = -1;
         for (int k = 0; k < n && wrong < 0; ++k) {

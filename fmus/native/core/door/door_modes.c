@@ -1,5 +1,6 @@
 #include "door/door_modes.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 #include "modes/beam_modes.h"
 #include "modes/beam_residual.h"
 #include "modes/chain_modes.h"
+#include "modes/singular.h"
 
 static bool in_range(int boundary, int count)
 {
@@ -84,7 +86,7 @@ VI_DOOR int vi_door_beam_residual_shapes(int boundary, int natural, int points, 
 }
 
 VI_DOOR int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
-                                double natural[], double damping_ratio[], double shape[])
+                                double natural[], double damping_ratio[], double shape[], double coupling[])
 {
     vi_chain chain;
     vi_chain_modes modes;
@@ -103,6 +105,51 @@ VI_DOOR int vi_door_chain_modes(int masses, const double mass[], const double st
     memcpy(damping_ratio, modes.damping_ratio, (size_t)masses * sizeof damping_ratio[0]);
     for (int i = 0; i < masses; ++i) {
         memcpy(shape + (ptrdiff_t)i * masses, modes.shape[i], (size_t)masses * sizeof shape[0]);
+        memcpy(coupling + (ptrdiff_t)i * masses, modes.damping[i], (size_t)masses * sizeof coupling[0]);
     }
     return modes.classical ? 0 : 1;
+}
+
+/* Add a row to a triangular factor by Givens rotations, which leave the product B'B as if the row were one of B. */
+static void fold_row(int columns, double factor[][VI_MODES], double row[])
+{
+    for (int j = 0; j < columns; ++j) {
+        const double length = hypot(factor[j][j], row[j]);
+        if (row[j] == 0.0 || !(length > 0.0)) {
+            continue;
+        }
+        const double cosine = factor[j][j] / length, sine = row[j] / length;
+        for (int k = j; k < columns; ++k) {
+            const double above = factor[j][k], below = row[k];
+            factor[j][k] = cosine * above + sine * below;
+            row[k] = cosine * below - sine * above;
+        }
+    }
+}
+
+VI_DOOR int vi_door_spring_modes(int rows, int columns, const double spring[], double value[], double vector[])
+{
+    if (rows < 0 || columns < 1 || columns > VI_MODES) {
+        return -1;
+    }
+    double factor[VI_ROWS][VI_MODES], row[VI_MODES];
+    vi_singular singular;
+    const bool folds = rows > VI_ROWS;
+    memset(factor, 0, sizeof factor);
+    for (int i = 0; i < rows; ++i) {
+        memcpy(row, spring + (ptrdiff_t)i * columns, (size_t)columns * sizeof row[0]);
+        if (folds) {
+            fold_row(columns, factor, row);
+        } else {
+            memcpy(factor[i], row, (size_t)columns * sizeof row[0]);
+        }
+    }
+    if (!vi_singular_find(folds ? columns : rows, columns, factor, &singular)) {
+        return -1;
+    }
+    memcpy(value, singular.value, (size_t)singular.rank * sizeof value[0]);
+    for (int k = 0; k < singular.rank; ++k) {
+        memcpy(vector + (ptrdiff_t)k * columns, singular.right[k], (size_t)columns * sizeof vector[0]);
+    }
+    return singular.rank;
 }

@@ -33,15 +33,17 @@ static void orthonormalize(int n, double column[][VI_ORBIT_STATES], double stret
 static void fly(const vi_orbit_response *response, double from, double to, double u, double state[])
 {
     const int modes = response->body->modes;
+    double x, v;
     for (int j = 0; j < modes; ++j) {
-        double phi[4], x, v, x_end, v_end;
         vi_orbit_steady(response, j, from, &x, &v);
-        vi_orbit_steady(response, j, to, &x_end, &v_end);
-        vi_mode_propagator(&response->mode[j], u, phi);
-        x = state[j] - x;
-        v = state[modes + j] - v;
-        state[j] = x_end + phi[0] * x + phi[1] * v;
-        state[modes + j] = v_end + phi[2] * x + phi[3] * v;
+        state[j] -= x;
+        state[modes + j] -= v;
+    }
+    vi_orbit_free(response, u, state, state + modes);
+    for (int j = 0; j < modes; ++j) {
+        vi_orbit_steady(response, j, to, &x, &v);
+        state[j] += x;
+        state[modes + j] += v;
     }
 }
 

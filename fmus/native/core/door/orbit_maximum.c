@@ -1,6 +1,7 @@
 #include "door/orbit_maximum.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "motion/majorant.h"
 
@@ -12,34 +13,128 @@ typedef struct {
     double beyond, velocity, acceleration, bound;
 } seen;
 
-/* Find these for a contact `u` seconds after the start of a flight in modal `state` at forcing phase `phase`. */
-static seen look(const vi_orbit_response *response, int contact, const double state[], double phase, double u)
+/* A contact in a flight: the free motion of the modes, which adds to the steady one, at its start. */
+typedef struct {
+    const vi_orbit_response *response;
+    int contact;
+    double phase;
+    double x[VI_MODES], v[VI_MODES];
+    vi_complex weight[VI_TERMS]; /* coupled: displacement of the contact by each term */
+} flight;
+
+/* Begin a flight in modal `state` at forcing phase `phase`. */
+static void begin(flight *own, const vi_orbit_response *response, int contact, const double state[], double phase)
 {
     const vi_orbit_body *body = response->body;
     const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
-    const double w = body->angular_frequency, angle = phase + w * u, c = cos(angle), s = sin(angle);
-    seen sum = {0.0, 0.0, 0.0, 0.0};
-    double cosine = 0.0, sine = 0.0;
+    own->response = response;
+    own->contact = contact;
+    own->phase = phase;
     for (int j = 0; j < body->modes; ++j) {
-        const vi_mode *mode = &response->mode[j];
-        double phi[4], x, v;
-        vi_orbit_steady(response, j, phase, &x, &v);
-        x = state[j] - x;
-        v = state[body->modes + j] - v;
+        vi_orbit_steady(response, j, phase, &own->x[j], &own->v[j]);
+        own->x[j] = state[j] - own->x[j];
+        own->v[j] = state[body->modes + j] - own->v[j];
+    }
+    if (!body->coupling || body->coupling->terms.terms == 0) {
+        return;
+    }
+    const vi_pressed_modes *terms = &body->coupling->terms;
+    vi_pressed_parts(terms, own->x, own->v, own->weight);
+    for (int m = 0; m < terms->terms; ++m) {
+        vi_complex moved = {0.0, 0.0};
+        for (int j = 0; j < body->modes; ++j) {
+            moved = vi_complex_add(moved, vi_complex_scale(shape[j], terms->vector[m][j]));
+        }
+        own->weight[m] = vi_complex_multiply(own->weight[m], moved);
+    }
+}
+
+/* Free motion of the contact `u` seconds after the start, by terms e^(rate u) that never grow. */
+static seen coupled_motion(const flight *own, double u)
+{
+    const vi_orbit_coupling *coupling = own->response->body->coupling;
+    vi_complex turn[VI_TERMS];
+    seen sum = {0.0, 0.0, 0.0, 0.0};
+    vi_orbit_turns(coupling, u, turn);
+    for (int m = 0; m < coupling->terms.terms; ++m) {
+        const vi_complex rate = coupling->terms.rate[m], x = vi_complex_multiply(own->weight[m], turn[m]);
+        const vi_complex v = vi_complex_multiply(rate, x), a = vi_complex_multiply(rate, v);
+        sum.beyond += x.re;
+        sum.velocity += v.re;
+        sum.acceleration += a.re;
+        sum.bound += vi_complex_size(rate) * vi_complex_size(a);
+    }
+    return sum;
+}
+
+/* The same next to critical damping, by series. The third derivative is (D D s - W s).v + (D s).W x at the contact's
+ * shape s, and v.v + x.W x never grows. */
+static seen series_motion(const flight *own, double u)
+{
+    const vi_orbit_response *response = own->response;
+    const vi_orbit_body *body = response->body;
+    const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
+    double x[VI_MODES], v[VI_MODES], drag[VI_MODES], once[VI_MODES], twice[VI_MODES], square = 0.0, energy = 0.0;
+    memcpy(x, own->x, (size_t)body->modes * sizeof *x);
+    memcpy(v, own->v, (size_t)body->modes * sizeof *v);
+    vi_orbit_free(response, u, x, v);
+    vi_orbit_drag(response, v, drag);
+    vi_orbit_drag(response, shape, once);
+    vi_orbit_drag(response, once, twice);
+    seen sum = {0.0, 0.0, 0.0, 0.0};
+    for (int j = 0; j < body->modes; ++j) {
+        const double stiffness = response->mode[j].stiffness, along = twice[j] - stiffness * shape[j];
+        sum.beyond += shape[j] * x[j];
+        sum.velocity += shape[j] * v[j];
+        sum.acceleration -= shape[j] * (stiffness * x[j] + drag[j]);
+        square += along * along + stiffness * once[j] * once[j];
+        energy += v[j] * v[j] + stiffness * x[j] * x[j];
+    }
+    sum.bound = sqrt(square * energy);
+    return sum;
+}
+
+/* Free motion of the contact `u` seconds after the start, mode by mode. */
+static seen free_motion(const flight *own, double u)
+{
+    const vi_orbit_body *body = own->response->body;
+    const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
+    seen sum = {0.0, 0.0, 0.0, 0.0};
+    for (int j = 0; j < body->modes; ++j) {
+        const vi_mode *mode = &own->response->mode[j];
+        const double x = own->x[j], v = own->v[j];
+        double phi[4];
         vi_mode_propagator(mode, u, phi);
         const double moved = phi[0] * x + phi[1] * v, faster = phi[2] * x + phi[3] * v;
         const double drag = 2.0 * mode->decay;
-        sum.beyond += shape[j] * (moved + response->level[j]);
+        sum.beyond += shape[j] * moved;
         sum.velocity += shape[j] * faster;
         sum.acceleration -= shape[j] * (mode->stiffness * moved + drag * faster);
         /* |x'''| = |(4 c^2 - w^2) v + 2 c w^2 x|, and v^2 + w^2 x^2 never grows */
         sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + drag * mode->natural)
                      * sqrt(faster * faster + mode->stiffness * moved * moved);
+    }
+    return sum;
+}
+
+/* Find the motion of the contact against its stop `u` seconds after the start. */
+static seen look(const flight *own, double u)
+{
+    const vi_orbit_response *response = own->response;
+    const vi_orbit_body *body = response->body;
+    const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
+    const double w = body->angular_frequency, angle = own->phase + w * u, c = cos(angle), s = sin(angle);
+    seen sum = !body->coupling                     ? free_motion(own, u)
+               : body->coupling->terms.terms == 0 ? series_motion(own, u)
+                                                   : coupled_motion(own, u);
+    double cosine = 0.0, sine = 0.0;
+    for (int j = 0; j < body->modes; ++j) {
+        sum.beyond += shape[j] * response->level[j];
         cosine += shape[j] * response->steady_cos[j];
         sine += shape[j] * response->steady_sin[j];
     }
-    const double direction = body->direction[contact];
-    sum.beyond = direction * (sum.beyond + cosine * c + sine * s - body->position[contact]);
+    const double direction = body->direction[own->contact];
+    sum.beyond = direction * (sum.beyond + cosine * c + sine * s - body->position[own->contact]);
     sum.velocity = direction * (sum.velocity + w * (sine * c - cosine * s));
     sum.acceleration = direction * (sum.acceleration - w * w * (cosine * c + sine * s));
     sum.bound += w * w * w * sqrt(cosine * cosine + sine * sine);
@@ -61,13 +156,15 @@ static double search(const vi_orbit_response *response, int contact, const doubl
                      double what[3])
 {
     const double w = response->body->angular_frequency;
-    seen now = look(response, contact, state, phase, 0.0);
+    flight own;
+    begin(&own, response, contact, state, phase);
+    seen now = look(&own, 0.0);
     double u = 0.0;
     for (int evaluation = 0; u < length; ++evaluation) {
         const double away = now.velocity > 0.0 ? -now.acceleration : now.acceleration;
         const double certain = vi_parabola_root(fabs(now.velocity), away, now.bound);
         u = fmin(u + fmax(certain, vi_least_step(length, LEAST_STEP, evaluation)), length);
-        const seen next = look(response, contact, state, phase, u);
+        const seen next = look(&own, u);
         if (now.velocity > 0.0 && next.velocity <= 0.0) {
             keep(what, fmax(now.beyond, next.beyond), phase + w * u, contact);
         }
@@ -96,7 +193,9 @@ VI_DOOR int vi_door_orbit_maximum(const vi_orbit_body *body, const vi_orbit_trai
             const double arriving = search(&response, contact, start, train->phase[i], length, what);
             /* an impact elsewhere may reverse this contact */
             if (contact != train->contact[next] && arriving > 0.0) {
-                const seen left = look(&response, contact, after, train->phase[next], 0.0);
+                flight leaving;
+                begin(&leaving, &response, contact, after, train->phase[next]);
+                const seen left = look(&leaving, 0.0);
                 if (left.velocity <= 0.0) {
                     keep(what, left.beyond, train->phase[next], contact);
                 }

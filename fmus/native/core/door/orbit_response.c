@@ -3,10 +3,14 @@
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "motion/magnitude.h"
 
 static const double TURN = 6.283185307179586;
+/* Fastest rate of coupled modes over the angular frequency of the force. Above, no series follows them: a period would
+ * take more than 1e6 steps. */
+static const double MOST_OF_SERIES = 1e5;
 
 static bool is_body(const vi_orbit_body *body)
 {
@@ -58,10 +62,26 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
     return isfinite(start[0] + start[1]);
 }
 
+/* Does the damping couple the modes, and are the terms of their motion known? */
+static bool by_terms(const vi_orbit_body *body)
+{
+    return body->coupling && body->coupling->terms.terms > 0;
+}
+
+/* Does the damping couple the modes, next to critical damping? */
+static bool by_series(const vi_orbit_body *body)
+{
+    return body->coupling && body->coupling->terms.terms == 0;
+}
+
 int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
 {
     if (!is_body(body)) {
         return VI_ORBIT_REFUSED;
+    }
+    if (body->coupling && body->coupling->terms.terms == 0
+        && !(body->coupling->fastest < MOST_OF_SERIES * body->angular_frequency)) {
+        return VI_ORBIT_CRITICAL;
     }
     response->body = body;
     for (int j = 0; j < body->modes; ++j) {
@@ -73,8 +93,13 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
         const double along = detuning / size / size, across = drag / size / size;
         const double c = body->cosine[j], s = body->sine[j];
         response->level[j] = body->held[j] / mode->stiffness;
-        response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
-        response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
+        if (body->coupling) {
+            response->steady_cos[j] = body->coupling->steady[j].re;
+            response->steady_sin[j] = -body->coupling->steady[j].im;
+        } else {
+            response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
+            response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
+        }
         if (!isfinite(response->steady_cos[j] + response->steady_sin[j])) {
             return VI_ORBIT_RESONANT;
         }
@@ -93,17 +118,59 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
     }
     response->train = train;
     response->length = TURN * train->periods / body->angular_frequency;
-    for (int j = 0; j < body->modes; ++j) {
+    for (int j = 0; !body->coupling && j < body->modes; ++j) {
         if (!start_of_train(&response->mode[j], response->length, response->start[j])) {
+            return VI_ORBIT_RESONANT;
+        }
+    }
+    if (by_series(body)
+        && !vi_orbit_recurring_states(body->coupling, body->contacts, body->impulse, response->length,
+                                      response->state)) {
+        return VI_ORBIT_RESONANT;
+    }
+    for (int k = 0; by_terms(body) && k < body->contacts; ++k) {
+        const double *impulse = body->impulse + (ptrdiff_t)k * body->modes;
+        if (!vi_orbit_recurring_parts(body->coupling, impulse, response->length, response->part[k])) {
             return VI_ORBIT_RESONANT;
         }
     }
     return VI_ORBIT_DONE;
 }
 
+static void carry_coupled(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES])
+{
+    const vi_orbit_coupling *coupling = response->body->coupling;
+    const int modes = response->body->modes;
+    vi_complex turn[VI_TERMS], part[VI_TERMS];
+    if (by_terms(response->body)) {
+        vi_orbit_turns(coupling, u, turn);
+    }
+    for (int c = 0; c < columns; ++c) {
+        double x[VI_MODES], v[VI_MODES];
+        for (int j = 0; j < modes; ++j) {
+            x[j] = change[j][c];
+            v[j] = change[modes + j][c];
+        }
+        if (by_terms(response->body)) {
+            vi_pressed_parts(&coupling->terms, x, v, part);
+            vi_orbit_turned_sum(coupling, part, turn, x, v);
+        } else {
+            vi_orbit_series(coupling, u, x, v);
+        }
+        for (int j = 0; j < modes; ++j) {
+            change[j][c] = x[j];
+            change[modes + j][c] = v[j];
+        }
+    }
+}
+
 void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES])
 {
     const int modes = response->body->modes;
+    if (response->body->coupling) {
+        carry_coupled(response, u, columns, change);
+        return;
+    }
     for (int j = 0; j < modes; ++j) {
         double phi[4];
         vi_mode_propagator(&response->mode[j], u, phi);
@@ -122,13 +189,61 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k)
     return i > k ? passed : response->length + passed;
 }
 
-void vi_orbit_train_answer(const vi_orbit_response *response, int j, double u, double *x, double *v)
+void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[])
 {
-    const double *start = response->start[j];
-    double phi[4];
-    vi_mode_propagator(&response->mode[j], u, phi);
-    *x = -(phi[0] * start[0] + phi[1] * start[1]);
-    *v = -(phi[2] * start[0] + phi[3] * start[1]);
+    const vi_orbit_body *body = response->body;
+    if (by_terms(body)) {
+        vi_complex turn[VI_TERMS];
+        vi_orbit_turns(body->coupling, u, turn);
+        vi_orbit_turned_sum(body->coupling, response->part[contact], turn, x, v);
+    } else if (by_series(body)) {
+        memcpy(x, response->state[contact], (size_t)body->modes * sizeof x[0]);
+        memcpy(v, response->state[contact] + body->modes, (size_t)body->modes * sizeof v[0]);
+        vi_orbit_series(body->coupling, u, x, v);
+    }
+    for (int j = 0; j < body->modes; ++j) {
+        if (body->coupling) {
+            x[j] = -x[j];
+            v[j] = -v[j];
+            continue;
+        }
+        const double *start = response->start[j], impulse = body->impulse[(ptrdiff_t)contact * body->modes + j];
+        double phi[4];
+        vi_mode_propagator(&response->mode[j], u, phi);
+        x[j] = -(phi[0] * start[0] + phi[1] * start[1]) * impulse;
+        v[j] = -(phi[2] * start[0] + phi[3] * start[1]) * impulse;
+    }
+}
+
+void vi_orbit_drag(const vi_orbit_response *response, const double v[], double drag[])
+{
+    const vi_orbit_body *body = response->body;
+    for (int j = 0; j < body->modes; ++j) {
+        drag[j] = body->coupling ? vi_pressed_drag(&body->coupling->body, j, v) : 2.0 * response->mode[j].decay * v[j];
+    }
+}
+
+void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[])
+{
+    const vi_orbit_body *body = response->body;
+    if (by_series(body)) {
+        vi_orbit_series(body->coupling, u, x, v);
+        return;
+    }
+    if (by_terms(body)) {
+        vi_complex turn[VI_TERMS], part[VI_TERMS];
+        vi_orbit_turns(body->coupling, u, turn);
+        vi_pressed_parts(&body->coupling->terms, x, v, part);
+        vi_orbit_turned_sum(body->coupling, part, turn, x, v);
+        return;
+    }
+    for (int j = 0; j < body->modes; ++j) {
+        const double displacement = x[j], velocity = v[j];
+        double phi[4];
+        vi_mode_propagator(&response->mode[j], u, phi);
+        x[j] = phi[0] * displacement + phi[1] * velocity;
+        v[j] = phi[2] * displacement + phi[3] * velocity;
+    }
 }
 
 void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v)
@@ -166,12 +281,16 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
     const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
     const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
     double acceleration = 0.0; /* of the contact, before the impact */
+    double before[VI_MODES] = {0.0}, drag[VI_MODES], lost_drag[VI_MODES];
     for (int j = 0; j < modes; ++j) {
-        const vi_mode *mode = &response->mode[j];
-        const double before = state[modes + j] + lost * speed * impulse[j];
+        before[j] = state[modes + j] + lost * speed * impulse[j];
+    }
+    vi_orbit_drag(response, before, drag);
+    vi_orbit_drag(response, impulse, lost_drag);
+    for (int j = 0; j < modes; ++j) {
         acceleration += shape[j]
-                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j]
-                           - 2.0 * mode->decay * before - mode->stiffness * state[j]);
+                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j] - drag[j]
+                           - response->mode[j].stiffness * state[j]);
     }
     for (int c = 0; c < columns; ++c) {
         double displaced = 0.0, faster = 0.0;
@@ -181,9 +300,9 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
         }
         const double later = displaced / speed;
         for (int j = 0; j < modes; ++j) {
-            const double drag = 2.0 * response->mode[j].decay * speed * impulse[j];
+            const double held_back = speed * lost_drag[j] + acceleration * impulse[j];
             change[j][c] -= lost * impulse[j] * displaced;
-            change[modes + j][c] += lost * ((drag + acceleration * impulse[j]) * later - impulse[j] * faster);
+            change[modes + j][c] += lost * (held_back * later - impulse[j] * faster);
         }
     }
 }

@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "door/orbit_coupling.h"
 #include "motion/flow.h"
 #include "sizes.h"
 
@@ -15,7 +16,8 @@ enum {
     VI_ORBIT_DONE = 0,
     VI_ORBIT_REFUSED = 1,  /* numbers outside their range */
     VI_ORBIT_RESONANT = 2, /* an undamped mode's response to the force, or to its impacts, is unbounded */
-    VI_ORBIT_SINGULAR = 3  /* no velocities solve the equations for these phases */
+    VI_ORBIT_SINGULAR = 3, /* no velocities solve the equations for these phases */
+    VI_ORBIT_CRITICAL = 4  /* coupled modes next to critical damping, and far more rates than the force: no series */
 };
 
 /* A body of mass-normalised modes; shapes are [contact][mode]. */
@@ -23,7 +25,7 @@ typedef struct {
     int32_t modes, contacts;
     double angular_frequency;     /* of the force, rad/s */
     const double *natural;        /* [modes] rad/s, > 0 */
-    const double *damping_ratio;  /* [modes] */
+    const double *damping_ratio;  /* [modes]; from the diagonal of a damping that couples the modes */
     const double *cosine, *sine;  /* [modes] modal force = cosine cos(phase) + sine sin(phase) */
     const double *held;           /* [modes] constant modal force */
     const double *shape;          /* displacement of each contact */
@@ -31,6 +33,7 @@ typedef struct {
     const double *direction; /* [contacts] +1: the stop is above, -1: below */
     const double *position; /* [contacts] m */
     const double *restitution; /* [contacts] */
+    const vi_orbit_coupling *coupling; /* complex modes where the damping couples the modes, else NULL */
 } vi_orbit_body;
 
 /* Impacts in their order: the contact and the phase of each, rad, 0 <= phase[0] < phase[1] < ... < 2 pi periods. */
@@ -47,6 +50,8 @@ typedef struct {
     vi_mode mode[VI_MODES];
     double steady_cos[VI_MODES], steady_sin[VI_MODES], level[VI_MODES];
     double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
+    vi_complex part[VI_PORTS][VI_TERMS]; /* coupled: terms just after such an impulse at each contact */
+    double state[VI_PORTS][VI_ORBIT_STATES]; /* the same without terms: displacements and velocities */
 } vi_orbit_response;
 
 /* Find the modes and their steady responses only. Returns one of VI_ORBIT_*. */
@@ -58,8 +63,14 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
 /* Time from impact k to impact i, s; > 0, and a whole train from an impact to itself. */
 double vi_orbit_since(const vi_orbit_response *response, int i, int k);
 
-/* Response of mode j, `u` seconds after an impact that takes a unit of speed, once in each train. */
-void vi_orbit_train_answer(const vi_orbit_response *response, int j, double u, double *x, double *v);
+/* Response of all modes, `u` seconds after an impact at a contact that takes a unit of speed, once in each train. */
+void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[]);
+
+/* Accelerations that the damping takes from modal velocities v. */
+void vi_orbit_drag(const vi_orbit_response *response, const double v[], double drag[]);
+
+/* Free motion of all modes for `u` seconds. */
+void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[]);
 
 /* Steady response of mode j to the force. */
 void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v);

@@ -54,19 +54,17 @@ static void answer(const vi_orbit_response *response, int i, int k, double g[3])
     const vi_orbit_body *body = response->body;
     const int32_t *contact = response->train->contact;
     const double *shape = body->shape + (ptrdiff_t)contact[i] * body->modes;
-    const double *impulse = body->impulse + (ptrdiff_t)contact[k] * body->modes;
-    const double u = vi_orbit_since(response, i, k);
+    double x[VI_MODES], v[VI_MODES], drag[VI_MODES];
+    vi_orbit_train_answer(response, contact[k], vi_orbit_since(response, i, k), x, v);
+    vi_orbit_drag(response, v, drag);
     const double factor = (1.0 + body->restitution[contact[k]]) * body->direction[contact[i]]
                           * body->direction[contact[k]];
     g[0] = g[1] = g[2] = 0.0;
     for (int j = 0; j < body->modes; ++j) {
-        const vi_mode *mode = &response->mode[j];
-        double x, v;
-        vi_orbit_train_answer(response, j, u, &x, &v);
-        const double weight = factor * shape[j] * impulse[j];
-        g[0] += weight * x;
-        g[1] += weight * v;
-        g[2] += weight * (-mode->stiffness * x - 2.0 * mode->decay * v);
+        const double weight = factor * shape[j];
+        g[0] += weight * x[j];
+        g[1] += weight * v[j];
+        g[2] += weight * (-response->mode[j].stiffness * x[j] - drag[j]);
     }
 }
 
@@ -134,14 +132,15 @@ static void after_impact(const vi_orbit_response *response, const double velocit
     const vi_orbit_train *train = response->train;
     for (int j = 0; j < body->modes; ++j) {
         vi_orbit_steady(response, j, train->phase[i], &state[j], &state[body->modes + j]);
-        for (int k = 0; k < train->impacts; ++k) {
-            const int32_t contact = train->contact[k];
-            const double strength = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact]
-                                    * body->impulse[(ptrdiff_t)contact * body->modes + j];
-            double x, v;
-            vi_orbit_train_answer(response, j, k == i ? 0.0 : vi_orbit_since(response, i, k), &x, &v);
-            state[j] += strength * x;
-            state[body->modes + j] += strength * v;
+    }
+    for (int k = 0; k < train->impacts; ++k) {
+        const int32_t contact = train->contact[k];
+        const double taken = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact];
+        double x[VI_MODES], v[VI_MODES];
+        vi_orbit_train_answer(response, contact, k == i ? 0.0 : vi_orbit_since(response, i, k), x, v);
+        for (int j = 0; j < body->modes; ++j) {
+            state[j] += taken * x[j];
+            state[body->modes + j] += taken * v[j];
         }
     }
 }

@@ -11,7 +11,8 @@
 #include "lanes/yielding.h"
 #include "motion/majorant.h"
 
-/* Least stiffness and, its reciprocal, largest stiffness and decay: squares of rates and of cells stay in range. */
+/* Least stiffness of a spring and, its reciprocal, largest stiffness and decay. Squares of rates and of cells stay in
+ * range. */
 static const double LEAST = 1e-60;
 
 /* ---- the present instant ---- */
@@ -293,8 +294,8 @@ static bool take_modes(const vi_lanes_work *w, int64_t point)
     const vi_lanes_points *p = w->points;
     for (int j = 0; j < w->plan->modes; ++j) {
         const int64_t i = j * p->count + point;
-        if (!(p->stiffness[i] > LEAST) || !(p->stiffness[i] < 1.0 / LEAST) || !(p->decay[i] >= 0.0)
-            || !(p->decay[i] < 1.0 / LEAST) || !isfinite(p->observed[i])) {
+        const bool has_range = p->stiffness[i] == 0.0 || (p->stiffness[i] > LEAST && p->stiffness[i] < 1.0 / LEAST);
+        if (!has_range || !(p->decay[i] >= 0.0) || !(p->decay[i] < 1.0 / LEAST) || !isfinite(p->observed[i])) {
             return false;
         }
     }

@@ -15,6 +15,8 @@ static const double LARGEST_STEADY = 1000.0;
 static const double REACH = 0.5;
 /* Longest cell, in periods; a round of such cells takes less than three periods. */
 static const double LONGEST_CELL = 0.25;
+/* Length over which the displacement of a mode without a spring is bounded, in periods: a round, and one cell more. */
+static const double LONGEST_ROUND = 4.0;
 /* Least rate of an underdamped mode, relative to its natural frequency, for bounds by amplitude; below, by energy. */
 static const double LEAST_TURNING = 0.1;
 
@@ -34,6 +36,11 @@ static bounds take_amplitude(vi_lane_group *g, int lane, int j, const vi_mode *m
         return (bounds){natural, square, square * natural, square * square};
     }
     many->mix[j][lane] = 0.0;
+    if (!(mode->stiffness > 0.0)) { /* the speed never grows */
+        const double length = LONGEST_ROUND * g->period[lane], speed = 1.0 / length, second = drag * speed;
+        many->reach[j][lane] = length;
+        return (bounds){speed, second, drag * second, drag * drag * second};
+    }
     many->reach[j][lane] = 1.0 / natural;
     const double second = (drag + natural) * natural;
     const double third = drag * second + mode->stiffness * natural;
@@ -45,7 +52,8 @@ static bool take_mode(vi_lane_group *g, int lane, int j, const vi_mode *mode, do
 {
     vi_many_modes *many = &g->many;
     const double c = mode->steady_cos, n = mode->steady_sin, w = mode->angular_frequency;
-    if ((mode->force != 0.0 && !mode->steady_exists)
+    const bool has_spring = mode->stiffness > 0.0;
+    if ((!has_spring && held != 0.0) || (mode->force != 0.0 && !mode->steady_exists)
         || mode->steady_amplitude * mode->fastest * mode->fastest > LARGEST_STEADY * fabs(mode->force)) {
         return false;
     }
@@ -55,7 +63,7 @@ static bool take_mode(vi_lane_group *g, int lane, int j, const vi_mode *mode, do
     many->decay[j][lane] = mode->decay;
     many->steady_cosine[j][lane] = c;
     many->steady_sine[j][lane] = n;
-    many->rest[j][lane] = held / mode->stiffness;
+    many->rest[j][lane] = has_spring ? held / mode->stiffness : 0.0;
     g->q[j][lane] = q - ((c * cosine + n * sine) + many->rest[j][lane]);
     g->p[j][lane] = p - w * (n * cosine - c * sine);
     return isfinite(g->q[j][lane]) && isfinite(g->p[j][lane]);

@@ -56,6 +56,18 @@ def test_the_sum_rule_of_the_worked_example() -> None:
     assert float(found.lyapunov_exponent.sum()) == pytest.approx(expected, abs=1e-12)
 
 
+def test_exponents_of_coupled_modes_keep_the_sum_rule_and_are_those_of_their_orbit() -> None:
+    coupled = CHAIN | {"body": CHAIN["body"] | {"dampings": [0.0, 0.3], "far_damping": 0.05}}
+    found = vi.lyapunov(vi.run(coupled))
+    assert int(found.impacts) > 800
+    assert float(found.sum_error) < 1e-12
+    (orbit,) = vi.find_orbits(coupled)
+    # a part of a round stays at both ends of the run
+    np.testing.assert_allclose(found.lyapunov_exponent, np.log(np.abs(orbit.multipliers)), atol=3e-3)
+    exact = 2.0 * np.log(0.7) - 0.65 * float(found.impact_interval)
+    assert float(found.lyapunov_exponent.sum()) == pytest.approx(exact, abs=1e-12)
+
+
 def test_exponents_of_a_periodic_orbit_of_a_chain_are_the_logarithms_of_its_multipliers() -> None:
     found = vi.lyapunov(vi.run(CHAIN))
     (orbit,) = vi.find_orbits(CHAIN, 1)

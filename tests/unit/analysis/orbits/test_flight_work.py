@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vibroimpact.analysis.orbits.flight_work import FlightWork, flight_work
+from vibroimpact.analysis.orbits.flight_work import FlightWork, coupled_flight_work, flight_work
 
 Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 START = np.array([0.3, -0.7, 0.5, -0.2])
@@ -71,3 +71,25 @@ def test_a_flight_without_length_changes_nothing() -> None:
     found = worked(2.0, 0.1, 1.0, 0.0)
     assert found.end.ravel().tolist() == START[:2].tolist()
     assert found.forcing.item() == found.squared.item() == 0.0
+
+
+NATURAL, RATIOS = np.array([0.6, 1.6, 4.0]), np.array([0.0, 1.0, 0.03])
+STARTS = np.array([[[0.3, -0.7, 0.5, -0.2], [0.1, 0.4, 0.0, 0.3], [-0.2, 0.9, 0.4, 0.1]]] * 2)
+LENGTHS = np.array([0.4, 9.0])
+
+
+def test_modes_that_a_diagonal_matrix_damps_are_those_of_their_damping_ratios() -> None:
+    own = flight_work(NATURAL, RATIOS, 0.9, LENGTHS, STARTS)
+    found = coupled_flight_work(NATURAL, np.diag(2.0 * RATIOS * NATURAL), 0.9, LENGTHS, STARTS)
+    for one, other in zip(found, own, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-13)
+
+
+def test_coupled_modes_gain_the_work_of_the_force_less_the_loss_to_damping_each_on_its_own() -> None:
+    dashpots = np.array([[0.7, -0.4, 1.1], [0.1, 1.3, -0.2]])
+    coupling = dashpots.T @ dashpots
+    found = coupled_flight_work(NATURAL, coupling, 0.9, LENGTHS, STARTS)
+    gained = 0.5 * ((found.end**2).sum(axis=-1) - (STARTS[..., :2] ** 2).sum(axis=-1))
+    np.testing.assert_allclose(gained, found.forcing - found.damping, atol=1e-13)
+    assert (found.damping.sum(axis=1) > 0.0).all()
+    assert found.damping.min() < 0.0, "one mode takes energy from the others"

@@ -178,6 +178,35 @@ def test_an_undamped_mode_that_is_back_after_the_orbit_is_refused_without_a_reso
         closed_form(oscillator(0.9, frequency, 0.0), periods)
 
 
+@pytest.mark.parametrize("periods", [1, 2])
+def test_damping_given_as_a_matrix_is_that_of_the_damping_ratios(periods: int) -> None:
+    modes = chain_modes([1.0, 2.0, 0.5], [3.0, 1.0, 2.0, 0.0], [0.12, 0.04, 0.08, 0.0])
+    force, tip = np.array([0.6, 0.0, 0.2]) @ modes.shapes, modes.shapes[-1]
+    contacts = (Contact(tip, 1.0, 0.1, 0.6), Contact(modes.shapes[0], -1.0, -2.0, 0.8))
+    numbers = modes.frequencies, modes.damping_ratios, force, 0.01 * force, 0.75, 0.0, contacts, tip
+    (one,), (other,) = (
+        closed_form(ImpactingBody(*numbers, coupling), periods) for coupling in (None, modes.coupling)
+    )
+    close = {"rtol": 1e-12, "atol": 1e-12}
+    for name in ("phases", "velocities", "states", "monodromy", "determinant", "multipliers"):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), **close, err_msg=name)
+    assert other.highest[0] == pytest.approx(one.highest[0], abs=1e-12)
+    assert other.highest[2] == one.highest[2]
+    at = np.linspace(one.phases[0], one.phases[0] + 2.0 * np.pi * periods, 40)
+    np.testing.assert_allclose(other.at(at), one.at(at), **close)
+    sizes = [np.sort(np.abs(each.body.rates)) for each in (one, other)]
+    np.testing.assert_allclose(sizes[1], sizes[0], **close)
+    assert other.body.slowest_decay == pytest.approx(one.body.slowest_decay, rel=1e-12)
+
+
+def test_rates_far_apart_next_to_critical_damping_are_refused() -> None:
+    frequencies, critical = np.array([1.0, 1e7]), np.array([[2.0, 0.0], [0.0, 1e3]])
+    contact, none = Contact(np.ones(2), 1.0, 0.1, 0.6), np.zeros(2)
+    body = ImpactingBody(frequencies, none, np.ones(2), none, 0.75, 0.0, (contact,), none, critical)
+    with pytest.raises(OrbitError, match="away from critical damping"):
+        closed_form(body)
+
+
 def test_impacts_that_fall_together_are_said() -> None:
     phases = np.array([1.0, 1.0 + 2.0 * np.pi])
     with pytest.raises(OrbitError, match="expected impacts one after the other, got two at one phase"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints
+from vibroimpact.fmus.core.modes import chain_modes
 
 STOP = {"contact[1].position": 0.3, "contact[1].restitution": 0.8}
 FORCE = {"forcing.angular_frequency": 2.0, "forcing.phase": 0.1}
@@ -23,10 +24,25 @@ BEAM |= {
     "contact[1].location": 0.8,
     "forcing.amplitude": 0.5,
 }
+STRUCTURE = {
+    "mode.angular_frequency[1]": 1.5,
+    "mode.angular_frequency[2]": 4.0,
+    "mode.damping_ratio[1]": 0.02,
+}
+STRUCTURE |= {
+    "mode.damping_ratio[2]": 0.01,
+    "mode.forcing[1]": 0.7,
+    "mode.forcing[2]": -0.3,
+    "mode.force[1]": 0.7,
+}
+STRUCTURE |= {"mode.force[2]": -0.3, "mode.observed_shape[1]": 0.5, "mode.observed_shape[2]": 0.9}
+STRUCTURE |= {"mode.contact_shape[1,1]": 0.8, "mode.contact_shape[1,2]": -0.6, "forcing.amplitude": 0.5}
+STRUCTURE |= {"mode.displacement_start[1]": 0.1}
 BODIES: dict[str, tuple[dict[str, float], dict[str, int]]] = {
     "Oscillator": (OSCILLATOR, {}),
     "Chain": (CHAIN, {"masses": 2, "modes": 0, "observed_mass": 2, "contact[1].mass_number": 2}),
     "Beam": (BEAM, {"modes": 3, "boundary": 1, "forcing.kind": 1}),
+    "Structure": (STRUCTURE, {"modes": 2, "coupled": False}),
 }
 
 
@@ -70,7 +86,8 @@ def test_a_stop_meets_the_mass_that_it_limits_and_on_a_beam_that_of_its_modes() 
 
 @pytest.mark.parametrize("fmu", BODIES)
 def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> None:
-    key = {"Oscillator": "stiffness", "Chain": "stiffness[1]", "Beam": "length"}[fmu]
+    others = {"Beam": "length", "Structure": "mode.angular_frequency[1]"}
+    key = ({"Oscillator": "stiffness", "Chain": "stiffness[1]"} | others)[fmu]
     values = np.array([0.7, 0.9, 0.7])
     together = at_points(body(fmu), {key: values}).in_state_coordinates()
     for point, value in enumerate(values):
@@ -79,15 +96,29 @@ def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> Non
             assert getattr(together, name)[..., point].tobytes() == getattr(alone, name)[..., 0].tobytes()
 
 
-def test_a_chain_that_does_not_fly_in_modes_says_why_and_is_left_by_lanes() -> None:
-    tied = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
-    assert body("Chain").flaw == "", "its dampings are in proportion to its stiffnesses"
-    assert body("Chain", far_damping=0.5).flaw == "coupled"
-    loose = body("Chain", **tied)
-    assert loose.flaw == "loose"
-    assert np.isnan(at_points(loose, {"forcing.phase": np.zeros(2)}).in_state_coordinates().stiffness).all()
-    assert body("Oscillator", stiffness=0.0).flaw == "loose"
-    assert body("Beam").flaw == ""
+def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_without_a_tie_by_orbits() -> None:
+    none = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
+    tied = body("Chain")
+    assert tied.mass_normalised().coupling is None, "its dampings are in proportion to its stiffnesses"
+    coupled, loose = body("Chain", far_damping=0.5), body("Chain", **none)
+    at_two = {"forcing.phase": np.zeros(2)}
+    assert np.isnan(at_points(coupled, at_two).in_state_coordinates().stiffness).all()
+    assert (at_points(loose, at_two).in_state_coordinates().stiffness[0] == 0.0).all()
+    dragged = body("Chain", **none | {"damping[1]": 0.1, "far_damping": 0.2, "damping[2]": 0.0})
+    assert at_points(dragged, at_two).in_state_coordinates().decay[:, 0] == pytest.approx([0.05, 0.05])
+    assert (tied.is_loose, coupled.is_loose, loose.is_loose) == (False, False, True)
+    assert body("Oscillator", stiffness=0.0).is_loose
+    assert not body("Beam").is_loose
+
+
+def test_the_damping_between_the_modes_of_a_chain_is_that_of_its_dashpots() -> None:
+    coupled = body("Chain", far_damping=0.5).mass_normalised()
+    modes = chain_modes([1.0, 2.0], [3.0, 1.0, 0.5], [0.06, 0.02, 0.5])
+    dashpots = np.array([[0.08, -0.02], [-0.02, 0.52]])
+    np.testing.assert_allclose(coupled.coupling, modes.shapes.T @ dashpots @ modes.shapes, atol=1e-15)
+    np.testing.assert_allclose(
+        2.0 * coupled.damping_ratios * coupled.frequencies, np.diag(coupled.coupling), rtol=1e-15
+    )
 
 
 def test_a_state_is_told_in_mass_normalised_modes_with_its_kinetic_energy() -> None:

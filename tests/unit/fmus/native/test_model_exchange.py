@@ -144,6 +144,16 @@ SCENES: dict[str, tuple[str, dict[str, float], float]] = {
         },
         30.0,
     ),
+    "structure of one mode": (
+        "Structure",
+        {
+            "forcing.amplitude": 0.02,
+            "forcing.angular_frequency": 0.7,
+            **stop(1, law=RESTITUTION, restitution=0.6, position=0.01),
+            **stop(2, law=KELVIN_VOIGT, stiffness=100.0, damping=3.0, position=-0.012, side=2),
+        },
+        30.0,
+    ),
     "beam of four modes": (
         "Beam",
         {
@@ -217,17 +227,19 @@ def test_impact_limit_ends_the_simulation() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam", "ImpactStop"])
+@pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam", "Structure", "ImpactStop"])
 def test_the_binary_has_the_states_that_its_description_counts(
     component: str, version: str, tmp_path: Path
 ) -> None:
-    options: dict[str, Any] = {"Chain": {"masses": 3}, "Beam": {"modes": 4}}.get(component, {})
+    counts: dict[str, Any] = {"Chain": {"masses": 3}, "Beam": {"modes": 4}, "Structure": {"modes": 5}}
     name = {"ImpactStop": "impact_stop"}.get(component, component.lower())
     it = Integrated(
-        component, version, export_fmu(name, tmp_path / "it.fmu", fmi=version, platform=None, **options)
+        component,
+        version,
+        export_fmu(name, tmp_path / "it.fmu", fmi=version, platform=None, **counts.get(component, {})),
     )
     it.fmu.exitInitializationMode()
-    states = {"Oscillator": 2, "Chain": 6, "Beam": 8, "ImpactStop": 0}[component]
+    states = {"Oscillator": 2, "Chain": 6, "Beam": 8, "Structure": 10, "ImpactStop": 0}[component]
     indicators = 0 if component == "ImpactStop" else 2
     assert it.description.numberOfContinuousStates == states
     assert it.description.numberOfEventIndicators == indicators

@@ -111,7 +111,7 @@ def test_states_that_are_not_finite_are_discarded_however_they_were_set(tmp_path
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam"])
+@pytest.mark.parametrize("component", ["Oscillator", "Chain", "Beam", "Structure"])
 def test_no_variable_is_a_state_and_the_derivative_of_another(component: str, version: str) -> None:
     it = Integrated(component, version)
     derivatives = [unknown.variable.name for unknown in it.description.derivatives]

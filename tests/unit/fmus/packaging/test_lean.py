@@ -29,7 +29,7 @@ from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description, schema_folder
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 
-BODIES = ("Oscillator", "Chain", "Beam")
+BODIES = ("Oscillator", "Chain", "Beam", "Structure")
 DESCRIBED = read_components()
 SIGNALS = ("Replay", "Gain")
 """Components without a mass, a stop or a bound."""

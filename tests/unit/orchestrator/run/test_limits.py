@@ -36,7 +36,6 @@ SEEN_IN = {
     "places": BEAM + RECORD + PLACES,
 }
 OF_THE_BODY = {
-    "coupled": CHAIN.replace("stiffnesses", "far_damping = 1.0\nstiffnesses") + RECORD + STOP,
     "spring": MASS.replace("stiffness = 1.0", "stiffness = 0.0") + RECORD + STOP,
     "loose": CHAIN.replace("stiffnesses = 1.0", "stiffnesses = [0.0, 1.0]") + RECORD + STOP,
 }
@@ -59,7 +58,7 @@ def test_what_the_tables_of_a_scene_have_is_seen_and_kept_from_who_cannot_take_i
 
 
 @pytest.mark.parametrize("row", OF_THE_BODY)
-def test_a_body_that_does_not_fly_in_modes_has_no_orbits(row: str) -> None:
+def test_a_body_that_nothing_ties_to_the_ground_has_no_orbits(row: str) -> None:
     with pytest.raises(UsageError) as error:
         impacting_body(scene(OF_THE_BODY[row]))
     assert f"expected {LIMITS[row].orbits}, got " in str(error.value)

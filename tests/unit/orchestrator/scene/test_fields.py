@@ -22,7 +22,13 @@ from vibroimpact.orchestrator.scene import (
     replay_models,
     sweep_models,
 )
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody, Rayleigh
+from vibroimpact.orchestrator.scene.body_models import (
+    BeamBody,
+    ChainBody,
+    OscillatorBody,
+    Rayleigh,
+    StructureBody,
+)
 from vibroimpact.orchestrator.scene.component_facts import component_facts
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
 
@@ -30,7 +36,9 @@ MODELS = {
     found
     for module in (models, body_models, measuring_models, replay_models, sweep_models, component_models)
     for found in vars(module).values()
-    if isinstance(found, type) and issubclass(found, BaseModel) and found.model_fields
+    if isinstance(found, type) and issubclass(found, BaseModel) and found is not StructureBody
+    if found.model_fields.keys()
+    > {key for base in found.__bases__ for key in getattr(base, "model_fields", ())}
 }
 BODIES = {"Oscillator": (OscillatorBody,), "Chain": (ChainBody,), "Beam": (BeamBody, Rayleigh)}
 BEAM = """

@@ -23,8 +23,9 @@ bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
 
 void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
 {
-    int rigid[VI_PORTS] = {0}, any = 0;
+    int rigid[VI_PORTS], any = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
+        rigid[k] = 0;
         if (hit[k] && s->model->stop[k] == VI_YIELDING_STOP) {
             vi_structure_touch_down(s, k);
         } else if (hit[k]) {
@@ -38,10 +39,10 @@ void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
 
 void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
 {
-    int hit[VI_PORTS] = {0};
+    int hit[VI_PORTS];
     vi_structure_put_on_stop(s, k);
-    hit[k] = 1;
     for (int l = 0; l < s->model->contacts; ++l) {
+        hit[l] = l == k;
         if (l != k && vi_structure_meets_now(s, l)) {
             s->state->status[l] = VI_CONTACT_TOUCHING;
             s->state->leaving[l] = 0;

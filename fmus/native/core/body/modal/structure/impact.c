@@ -230,14 +230,16 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, change[VI_PORTS] = {0.0};
-    double impulse[VI_PORTS], impulse_low[VI_PORTS];
-    int in_play[VI_PORTS] = {0};
+    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS], impulse[VI_PORTS], impulse_low[VI_PORTS];
+    int in_play[VI_PORTS];
     const double before = vi_structure_kinetic(s);
+    memset(change, 0, (size_t)n * sizeof *change);
+    memset(in_play, 0, (size_t)n * sizeof *in_play);
     for (int k = 0; k < n; ++k) {
         const bool resting = state->status[k] == VI_CONTACT_HELD
                              || (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]);
         in_play[k] = hit[k] || resting;
+        approach[k] = restitution[k] = 0.0;
         if (hit[k]) {
             approach[k] = vi_max(0.0, vi_structure_approach(s, k));
             restitution[k] = restitution_of(s, k, approach[k]);
@@ -325,7 +327,7 @@ void vi_structure_take_impulses(const vi_structure *s)
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
 {
     int now[VI_PORTS];
-    memcpy(now, hit, sizeof now);
+    memcpy(now, hit, (size_t)s->model->contacts * sizeof *now);
     for (int round = 0; round < MOST_ROUNDS; ++round) {
         collide_once(s, now);
         int any = 0;

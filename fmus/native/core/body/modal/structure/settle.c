@@ -123,8 +123,9 @@ void vi_structure_settle(const vi_structure *s, bool stop_here)
             state->leaving[k] = 2;
         }
     }
-    int candidate[VI_PORTS] = {0}, hit[VI_PORTS] = {0}, any_candidate = 0, first = -1;
+    int candidate[VI_PORTS], hit[VI_PORTS], any_candidate = 0, first = -1;
     for (int k = 0; k < s->model->contacts && !state->pending; ++k) {
+        candidate[k] = hit[k] = 0;
         if (!vi_structure_watched(s, k)) {
             continue;
         }

@@ -1,0 +1,301 @@
+"""Several bodies that springs and dashpots join, as one set of modes: equations.md 6.12."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vibroimpact.fmus.bodies.beam import BeamPoints
+from vibroimpact.fmus.bodies.impacting_body import Floats, Integers, Numbers
+from vibroimpact.fmus.bodies.structure import DIAGONAL
+from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes, spring_modes
+from vibroimpact.fmus.errors import UsageError
+
+TAKES_PART = 1e-8
+"""Displacement times sqrt(mass) above which a coordinate sets the sign of a mode, as in a chain."""
+COMMUTES = 32.0 * float(np.finfo(np.float64).eps)
+"""Entry of C M^-1 K - K M^-1 C, relative to the moduli of its terms, up to which it is rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Element:
+    """A spring beside a dashpot; `shape` is its elongation for 1 m of each coordinate."""
+
+    shape: Floats
+    stiffness: float
+    damping: float
+
+
+class Part(ABC):
+    """One body of an assembly: coordinates with masses, and its elements over these coordinates.
+
+    Attributes
+    ----------
+    masses : ndarray, shape (coordinate,)
+        kg.
+    displacements, velocities : ndarray, shape (coordinate,)
+        The start, m and m/s.
+    """
+
+    masses: Floats
+    displacements: Floats
+    velocities: Floats
+
+    @property
+    @abstractmethod
+    def elements(self) -> list[Element]:
+        """The springs and dashpots of the body."""
+
+    @property
+    @abstractmethod
+    def participation(self) -> Floats:
+        """Motion of each coordinate that 1 m of the base is, shape (coordinate,)."""
+
+    @abstractmethod
+    def point(self, place: float) -> Floats:
+        """Return the displacement of a place for 1 m of each coordinate, shape (coordinate,)."""
+
+
+class MassesPart(Part):
+    """An oscillator or a chain: element i lies between mass i - 1 (the ground for the first) and mass i.
+
+    Parameters
+    ----------
+    masses : array, shape (mass,)
+        kg.
+    stiffnesses, dampings : array, shape (mass + 1,)
+        N/m and N s/m; the last ties the last mass to the ground.
+    displacements, velocities : array, shape (mass,)
+        The start, m and m/s.
+    """
+
+    def __init__(
+        self,
+        masses: Sequence[float],
+        stiffnesses: Sequence[float],
+        dampings: Sequence[float],
+        displacements: Sequence[float],
+        velocities: Sequence[float],
+    ) -> None:
+        self.masses = np.array(masses, dtype=np.float64)
+        self.displacements = np.array(displacements, dtype=np.float64)
+        self.velocities = np.array(velocities, dtype=np.float64)
+        self._pairs = list(zip(stiffnesses, dampings, strict=True))
+
+    @property
+    def elements(self) -> list[Element]:
+        """The springs and dashpots of the body; an element at the far end only where it has numbers."""
+        count = len(self.masses)
+        beside = np.eye(count + 1, count) - np.eye(count + 1, count, -1)
+        found = [Element(shape, *pair) for shape, pair in zip(beside, self._pairs, strict=True)]
+        return [each for each in found if each.stiffness > 0.0 or each.damping > 0.0]
+
+    @property
+    def participation(self) -> Floats:
+        """1 for each mass."""
+        return np.ones(len(self.masses))
+
+    def point(self, place: float) -> Floats:
+        """Return the unit vector of a mass, counted from 1."""
+        return np.asarray(np.eye(len(self.masses))[int(place) - 1])
+
+
+class BeamPart(Part):
+    """A beam, from the parameters of its FMU; its modes are the coordinates."""
+
+    def __init__(self, numbers: Numbers, integers: Integers) -> None:
+        found = BeamPoints(numbers, integers, 0).structure_of(numbers)
+        boundary = {number: name for name, number in BOUNDARIES.items()}[integers["boundary"]]
+        count = integers["modes"]
+        self._modes = beam_modes(boundary, count)
+        self._natural, self._ratios = found.frequencies, found.damping_ratios
+        self.masses = np.full(count, found.mass)
+        self.displacements, self.velocities = (
+            np.array([numbers.get(f"modal_{name}_start[{i}]", 0.0) for i in range(1, count + 1)])
+            for name in ("displacement", "velocity")
+        )
+
+    @property
+    def elements(self) -> list[Element]:
+        """The spring and the dashpot of each mode."""
+        stiffness = self.masses * self._natural**2
+        damping = 2.0 * self.masses * self._natural * self._ratios
+        rows = np.eye(len(self.masses))
+        return [Element(*each) for each in zip(rows, stiffness.tolist(), damping.tolist(), strict=True)]
+
+    @property
+    def participation(self) -> Floats:
+        """Mean of each shape over the length."""
+        return self._modes.participation
+
+    def point(self, place: float) -> Floats:
+        """Return the shapes at a place, a fraction of the length."""
+        return np.asarray(self._modes.shapes(place)[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A spring beside a dashpot between two points, each a part (from 0) and a place on it; None is the ground."""
+
+    first: tuple[int, float] | None
+    second: tuple[int, float] | None
+    stiffness: float
+    damping: float
+
+
+class Assembly:
+    """The modes of several bodies with joints: K phi = w^2 M phi, phi' M phi = 1.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    joints : sequence of Joint
+
+    Attributes
+    ----------
+    masses : ndarray, shape (coordinate,)
+        kg.
+    frequencies : ndarray, shape (mode,)
+        rad/s, ascending; 0 for each group of masses that nothing ties to the ground.
+    shapes : ndarray, shape (coordinate, mode)
+        kg^(-1/2).
+    damping : ndarray, shape (mode, mode)
+        Modal damping matrix phi' C phi, 1/s.
+
+    Raises
+    ------
+    UsageError
+        There are more than 64 coordinates, or the numbers have no modes in double precision.
+    """
+
+    def __init__(self, parts: Sequence[Part], joints: Sequence[Joint]) -> None:
+        self.parts = tuple(parts)
+        self.masses = np.concatenate([part.masses for part in parts])
+        self._first = np.cumsum([0, *(len(part.masses) for part in parts)])
+        elements = [
+            Element(self._own(number, each.shape), each.stiffness, each.damping)
+            for number, part in enumerate(parts)
+            for each in part.elements
+        ]
+        elements += [
+            Element(self.point(each.first) - self.point(each.second), each.stiffness, each.damping)
+            for each in joints
+        ]
+        self.elements = tuple(elements)
+        self.frequencies, self.shapes = self._modes()
+        self.damping = self._modal_damping()
+
+    def _own(self, part: int, shape: Floats) -> Floats:
+        """Return a shape over the coordinates of a part as one over all coordinates."""
+        found = np.zeros(len(self.masses))
+        found[self._first[part] : self._first[part + 1]] = shape
+        return found
+
+    def point(self, place: tuple[int, float] | None) -> Floats:
+        """Return the displacement of a point for 1 m of each coordinate; 0 for the ground."""
+        if place is None:
+            return np.zeros(len(self.masses))
+        part, where = place
+        return self._own(part, self.parts[part].point(where))
+
+    def in_modes(self, shape: Floats) -> Floats:
+        """Return the displacement that belongs to a shape over the coordinates for 1 kg^(1/2) m of each mode."""
+        return _times(shape, self.shapes)
+
+    def modal(self, motion: Floats) -> Floats:
+        """Return a motion of the coordinates in mass-normalised modes: phi' M motion."""
+        return _times(self.masses * motion, self.shapes)
+
+    # ---- modes ----
+
+    def _modes(self) -> tuple[Floats, Floats]:
+        """Return the angular frequencies, ascending, and the shapes, shape (coordinate, mode)."""
+        rigid = self._rigid()
+        root = np.sqrt(self.masses)
+        springs = [
+            np.sqrt(each.stiffness) * each.shape / root for each in self.elements if each.stiffness > 0.0
+        ]
+        count = len(self.masses)
+        frequencies, vectors = spring_modes(np.array(springs).reshape(-1, count))
+        kept = count - len(rigid)
+        if len(frequencies) < kept:
+            raise UsageError("body: expected stiffnesses and masses within some 30 decades, got wider ones.")
+        # rounding in a closed path of springs may look like further springs
+        frequencies, vectors = frequencies[len(frequencies) - kept :], vectors[len(vectors) - kept :]
+        shapes = np.concatenate([rigid, vectors / root]).T
+        return np.concatenate([np.zeros(len(rigid)), frequencies]), shapes * self._signs(shapes, root)
+
+    def _rigid(self) -> Floats:
+        """Return the shape of each group of masses that springs join but do not tie down, shape (group, mass)."""
+        springs = [each.shape for each in self.elements if each.stiffness > 0.0]
+        group = np.arange(len(self.masses))
+        for shape in springs:
+            joined = group[shape != 0.0]
+            group[np.isin(group, joined)] = joined.min(initial=len(group))
+        found = []
+        for number in np.unique(group):
+            own = group == number
+            if all(shape[own].sum() == 0.0 for shape in springs):
+                found.append(own / np.sqrt(self.masses[own].sum()))
+        return np.array(found).reshape(-1, len(self.masses))
+
+    def _signs(self, shapes: Floats, root: Floats) -> Floats:
+        """Return 1 or -1 for each mode, so that its first coordinate that takes part moves to the positive side."""
+        takes_part = np.abs(shapes * root[:, None]) > TAKES_PART
+        first = shapes[takes_part.argmax(axis=0), np.arange(shapes.shape[1])]
+        return np.where(first < 0.0, -1.0, 1.0)
+
+    # ---- damping ----
+
+    def _modal_damping(self) -> Floats:
+        count = len(self.masses)
+        found = np.zeros((count, count))
+        for each in self.elements:
+            if each.damping > 0.0:
+                elongation = self.in_modes(each.shape)
+                found = found + each.damping * elongation[:, None] * elongation
+        return found
+
+    @property
+    def damping_ratios(self) -> Floats:
+        """Damping ratio of each mode, from the diagonal of the modal damping; 0 without a spring."""
+        moves = self.frequencies > 0.0
+        own = self.damping.diagonal() / (2.0 * np.where(moves, self.frequencies, 1.0))
+        return np.where(moves, own, 0.0)
+
+    @cached_property
+    def is_coupled(self) -> bool:
+        """Whether the damping couples the modes, or damps a mode without a spring, which has no damping ratio."""
+        own = self.damping.diagonal()
+        off = np.abs(self.damping - np.diag(own))
+        if (own[self.frequencies == 0.0] != 0.0).any():
+            return True
+        return not self._commutes() or bool((off > DIAGONAL * (own[:, None] + own)).any())
+
+    def _commutes(self) -> bool:
+        """Return whether C M^-1 K = K M^-1 C within rounding."""
+        stiffness, damping = self._matrix("stiffness"), self._matrix("damping")
+        one = damping[:, :, None] * (stiffness / self.masses[:, None])[None]
+        other = stiffness[:, :, None] * (damping / self.masses[:, None])[None]
+        size = (np.abs(one) + np.abs(other)).sum(axis=1)
+        return bool((np.abs((one - other).sum(axis=1)) <= COMMUTES * size).all())
+
+    def _matrix(self, name: str) -> Floats:
+        """Return the matrix of the stiffnesses or of the dampings over the coordinates."""
+        count = len(self.masses)
+        found = np.zeros((count, count))
+        for each in self.elements:
+            found = found + getattr(each, name) * each.shape[:, None] * each.shape
+        return found
+
+
+def _times(row: Floats, matrix: Floats) -> Floats:
+    """Return the product of a row and a matrix, summed in the order of the row: the same bits on each machine."""
+    found = np.zeros(matrix.shape[1])
+    for place in np.flatnonzero(row):
+        found = found + row[place] * matrix[place]
+    return found

@@ -1,0 +1,304 @@
+#include "modal_structure.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "structure_file.h"
+#include "structure_variables.h"
+
+/* Smallest and largest angular frequency of a mode with a spring, rad/s: their squares are normal numbers. */
+static const double SLOWEST = 1e-150, FASTEST = 1e150;
+/* Rounding of a damping matrix, as a part of its size. */
+static const double MATRIX_ROUNDING = 64.0 * DBL_EPSILON;
+
+static void defaults(void *self)
+{
+    modal_structure *s = self;
+    s->modes = 1;
+    s->modes_described = VI_MODES;
+    for (int j = 0; j < VI_MODES; ++j) { /* an oscillator of mass 1 and stiffness 1 */
+        s->natural[j] = s->body.model.observed[j] = s->forcing[j] = s->force_shape[j] = 1.0;
+        s->base[j] = -1.0;
+        for (int k = 0; k < VI_PORTS; ++k) {
+            s->body.model.shape[k][j] = 1.0;
+        }
+    }
+}
+
+static void sized(void *self, const char *block, int count)
+{
+    modal_structure *s = self;
+    if (strcmp(block, "modes") == 0 && count >= 1 && count <= VI_MODES) {
+        s->modes = s->modes_described = count;
+    }
+}
+
+/* ---- the file of modes ---- */
+
+static void *open_file(const char *folder, char message[VI_MESSAGE_LENGTH])
+{
+    return vi_structure_file_open(folder, message);
+}
+
+/* Copy `count` numbers and return the place after them. */
+static const double *take(const double *from, int count, double to[])
+{
+    memcpy(to, from, (size_t)count * sizeof *to);
+    return from + count;
+}
+
+static void attach(void *self, const void *resources)
+{
+    modal_structure *s = self;
+    const vi_structure_file *file = resources;
+    if (file == NULL || file->modes == 0) {
+        return;
+    }
+    const int n = file->modes;
+    memset(s->body.model.shape, 0, sizeof s->body.model.shape); /* contacts beyond those of the file meet nothing */
+    s->modes = s->modes_of_file = n;
+    s->coupled = file->coupled;
+    const double *next = take(file->numbers, n, s->natural);
+    next = take(next, n, s->damping_ratio);
+    for (int i = 0; i < n; ++i) {
+        next = take(next, n, s->body.model.coupling[i]);
+    }
+    for (int k = 0; k < file->contacts; ++k) {
+        next = take(next, n, s->body.model.shape[k]);
+    }
+    double *const rows[] = {s->body.model.observed, s->forcing, s->base, s->force_shape, s->displacement_start,
+                            s->velocity_start};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+        next = take(next, n, rows[i]);
+    }
+}
+
+/* ---- validation ---- */
+
+static void check_frequencies(const modal_structure *s, char *message)
+{
+    double before = 0.0;
+    for (int j = 0; j < s->modes; ++j) {
+        const double w = s->natural[j];
+        if (!(w == 0.0 || (w >= SLOWEST && w <= FASTEST))) {
+            vi_complain(message, "mode.angular_frequency[%d]: expected 0, or %g to %g, got %.17g", j + 1, SLOWEST,
+                        FASTEST, w);
+        } else if (w < before) {
+            vi_complain(message, "mode.angular_frequency[%d]: expected at least that of the mode before, %.17g, got"
+                                 " %.17g", j + 1, before, w);
+        }
+        before = w;
+    }
+}
+
+/* Is the matrix positive semidefinite within rounding? Cholesky's factor of the matrix with a little more on its
+ * diagonal exists. */
+static bool never_gains(const modal_structure *s, double slack)
+{
+    double factor[VI_MODES][VI_MODES];
+    for (int i = 0; i < s->modes; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            double left = s->body.model.coupling[i][j] + (i == j ? slack : 0.0);
+            for (int k = 0; k < j; ++k) {
+                left -= factor[i][k] * factor[j][k];
+            }
+            if (i == j && !(left > 0.0)) {
+                return false;
+            }
+            factor[i][j] = i == j ? sqrt(left) : left / factor[j][j];
+        }
+    }
+    return true;
+}
+
+static void check_matrix(const modal_structure *s, char *message)
+{
+    double size = 0.0;
+    for (int i = 0; i < s->modes; ++i) {
+        for (int j = 0; j < s->modes; ++j) {
+            if (!isfinite(s->body.model.coupling[i][j])) {
+                vi_complain(message, "mode.damping[%d,%d]: expected a finite number, got %.17g", i + 1, j + 1,
+                            s->body.model.coupling[i][j]);
+                return;
+            }
+            size = fmax(size, fabs(s->body.model.coupling[i][j]));
+        }
+    }
+    for (int i = 0; i < s->modes; ++i) {
+        for (int j = 0; j < i; ++j) {
+            const double one = s->body.model.coupling[i][j], other = s->body.model.coupling[j][i];
+            if (!(fabs(one - other) <= MATRIX_ROUNDING * size)) {
+                vi_complain(message, "mode.damping[%d,%d]: expected that of [%d,%d], %.17g, got %.17g", i + 1, j + 1,
+                            j + 1, i + 1, other, one);
+                return;
+            }
+        }
+    }
+    if (size > 0.0 && !never_gains(s, MATRIX_ROUNDING * size * (double)s->modes)) {
+        vi_complain(message, "mode.damping: expected a matrix that takes energy from each motion, positive semidefinite,"
+                             " got another");
+    }
+}
+
+static void check_shapes(const modal_structure *s, char *message)
+{
+    const int n = (int)s->modes;
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (vi_contact_law_is_none(s->body.contacts[k].law.law)) {
+            continue;
+        }
+        double mobility = 0.0;
+        for (int j = 0; j < n; ++j) {
+            mobility += s->body.model.shape[k][j] * s->body.model.shape[k][j];
+        }
+        if (!isnormal(mobility)) {
+            vi_complain(message, "mode.contact_shape[%d,1:%d]: expected the shape of a contact that can move, got one"
+                                 " whose mobility is %g 1/kg", k + 1, n, mobility);
+        }
+    }
+    vi_check_each(message, vi_check_finite, "mode.observed_shape", s->body.model.observed, n);
+    vi_check_each(message, vi_check_finite, "mode.forcing", s->forcing, n);
+    vi_check_each(message, vi_check_finite, "mode.base", s->base, n);
+    vi_check_each(message, vi_check_finite, "mode.force", s->force_shape, n);
+}
+
+static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
+{
+    const modal_structure *s = self;
+    vi_check_finite(message, "force", s->force);
+    vi_check_finite(message, "force_rate", s->force_rate);
+}
+
+static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
+{
+    const modal_structure *s = self;
+    vi_check_finite(message, "forcing.amplitude", s->forcing_amplitude);
+    vi_check_finite(message, "forcing.base_acceleration", s->forcing_base_acceleration);
+}
+
+static bool parameters_are_good(const modal_structure *s, char *message)
+{
+    if (s->modes < 1 || s->modes > s->modes_described) {
+        vi_complain(message, "modes: expected 1 to %lld, got %lld", (long long)s->modes_described, (long long)s->modes);
+        return false;
+    }
+    if (s->modes_of_file > 0 && s->modes > s->modes_of_file) {
+        vi_complain(message, "modes: expected at most the %lld modes of resources/structure.bin, got %lld",
+                    (long long)s->modes_of_file, (long long)s->modes);
+        return false;
+    }
+    const int n = (int)s->modes;
+    check_frequencies(s, message);
+    if (s->coupled) {
+        check_matrix(s, message);
+    } else {
+        vi_check_each(message, vi_check_not_negative, "mode.damping_ratio", s->damping_ratio, n);
+    }
+    check_shapes(s, message);
+    check_forcing(s, message);
+    vi_check_each(message, vi_check_finite, "mode.displacement_start", s->displacement_start, n);
+    vi_check_each(message, vi_check_finite, "mode.velocity_start", s->velocity_start, n);
+    vi_body_check(&s->body, message);
+    check_inputs(s, message);
+    return message[0] == '\0';
+}
+
+/* ---- from parameters to modes ---- */
+
+/* Modal amplitudes of the harmonic force and of the base's inertial force; a force of frequency 0 is constant. */
+static void find_forcing(const void *self, double force[VI_MODES])
+{
+    const modal_structure *s = self;
+    const double share = s->body.forcing_angular_frequency == 0.0 ? cos(s->body.forcing_phase) : 1.0;
+    for (int j = 0; j < s->modes; ++j) {
+        force[j] = share * (s->forcing_amplitude * s->forcing[j] + s->forcing_base_acceleration * s->base[j]);
+    }
+}
+
+/* Damping ratio of a mode; where the damping couples the modes, from the diagonal. */
+static double ratio_of(const modal_structure *s, int j)
+{
+    if (!s->coupled) {
+        return s->damping_ratio[j];
+    }
+    return s->natural[j] > 0.0 ? 0.5 * s->body.model.coupling[j][j] / s->natural[j] : 0.0;
+}
+
+static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
+{
+    modal_structure *s = self;
+    if (!parameters_are_good(s, message)) {
+        return false;
+    }
+    vi_structure_model *model = &s->body.model;
+    vi_structure_state *state = &s->body.state;
+    double force[VI_MODES];
+    find_forcing(s, force);
+    model->modes = (int32_t)s->modes;
+    model->contacts = vi_body_ports(&s->body);
+    model->coupled = s->coupled;
+    memcpy(model->impulse, model->shape, sizeof model->impulse);
+    for (int j = 0; j < VI_MODES; ++j) {
+        const bool used = j < model->modes;
+        s->body.natural[j] = used ? s->natural[j] : 0.0;
+        state->q[j] = used ? s->displacement_start[j] : 0.0;
+        state->p[j] = used ? s->velocity_start[j] : 0.0;
+    }
+    for (int j = 0; j < model->modes; ++j) {
+        vi_structure_mode(model, j, s->natural[j], ratio_of(s, j), force[j], s->body.forcing_angular_frequency);
+    }
+    return true;
+}
+
+/* ---- loads and outputs ---- */
+
+static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
+{
+    const modal_structure *s = self;
+    for (int j = 0; j < s->modes; ++j) {
+        held[j] = s->force * s->force_shape[j] + s->body.base_acceleration * s->base[j];
+        held_rate[j] = s->force_rate * s->force_shape[j] + s->body.base_acceleration_rate * s->base[j];
+    }
+}
+
+static double base_forcing(const void *self)
+{
+    return ((const modal_structure *)self)->forcing_base_acceleration;
+}
+
+/* All outputs are those of the body. */
+static void update_outputs(void *self, double base_acceleration)
+{
+    (void)self;
+    (void)base_acceleration;
+}
+
+/* The states are those of the modes. */
+static void show_states(void *self, vi_exchange_body *body)
+{
+    body->modes = (int)((const modal_structure *)self)->modes_described;
+}
+
+const vi_body_form vi_this_body = {
+    .place = offsetof(modal_structure, body),
+    .restitution = STRUCTURE_CONTACT_APPLIED_RESTITUTION_1,
+    .stride = STRUCTURE_CONTACT_APPLIED_RESTITUTION_2 - STRUCTURE_CONTACT_APPLIED_RESTITUTION_1,
+    .taken = STRUCTURE_RECORD_TAKEN,
+    .start = "mode.displacement_start",
+    .defaults = defaults,
+    .sized = sized,
+    .open = open_file,
+    .attach = attach,
+    .close = free,
+    .prepare = prepare,
+    .check_inputs = check_inputs,
+    .check_forcing = check_forcing,
+    .find_forcing = find_forcing,
+    .find_inputs = find_inputs,
+    .base_forcing = base_forcing,
+    .update_outputs = update_outputs,
+    .show_states = show_states,
+};

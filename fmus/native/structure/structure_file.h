@@ -1,0 +1,26 @@
+/* The modes of a structure in the file structure.bin of an FMU's resources, which a tool without arrays cannot set.
+ *
+ * Little-endian: the eight letters VISTRUC1, then as int64 the number of modes, of contacts, and 1 or 0: does the damping
+ * couple the modes? Then as float64 the arrays of variables.toml in their order, for these modes and contacts only.
+ */
+#ifndef VIBROIMPACT_STRUCTURE_FILE_H
+#define VIBROIMPACT_STRUCTURE_FILE_H
+
+#include <stdint.h>
+
+#include "body/complaint.h"
+#include "sizes.h"
+
+/* Numbers of a file: eight rows, the damping matrix and the rows of the contacts. */
+enum { VI_STRUCTURE_ROWS = 8, VI_MOST_NUMBERS = VI_MODES * (VI_STRUCTURE_ROWS + VI_MODES + VI_PORTS) };
+
+typedef struct {
+    int32_t modes, contacts, coupled; /* modes: 0 without a file */
+    double numbers[VI_MOST_NUMBERS];  /* finite */
+} vi_structure_file;
+
+/* Read the file from the folder of resources; one without modes where the folder is NULL or lacks the file. Returns
+ * NULL, with the reason in `message`, for another content. The caller frees it. */
+vi_structure_file *vi_structure_file_open(const char *folder, char message[VI_MESSAGE_LENGTH]);
+
+#endif

@@ -1,0 +1,219 @@
+"""Several `[[body]]` tables that links join: one body of modes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from vibroimpact.orchestrator.scene.body_models.base import BodyTable, Stops
+from vibroimpact.orchestrator.scene.body_models.beam import BeamBody
+from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.points import (
+    GROUND,
+    NoPoint,
+    OneBody,
+    PointOfBody,
+    find_point,
+)
+from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
+from vibroimpact.orchestrator.scene.measuring_models import Sensor
+from vibroimpact.orchestrator.scene.models import (
+    DAMPING,
+    FEEDS_ENERGY,
+    POINT_RULE,
+    Forcing,
+    NotNegative,
+    Point,
+    SceneTable,
+    Stop,
+)
+from vibroimpact.orchestrator.scene.sampled_names import each_of
+
+if TYPE_CHECKING:
+    from vibroimpact.fmus.bodies.assembly import Assembly, Part
+
+MOST_LINKS = 256
+NOT_IN_STRUCTURES = (
+    *("modes", "residual", "observed_mass", "impact_projection", "poisson_ratio"),
+    *("frequency_slope", "damping_slope", "damping_reciprocal"),
+)
+"""Keys of a body that have no meaning, or no number to vary, among several bodies; `modes` of a beam is fixed."""
+
+
+class LinkTable(SceneTable):
+    """`[[link]]`: a spring and a dashpot in parallel between two points."""
+
+    between: Annotated[
+        tuple[Point, ...],
+        Field(strict=False, min_length=2, max_length=2),
+        Rule(
+            'two points of bodies such as ["frame", "beam.tip"]',
+            item=POINT_RULE.item,
+            hint=f'One of them may be "{GROUND}".',
+            doc=f'two points of bodies, or one and `"{GROUND}"`',
+        ),
+    ]
+    stiffness: Annotated[NotNegative, Rule(unit="N/m", hint="Use 0 for a dashpot alone.")] = 0.0
+    damping: Annotated[NotNegative, Rule(unit="N s/m", hint=FEEDS_ENERGY, effect=DAMPING)] = 0.0
+
+
+class StructureBody(BodyTable):
+    """Several bodies with their links; the state is the state of the modes of all of them."""
+
+    NAME: ClassVar[str] = "several bodies"
+    FMU: ClassVar[str] = "Structure"
+    MOST_STOPS: ClassVar[int] = 32
+    ELEMENT: ClassVar[str] = "mode"
+    STATE: ClassVar[str] = "modal_"
+    SLOWEST: ClassVar[str] = "mode.angular_frequency"
+    TAKES_ARRAYS: ClassVar[bool] = False
+    PLACE: ClassVar[str] = "at"
+    CAN_BE_MEASURED: ClassVar[bool] = False
+
+    names: Annotated[tuple[str, ...], Rule(sweepable=False)]
+    parts: Annotated[tuple[OneBody, ...], Rule(sweepable=False)]
+    links: Annotated[tuple[LinkTable, ...], Rule(sweepable=False)] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of modes: the masses of oscillators and chains, and the modes of beams."""
+        return sum(part.size for part in self.parts)
+
+    @property
+    def start_names(self) -> tuple[str, ...]:
+        """Parameters of the FMU with the start of the modes, in the order of the state."""
+        names = "displacement", "velocity"
+        return tuple(one for name in names for one in each_of(f"mode.{name}_start", self.size))
+
+    @property
+    def own_variables(self) -> tuple[str, ...]:
+        """The motion and the energy of each mode."""
+        names = "modal_displacement", "modal_velocity", "modal_energy"
+        return tuple(one for name in names for one in each_of(name, self.size))
+
+    def with_numbers(self, parts: Sequence[OneBody], links: Sequence[LinkTable]) -> StructureBody:
+        """Return these bodies with other numbers, which are known to be valid."""
+        return StructureBody.model_construct(names=self.names, parts=tuple(parts), links=tuple(links))
+
+    # ---- points ----
+
+    def point(self, text: str) -> PointOfBody:
+        """Return a point of a valid scene by its name."""
+        found = find_point(text, self.names, self.parts)
+        assert not isinstance(found, NoPoint), "the rules of scenes refuse it"
+        return found
+
+    def observed_point(self, stops: Stops) -> PointOfBody:
+        """Return the point whose displacement is recorded: of the first stop or contact, or the last body."""
+        if stops:
+            return self.point(stops[0].at or stops[0].between[0])
+        return self.point(self.names[-1])
+
+    def place_of(self, stop: Stop) -> float:
+        """Return a number of the point of a stop, which differs between points; NaN for a contact of two points."""
+        return math.nan if stop.at is None else _number_of(self.point(stop.at))
+
+    def observed_place(self, stops: Stops, sensor: Sensor | None) -> float:
+        """Return the number of the point of the recorded displacement, as by `place_of`."""
+        return _number_of(self.observed_point(stops))
+
+    # ---- modes ----
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The modes of the bodies with their links."""
+        # the import takes time, and scenes of one body do not need it
+        from vibroimpact.fmus.bodies.assembly import Assembly, Joint
+
+        joints = []
+        for link in self.links:
+            first, second = (None if end == GROUND else self.point(end) for end in link.between)
+            joints.append(Joint(first, second, link.stiffness, link.damping))
+        return Assembly([_part_of(part) for part in self.parts], joints)
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether the damping couples the modes."""
+        return self.assembly.is_coupled
+
+    def _shape_of(self, stop: Stop) -> NDArray[np.float64]:
+        """Return the row of a stop over the coordinates: its point, or the difference of the two points."""
+        assembly = self.assembly
+        if stop.at is not None:
+            return assembly.point(self.point(stop.at))
+        first, second = (assembly.point(self.point(end)) for end in stop.between)
+        return first - second
+
+    def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
+        """Return the modes, their start, their shapes at contacts, and their loads, mass-normalised, SI."""
+        assembly = self.assembly
+        observed = assembly.point(self.observed_point(stops))
+        forced = observed if forcing is None or forcing.at is None else assembly.point(self.point(forcing.at))
+        participation = np.concatenate([part.participation for part in assembly.parts])
+        base = -assembly.modal(participation)
+        force = assembly.in_modes(forced)
+        rows = {
+            "angular_frequency": assembly.frequencies,
+            "observed_shape": assembly.in_modes(observed),
+            "forcing": base if forcing is not None and forcing.kind == "base_acceleration" else force,
+            "base": base,
+            "force": force,
+            "displacement_start": assembly.modal(
+                np.concatenate([part.displacements for part in assembly.parts])
+            ),
+            "velocity_start": assembly.modal(np.concatenate([part.velocities for part in assembly.parts])),
+        }
+        tables = {"contact_shape": [assembly.in_modes(self._shape_of(stop)) for stop in stops]}
+        if assembly.is_coupled:
+            tables["damping"] = list(assembly.damping)
+        else:
+            rows["damping_ratio"] = assembly.damping_ratios
+        found = {
+            f"mode.{name}[{i}]": value
+            for name, row in rows.items()
+            for i, value in enumerate(row.tolist(), start=1)
+        }
+        found |= {
+            f"mode.{name}[{k},{i}]": value
+            for name, table in tables.items()
+            for k, row in enumerate(table, start=1)
+            for i, value in enumerate(row.tolist(), start=1)
+        }
+        if forcing is not None:
+            found["forcing.amplitude"] = forcing.scalar_amplitude
+        return found
+
+    def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
+        """Return the number of modes, and whether their damping couples them."""
+        return {"modes": self.size, "coupled": self.is_coupled}
+
+
+def _number_of(point: PointOfBody) -> float:
+    return 100.0 * point.body + point.place
+
+
+def _part_of(body: OneBody) -> Part:
+    """Return a body as a part of an assembly."""
+    from vibroimpact.fmus.bodies.assembly import BeamPart, MassesPart
+
+    if isinstance(body, BeamBody):
+        return BeamPart(
+            named_numbers(body, body.size) | body.fmu_floats(None, (), None), body.fmu_integers(None, ())
+        )
+    if isinstance(body, ChainBody):
+        numbers = named_numbers(body, body.size)
+        rows = [
+            [numbers[name] for name in each_of(name, body.size)]
+            for name in ("mass", "stiffness", "damping", "displacement_start", "velocity_start")
+        ]
+        rows[1].append(body.far_stiffness)
+        rows[2].append(body.far_damping)
+        return MassesPart(*rows)
+    one = [body.mass], [body.stiffness, 0.0], [body.damping, 0.0]
+    return MassesPart(*one, [body.displacement_start], [body.velocity_start])
