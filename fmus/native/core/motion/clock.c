@@ -118,12 +118,16 @@ double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
     return (whole + difference) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
 }
 
-bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
+int64_t vi_clock_events_here(const vi_standstill *standstill, vi_instant now)
 {
     const vi_instant *last = &standstill->instant;
-    if (now.periods != last->periods || now.rest != last->rest || now.rest_low != last->rest_low) {
-        *standstill = (vi_standstill){now, 0};
-    }
+    const bool here = now.periods == last->periods && now.rest == last->rest && now.rest_low == last->rest_low;
+    return here ? standstill->events : 0;
+}
+
+bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
+{
+    *standstill = (vi_standstill){now, vi_clock_events_here(standstill, now)};
     standstill->events += 1;
     return standstill->events >= VI_MOST_EVENTS;
 }

@@ -33,6 +33,9 @@ typedef struct {
  * most. */
 enum { VI_MOST_EVENTS = 1000 };
 
+/* Events in a row that have left the time at `now`. */
+int64_t vi_clock_events_here(const vi_standstill *standstill, vi_instant now);
+
 /* Count an event at `now`; true once VI_MOST_EVENTS in a row have left the time unchanged. */
 bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
 

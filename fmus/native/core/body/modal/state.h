@@ -91,9 +91,16 @@ typedef struct {
     int64_t known;                                   /* 64 bits, to avoid padding, which would be saved */
 } vi_rest_origin;
 
+/* Impacts that impacts set off at one instant; all 0 once none is left. */
+typedef struct {
+    int64_t rounds; /* so far */
+    double speed;   /* fastest approach so far, m/s */
+} vi_cascade;
+
 typedef struct {
     vi_instant now;
     vi_standstill standstill;
+    vi_cascade cascade;
     vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
     vi_phase phase;                  /* of the force, as last evaluated */

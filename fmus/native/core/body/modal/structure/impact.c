@@ -13,9 +13,19 @@
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-/* Rounds of joint impacts at one instant, each set off by the one before. Each round loses energy or ends; only between
- * stops that leave no room the rounds would never end. */
-static const int MOST_ROUNDS = 64;
+/* Rounds of impacts of one event, each set off by the one before; an instant has VI_MOST_EVENTS events at most. Between
+ * stops that leave no room the rounds would never end: they end with the first event. */
+enum { MOST_ROUNDS = 64 };
+
+/* Approach of a contact elsewhere, relative to the speed of an impact, up to which it is still. A larger approach is an
+ * impact of its own. A contact whose load gives it no larger approach within a radian rests without load. */
+static const double STILL = 64.0 * DBL_EPSILON;
+
+/* Rounding of a speed after rounds of impacts, in roundings of a single impact. */
+static const double MANY_ROUNDINGS = 16.0;
+
+/* Relative to the fastest approach of a round: difference up to which contacts collide together. */
+static const double TOGETHER = 1e-9;
 
 /* Height of a bounce, relative to the motion, that any integrator follows; unresolved heights are cut to it. */
 static const double HIGHEST_UNRESOLVED = 1e-4;
@@ -225,41 +235,115 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
     }
 }
 
+/* ---- contacts at rest during impacts of others ---- */
+
+static bool is_resting(const vi_structure *s, int k)
+{
+    const int32_t status = s->state->status[k];
+    return status == VI_CONTACT_HELD || (status == VI_CONTACT_TOUCHING && s->state->leaving[k]);
+}
+
+/* Is resting contact k without load, and would it rebound from an impact? */
+static bool is_idle(const vi_structure *s, int k)
+{
+    const double speed = s->state->cascade.speed;
+    if (!(restitution_of(s, k, speed) > 0.0)) {
+        return false;
+    }
+    vi_held_view view;
+    vi_structure_look_at_held(s, k, &view);
+    return view.pressure <= vi_max(view.noise, STILL * s->model->fastest * speed);
+}
+
+/* Can all these contacts leave their stops at once? */
+static bool leave_room(const vi_structure *s, const int chosen[])
+{
+    double whole[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], away[VI_PORTS] = {0.0}, p[VI_PORTS];
+    int index[VI_PORTS], count = 0;
+    vi_structure_signed(s, s->model->compliance, whole);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (chosen[k]) {
+            index[count++] = k;
+        }
+    }
+    for (int i = 0; i < count; ++i) {
+        away[i] = sqrt(whole[index[i]][index[i]]);
+        for (int j = 0; j < count; ++j) {
+            g[i][j] = whole[index[i]][index[j]];
+        }
+    }
+    vi_complementary(count, g, away, p);
+    for (int i = 0; i < count; ++i) {
+        double speed = 0.0;
+        for (int j = 0; j < count; ++j) {
+            speed += g[i][j] * p[j];
+        }
+        if (!(speed >= 0.5 * away[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Find the contacts that take part in a round: the hit ones, and resting ones, which may not be pushed in. A resting
+ * contact without load takes no part: an impact that reaches it is the next. */
+static void find_in_play(const vi_structure *s, const int hit[], int in_play[])
+{
+    int touching[VI_PORTS], idle[VI_PORTS], any = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        in_play[k] = touching[k] = hit[k] || is_resting(s, k);
+        idle[k] = !hit[k] && in_play[k] && is_idle(s, k);
+        any |= idle[k];
+    }
+    const bool apart = any && leave_room(s, touching);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        in_play[k] = in_play[k] && !(apart && idle[k]);
+    }
+}
+
+/* A round has changed the speed of resting contact k: does it still rest? */
+static void stay_or_part(const vi_structure *s, int k, bool in_play, double impulse)
+{
+    vi_structure_state *state = s->state;
+    const double v = vi_structure_approach(s, k), noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
+    s->contacts[k].total_impulse += in_play ? impulse : 0.0;
+    if (state->leaving[k] > 1) {
+        state->leaving[k] = 1; /* its acceleration may have changed */
+    }
+    const bool parts = in_play ? !(impulse > 0.0) && v < -noise : fabs(v) > vi_max(noise, STILL * state->cascade.speed);
+    if (parts) {
+        if (state->status[k] == VI_CONTACT_HELD) {
+            vi_structure_release(s, k, 0);
+        }
+        state->leaving[k] = 0;
+    }
+}
+
 /* One round: every hit contact demands its rebound; a contact that rests on its stop may only not be pushed in. */
 static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
     double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS], impulse[VI_PORTS], impulse_low[VI_PORTS];
-    int in_play[VI_PORTS];
+    int in_play[VI_PORTS], resting[VI_PORTS];
     const double before = vi_structure_kinetic(s);
-    memset(change, 0, (size_t)n * sizeof *change);
-    memset(in_play, 0, (size_t)n * sizeof *in_play);
     for (int k = 0; k < n; ++k) {
-        const bool resting = state->status[k] == VI_CONTACT_HELD
-                             || (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]);
-        in_play[k] = hit[k] || resting;
-        approach[k] = restitution[k] = 0.0;
+        approach[k] = restitution[k] = change[k] = 0.0;
+        resting[k] = !hit[k] && is_resting(s, k);
         if (hit[k]) {
             approach[k] = vi_max(0.0, vi_structure_approach(s, k));
             restitution[k] = restitution_of(s, k, approach[k]);
             change[k] = (1.0 + restitution[k]) * approach[k];
+            state->cascade.speed = vi_max(state->cascade.speed, approach[k]);
         }
     }
+    find_in_play(s, hit, in_play);
     joint_impulses(s, in_play, change, impulse, impulse_low);
     give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {
-        s->contacts[k].total_impulse += in_play[k] && !hit[k] ? impulse[k] : 0.0;
-        if (in_play[k] && !hit[k] && state->leaving[k] > 1) {
-            state->leaving[k] = 1; /* its acceleration may have changed */
-        }
-        if (in_play[k] && !hit[k] && !(impulse[k] > 0.0)
-            && vi_structure_approach(s, k) < -VI_ROUNDING * vi_structure_velocity_size(s, k)) {
-            if (state->status[k] == VI_CONTACT_HELD) {
-                vi_structure_release(s, k, 0);
-            }
-            state->leaving[k] = 0;
+        if (resting[k]) {
+            stay_or_part(s, k, in_play[k], impulse[k]);
         }
     }
     for (int k = 0; k < n; ++k) {
@@ -269,24 +353,36 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     }
 }
 
-/* A body between stops that leave no room: every touching contact comes to rest. */
-static void wedge(const vi_structure *s)
+/* Take the speed of these contacts, which touch their stops. */
+static void stop_contacts(const vi_structure *s, const int chosen[])
 {
-    double g[VI_PORTS][VI_PORTS], approach[VI_PORTS], impulse[VI_PORTS];
-    int touches[VI_PORTS] = {0};
+    double g[VI_PORTS][VI_PORTS], approach[VI_PORTS] = {0.0}, impulse[VI_PORTS];
     const double before = vi_structure_kinetic(s);
     for (int k = 0; k < s->model->contacts; ++k) {
-        const int32_t status = s->state->status[k];
-        touches[k] = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
         approach[k] = vi_structure_approach(s, k);
     }
     vi_structure_signed(s, s->model->compliance, g);
-    vi_solve_active(s->model->contacts, g, approach, touches, impulse);
+    vi_solve_active(s->model->contacts, g, approach, chosen, impulse);
     for (int k = 0; k < s->model->contacts; ++k) {
         vi_structure_push(s, k, impulse[k], s->state->p);
         s->contacts[k].total_impulse += impulse[k];
     }
     s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+}
+
+/* A body between stops that leave no room: every touching contact comes to rest. False where the stops leave room. */
+static bool wedge(const vi_structure *s)
+{
+    int touches[VI_PORTS] = {0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int32_t status = s->state->status[k];
+        touches[k] = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
+    }
+    if (leave_room(s, touches)) {
+        return false;
+    }
+    stop_contacts(s, touches);
+    return true;
 }
 
 void vi_structure_take_impulses(const vi_structure *s)
@@ -324,26 +420,80 @@ void vi_structure_take_impulses(const vi_structure *s)
     }
 }
 
-void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
+/* Does contact k, which an impact of this instant may have thrown in, touch its stop without a decision to rest? */
+static bool is_exposed(const vi_structure *s, int k)
 {
-    int now[VI_PORTS];
-    memcpy(now, hit, (size_t)s->model->contacts * sizeof *now);
-    for (int round = 0; round < MOST_ROUNDS; ++round) {
-        collide_once(s, now);
-        int any = 0;
+    vi_structure_state *state = s->state;
+    if (s->model->stop[k] != VI_RIGID_STOP || vi_contact_law_is_external(s->contacts[k].law.law)) {
+        return false;
+    }
+    if (vi_structure_meets_now(s, k)) { /* thrown against its stop by the last round, in a corner */
+        state->status[k] = VI_CONTACT_TOUCHING;
+        state->leaving[k] = 0;
+    }
+    return state->status[k] == VI_CONTACT_TOUCHING && !state->leaving[k];
+}
+
+/* Find the contacts of the next round: the fastest approach, with others as fast. False where none approaches; contacts
+ * of many rounds that neither approach nor leave are then at rest. */
+static bool find_next_round(const vi_structure *s, int next[])
+{
+    const vi_cascade *cascade = &s->state->cascade;
+    double approach[VI_PORTS], fastest = 0.0;
+    int still[VI_PORTS], any = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const bool exposed = is_exposed(s, k);
+        const double v = exposed ? vi_structure_approach(s, k) : 0.0;
+        const double rounding = (cascade->rounds > 1 ? MANY_ROUNDINGS : 1.0) * VI_ROUNDING;
+        const double least = vi_max(rounding * vi_structure_velocity_size(s, k), STILL * cascade->speed);
+        still[k] = exposed && fabs(v) <= least;
+        any |= still[k];
+        approach[k] = v > least ? v : 0.0;
+        fastest = vi_max(fastest, approach[k]);
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        next[k] = approach[k] > 0.0 && approach[k] >= (1.0 - TOGETHER) * fastest;
+    }
+    if (!(fastest > 0.0) && any && cascade->rounds > 1) {
+        stop_contacts(s, still);
         for (int k = 0; k < s->model->contacts; ++k) {
-            const bool rigid = s->model->stop[k] == VI_RIGID_STOP && !vi_contact_law_is_external(s->contacts[k].law.law);
-            if (rigid && vi_structure_meets_now(s, k)) { /* thrown against its stop by the last round, in a corner */
-                s->state->status[k] = VI_CONTACT_TOUCHING;
-                s->state->leaving[k] = 0;
-            }
-            const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k] && rigid;
-            now[k] = touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k);
-            any |= now[k];
-        }
-        if (!any) {
-            return;
+            s->state->leaving[k] = still[k] ? 1 : s->state->leaving[k];
         }
     }
-    wedge(s);
+    return fastest > 0.0;
+}
+
+/* Rounds of impacts, from these on, until no contact approaches its stop, or until the event ends. */
+static void cascade(const vi_structure *s, int next[])
+{
+    vi_cascade *cascade = &s->state->cascade;
+    for (int round = 0; round < MOST_ROUNDS; ++round) {
+        collide_once(s, next);
+        cascade->rounds += 1;
+        if (!find_next_round(s, next) || (cascade->rounds == MOST_ROUNDS && wedge(s))) {
+            *cascade = (vi_cascade){0, 0.0};
+            return;
+        }
+        if (vi_record_full(s->record) && !s->record->reported) {
+            return; /* the importer takes the rows first */
+        }
+    }
+}
+
+void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
+{
+    int next[VI_PORTS];
+    memcpy(next, hit, (size_t)s->model->contacts * sizeof *next);
+    s->state->cascade = (vi_cascade){0, 0.0};
+    cascade(s, next);
+}
+
+void vi_structure_collide_on(const vi_structure *s)
+{
+    int next[VI_PORTS];
+    if (!find_next_round(s, next)) {
+        s->state->cascade = (vi_cascade){0, 0.0};
+        return;
+    }
+    cascade(s, next);
 }

@@ -4,8 +4,13 @@
 
 #include "body/modal/state.h"
 
-/* Apply joint impulses to all contacts that touch and approach; external laws use their answers if `answered`. */
+/* Apply joint impulses to all contacts that touch and approach; external laws use their answers if `answered`. The
+ * impacts that they set off at this instant follow in rounds, fastest first. `cascade` of the state is set where rounds
+ * are left. equations.md 3.5. */
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
+
+/* Go on with the rounds that an event has left. */
+void vi_structure_collide_on(const vi_structure *s);
 
 /* Apply the given impulses once, each to its contact. A resting contact then leaves its stop, or hits it next. */
 void vi_structure_take_impulses(const vi_structure *s);

@@ -7,10 +7,15 @@
 #include "body/modal/held.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
+#include "body/modal/structure/impact.h"
 #include "contact/complementarity.h"
 
 /* Force, in roundings, up to which a contact whose point others hold counts as without force. */
 static const double NEGLIGIBLE_PUSH = 16.0;
+
+/* Events at one instant after which decisions contradict each other by rounding. The joint forces of the stops then
+ * decide alone. */
+enum { MOST_DECISIONS = VI_MOST_EVENTS / 2 };
 
 static bool gives_way(const vi_structure *s, int k)
 {
@@ -73,7 +78,9 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     const bool idle = (nothing || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
-    const bool presses = !idle && (tie ? stays : taken > view.noise);
+    const bool undecided = vi_clock_events_here(&s->state->standstill, s->state->now) > MOST_DECISIONS && !compliant;
+    const bool pushed = gap < -view.noise || taken > (was_held ? 0.0 : view.noise);
+    const bool presses = undecided ? pushed : !idle && (tie ? stays : taken > view.noise);
     if (presses && compliant) {
         vi_structure_touch_down(s, k);
     } else if (presses && !was_held) {
@@ -117,6 +124,9 @@ static void settle_resting(const vi_structure *s, const int candidate[])
 void vi_structure_settle(const vi_structure *s, bool stop_here)
 {
     vi_structure_state *state = s->state;
+    if (state->cascade.rounds > 0) {
+        vi_structure_collide_on(s);
+    }
     for (int k = 0; k < s->model->contacts; ++k) {
         if (state->status[k] == VI_CONTACT_YIELDING && vi_structure_only_touches(s, k)) {
             vi_structure_separate(s, k, false);
@@ -124,7 +134,7 @@ void vi_structure_settle(const vi_structure *s, bool stop_here)
         }
     }
     int candidate[VI_PORTS], hit[VI_PORTS], any_candidate = 0, first = -1;
-    for (int k = 0; k < s->model->contacts && !state->pending; ++k) {
+    for (int k = 0; k < s->model->contacts && !state->pending && state->cascade.rounds == 0; ++k) {
         candidate[k] = hit[k] = 0;
         if (!vi_structure_watched(s, k)) {
             continue;

@@ -360,6 +360,10 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
         return looked;
     }
     const bool coupled = is_coupled(s);
+    if (state->cascade.rounds > 0) {
+        vi_structure_settle(s, stops_here(s, target, request)); /* impacts of this instant go on */
+        return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
+    }
     if (coupled && loads_are_finite(s)) {
         drift(s, target, request);
     } else if (coupled || !fly(s, target, request)) {
