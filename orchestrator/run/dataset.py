@@ -28,6 +28,8 @@ from vibroimpact.orchestrator.run.empty_record import empty_record, records_impa
 from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models.structure import MOTIONS, observed_variables
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -36,6 +38,8 @@ from vibroimpact.orchestrator.scene.sweep import expand, shared_dimensions
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
 FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
+_OF_MOTION = dict(zip(MOTIONS, ("m", "m s-1"), strict=True))
+_STATE_OF_MODES = "displacements (kg1/2 m), then velocities (kg1/2 m s-1), of all mass-normalised modes at the end of the run"
 
 
 class DatasetForm:
@@ -62,6 +66,11 @@ class DatasetForm:
         stored = dict(zip(scene.sampled, stored_samples(scene), strict=True))
         of_channels = channel_attributes(scene).items()
         self._attributes = {stored[name]: own for name, own in of_channels} | _described(scene, self._names)
+        if scene.is_one_body and isinstance(scene.body, StructureBody):
+            self._attributes["final_state"] = {"long_name": _STATE_OF_MODES}
+            known = scene.body.long_names(scene.stops)
+            own = {stored[name]: {"long_name": known[name]} for name in scene.sampled if name in known}
+            self._attributes |= own
         if not scene.is_one_body and records_impacts(scene):
             self._attributes["impact_contact"] = _named_contacts([each.name for each in scene.meetings])
 
@@ -216,6 +225,10 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         return units | stored if scene.units == "SI" else stored
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
     forcing |= dict.fromkeys(scene.channels, "V")
+    if isinstance(scene.body, StructureBody):
+        forcing |= {
+            name: _OF_MOTION[name.partition("[")[0]] for name in observed_variables(scene.record.observed)
+        }
     return forcing | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
 
 

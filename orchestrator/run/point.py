@@ -145,7 +145,8 @@ class PointRunner(Runner):
         began = time.perf_counter()
         scene = self.scene.at(values) if values else self.scene
         self._reopen_if_other(scene)
-        run = _Run(scene, self.driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
+        plan = self._plan.at(scene) if values else self._plan
+        run = _Run(scene, self.driver, plan, without_padding(start, len(state_variables(scene)) // 2))
         outcome, message = run.run()
         message = message or "; ".join(self.driver.warnings)
         record = run.record(outcome, message, time.perf_counter() - began)

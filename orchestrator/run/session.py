@@ -124,7 +124,7 @@ class Session:
                 "body.modes, execution.macro_step: expected what the opened scene has, got another number. "
                 "Open a scene that says so."
             )
-        self._forcing = scene.forcing
+        self._forcing, self._plan = scene.forcing, self._plan.at(scene)
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)
         self._driver.record(impacts=True, extrema=False, periods=False)

@@ -346,7 +346,7 @@ class TimeSeries(SceneTable):
         ),
     ] = None
     variables: Annotated[
-        tuple[Annotated[str, Field(min_length=1, max_length=60)], ...],
+        tuple[Annotated[str, Field(min_length=1, max_length=200)], ...],
         Field(strict=False, min_length=1),
         Rule(
             "an array of variable names",
@@ -358,6 +358,17 @@ class TimeSeries(SceneTable):
 
 
 _NOT_RECORDED = "not recorded"
+PointPair = Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=2)]
+
+
+def _point_or_pair(value: object) -> str:
+    return ARRAY_TAG if isinstance(value, list | tuple) else WORD_TAG
+
+
+Observed = Annotated[
+    Annotated[Point, Tag(WORD_TAG)] | Annotated[PointPair, Tag(ARRAY_TAG)], Discriminator(_point_or_pair)
+]
+MOST_OBSERVED = 32
 
 
 class Record(SceneTable):
@@ -392,6 +403,18 @@ class Record(SceneTable):
             "and smallest displacement, the mean number of impacts, the strobe of the last period"
         ),
     ] = True
+    observed: Annotated[
+        tuple[Observed, ...],
+        Field(strict=False, max_length=MOST_OBSERVED),
+        Rule(
+            f"an array of at most {MOST_OBSERVED} points and pairs of points",
+            item="a point of a body, or an array of two points",
+            hint='For example ["ball", ["ball", "frame"]].',
+            doc='several bodies: points such as `"ball"`, and pairs such as `["ball", "frame"]` for the first '
+            "displacement minus the second; the first entry is the observed point",
+            default="the first stop's point, else the first contact's first point, else the last body",
+        ),
+    ] = ()
     time_series: Annotated[
         TimeSeries | None,
         Rule(
