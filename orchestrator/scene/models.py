@@ -411,7 +411,7 @@ class Record(SceneTable):
             item="a point of a body, or an array of two points",
             hint='For example ["ball", ["ball", "frame"]].',
             doc='several bodies: points such as `"ball"`, and pairs such as `["ball", "frame"]` for the first '
-            "displacement minus the second; the first entry is the observed point",
+            "displacement minus the second; each has extremes and a strobe, the first as the observed point",
             default="the first stop's point, else the first contact's first point, else the last body",
         ),
     ] = ()

@@ -136,12 +136,23 @@ class StructureBody(BodyTable):
 
     def long_names(self, stops: Stops) -> dict[str, str]:
         """Return the motion of each observed point, contact and mode in words, by its name in a time series."""
-        found = {}
+        found: dict[str, str] = {}
         for motion in MOTIONS:
             found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
             met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
             found |= {f"contact_{motion}[{number}]": f"{motion} of {words}" for number, words in met}
         return found
+
+    @property
+    def further_words(self) -> tuple[str, ...]:
+        """The observed points besides the first, in words."""
+        return tuple(map(_words, self.observed[1:]))
+
+    def observing_one(self) -> StructureBody:
+        """Return these bodies without the observed points that only a record needs."""
+        return StructureBody.model_construct(
+            names=self.names, parts=self.parts, links=self.links, observed=self.observed[:1]
+        )
 
     # ---- modes ----
 
@@ -203,9 +214,8 @@ class StructureBody(BodyTable):
             ),
             "velocity_start": assembly.modal(np.concatenate([part.velocities for part in assembly.parts])),
         }
-        tables = {
-            "contact_shape": [assembly.in_modes(self._shape_of(stop.at or stop.between)) for stop in stops]
-        }
+        points = (*(stop.at or stop.between for stop in stops), *self.observed[1:])
+        tables = {"contact_shape": [assembly.in_modes(self._shape_of(each)) for each in points]}
         if assembly.is_coupled:
             tables["damping"] = list(assembly.damping)
         else:
@@ -226,8 +236,9 @@ class StructureBody(BodyTable):
         return found
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return the number of modes, and whether their damping couples them."""
-        return {"modes": self.size, "coupled": self.is_coupled}
+        """Return the number of modes and of further observed points, and whether the damping couples the modes."""
+        further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
+        return {"modes": self.size, "coupled": self.is_coupled, **further}
 
 
 def label_of(observed: Observed) -> str:

@@ -65,7 +65,7 @@ def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
         for key in part.written("body"):
             if key not in NOT_IN_STRUCTURES or key == "poisson_ratio":
                 continue
-            if key == "modes" and keeps_modes and not part.finds_modes:
+            if key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes)):
                 continue
             where = f"body[{number}].{key}"
             if key == "modes" and keeps_modes:
@@ -92,6 +92,11 @@ def _counts_are_few(draft: Draft) -> Iterator[Problem]:
         hint = "Each mass of an oscillator or a chain counts, and each mode of a beam."
         yield Problem("body", f"at most {MOST_MODES} modes in all", f"{sum(sizes)}", hint)
     contacts, most = len(draft.stops) + len(draft.meetings), StructureBody.MOST_STOPS
+    observed = () if draft.record is None else draft.record.observed
+    if contacts <= most < contacts + len(observed) - 1:
+        got = f"{contacts} and {len(observed) - 1}"
+        expected = f"at most {most} stops, contacts and observed points after the first in all"
+        yield Problem("record.observed", expected, got, "Leave some of them out.")
     if contacts > most:
         yield Problem(
             "contact", f"at most {most} stops and contacts in all", f"{contacts}", "Remove some of them."

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import vibroimpact as vi
+from vibroimpact.analysis.dataset.schema import POINT_COLUMNS
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.session import Session
@@ -66,6 +67,46 @@ def test_extremes_are_of_the_first_observed_point() -> None:
     assert lowest - 1e-12 <= way.min() < way.max() <= highest + 1e-12
 
 
+LAWS: list[dict[str, Any]] = [
+    {"restitution": 0.8},
+    {"restitution": 0.0},
+    {"law": "kelvin_voigt", "stiffness": 40.0, "damping": 0.5},
+    {"law": "hertz", "stiffness": 300.0},
+    {"law": "hunt_crossley", "stiffness": 300.0, "damping": 0.3},
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_each_observed_point_has_the_extremes_that_it_has_alone(law: dict[str, Any]) -> None:
+    """Flights, rests, and contacts that yield: each has its own search for extremes."""
+    pair = {"clearance": 0.1, **law}
+    tables = {"contact": [pair | {"between": ["frame", "ball"]}, pair | {"between": ["ball", "frame"]}]}
+    power = law.get("law") in ("hertz", "hunt_crossley")
+    record = TABLES["record"] | {"recorded_periods": 2}
+    whole = vi.run(Scene.from_dict(TABLES | tables | {"record": record | {"observed": OBSERVED}}))
+    for observed, name in zip(OBSERVED[1:], ("ball", "arm_1"), strict=True):
+        alone = vi.run(Scene.from_dict(TABLES | tables | {"record": record | {"observed": [observed]}}))
+        for column in POINT_COLUMNS:
+            ours, theirs = whole[f"{column}_{name}"].values, alone[column].values
+            assert ours == pytest.approx(theirs, abs=1e-6 if power else 1e-12), (column, name)
+    assert whole.displacement_max_ball.attrs["long_name"] == "ball: largest displacement in a period"
+    assert whole.displacement_max_ball.dims == ("period",)
+
+
+def test_one_value_stands_for_all_periods_of_each_observed_point() -> None:
+    each, one = vi.run(scene(OBSERVED)), vi.run(scene(OBSERVED, each_period=False))
+    assert one.sizes["period"] == 1
+    assert one.displacement_max_arm_1.item() == each.displacement_max_arm_1.values.max()
+    assert one.displacement_min_arm_1.item() == each.displacement_min_arm_1.values.min()
+    assert one.strobe_velocity_ball.item() == each.strobe_velocity_ball.values[-1]
+
+
+def test_observed_points_are_recorded_without_impacts_or_strobe() -> None:
+    found = vi.run(scene(OBSERVED, strobe=False, impacts=False))
+    assert {"displacement_max_ball", "displacement_min_arm_1"} <= set(found.variables)
+    assert "strobe_velocity_ball" not in found.variables
+
+
 def test_a_pair_moves_as_its_contact_does() -> None:
     names = ["displacement[frame - ball]", "contact_displacement[1]", "contact_velocity[1]", "velocity"]
     found = vi.run(scene(OBSERVED, time_series={"rate": 20.0, "variables": names}))
@@ -85,10 +126,11 @@ def test_each_point_of_a_sweep_has_the_shapes_of_its_own_modes() -> None:
         assert own.tolist() == alone.displacement_ball.values.tolist()
 
 
-def test_observed_points_keep_a_sweep_with_their_series_out_of_lanes() -> None:
+def test_more_observed_points_and_their_series_keep_a_sweep_out_of_lanes() -> None:
     sweep = {"forcing.angular_frequency": [0.9, 1.0]}
-    assert goes_by_lanes(scene(OBSERVED).with_sweep(sweep))
-    assert not goes_by_lanes(scene(OBSERVED, time_series={"rate": 5.0}).with_sweep(sweep))
+    assert goes_by_lanes(scene(OBSERVED[:1]).with_sweep(sweep))
+    assert not goes_by_lanes(scene(OBSERVED).with_sweep(sweep))
+    assert not goes_by_lanes(scene(OBSERVED[:1], time_series={"rate": 5.0}).with_sweep(sweep))
 
 
 def test_a_session_has_observed_points_as_outputs() -> None:
