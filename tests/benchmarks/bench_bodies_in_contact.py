@@ -4,8 +4,8 @@ Newton's cradle of five balls with restitution 1 swings until it has made the gi
 2.0. Two chains pound, and two masses on springs hit each other with a compliant law. The results are the processor
 time for each impulse (or contact), and the relative change of the energy.
 
-A ball in the cavity of an oscillator runs as one structure over 200 forcing periods: one point after the other, and
-the points of a sweep at once. The results are the processor times of a point.
+A ball in the cavity of an oscillator runs as one structure over 200 forcing periods. Its points run one after the
+other, and at once in lanes. The results are the processor times of a point.
 Run with `python tests/benchmarks/bench_bodies_in_contact.py [--impacts 10000]`.
 """
 
