@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
-from vibroimpact.orchestrator.run.summary import contacts, effects, engine, fused_form, laws
+from vibroimpact.orchestrator.run.summary import contacts, effects, engine, fused_form, laws, out_of_lanes
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -60,6 +60,8 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     if remark := fused_form(scene):
         yield "fused", remark
+    if remark := out_of_lanes(scene):
+        yield "lanes", remark
     known = effects(scene)
     listed = ("stops" if scene.stops else "", "contacts")
     yield (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,12 @@ import xarray as xr
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import POINT_COLUMNS
+from vibroimpact.analysis.figures.sweep.diagrams import drawable_variables
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.session import Session
+from vibroimpact.orchestrator.run.summary import out_of_lanes
 from vibroimpact.orchestrator.scene import Scene
 
 OBSERVED: list[Any] = [["frame", "ball"], "ball", "arm.1"]
@@ -130,6 +135,8 @@ def test_more_observed_points_and_their_series_keep_a_sweep_out_of_lanes() -> No
     sweep = {"forcing.angular_frequency": [0.9, 1.0]}
     assert goes_by_lanes(scene(OBSERVED[:1]).with_sweep(sweep))
     assert not goes_by_lanes(scene(OBSERVED).with_sweep(sweep))
+    assert out_of_lanes(scene(OBSERVED).with_sweep(sweep)).startswith("none, as record.observed has more")
+    assert not out_of_lanes(scene(OBSERVED[:1]).with_sweep(sweep))
     assert not goes_by_lanes(scene(OBSERVED[:1], time_series={"rate": 5.0}).with_sweep(sweep))
 
 
@@ -186,3 +193,30 @@ def test_sampled_motion_is_a_sum_of_modes() -> None:
     weights = body.weights_of("velocity[arm.1]")
     assert list(weights) == [f"modal_velocity[{i}]" for i in range(1, 5)]
     assert np.square(list(weights.values())).sum() == pytest.approx(1.0 / 0.5)
+
+
+@pytest.mark.parametrize("layout", ["netcdf", "zarr"])
+def test_a_campaign_stores_each_observed_point_and_goes_on(layout: Any, tmp_path: Path) -> None:
+    swept = scene(OBSERVED, recorded_periods=2).with_sweep({"body[2].mass": [0.1, 0.2, 0.3]})
+    found = vi.campaign(swept, tmp_path / "map", format=layout)
+    alone = vi.run(swept)
+    for name in ("displacement_max_ball", "strobe_velocity_arm_1"):
+        assert found[name].values.tolist() == alone[name].values.tolist()
+        assert found[name].attrs["long_name"] == alone[name].attrs["long_name"]
+
+
+def test_a_figure_draws_the_extremes_of_an_observed_point(tmp_path: Path) -> None:
+    found = vi.run(scene(OBSERVED, recorded_periods=2).with_sweep({"body[2].mass": [0.1, 0.2]}))
+    assert "displacement_max_ball" in drawable_variables(found)
+    vi.draw(found, variable="displacement_max_ball").savefig(tmp_path / "ball.png")
+    series = vi.draw(vi.run(scene(OBSERVED, recorded_periods=2, time_series={"rate": 9.0})))
+    assert [axis.get_ylabel() for axis in series.axes] == ["displacement (m)", "velocity (m s$^{-1}$)"]
+
+
+def test_an_export_is_the_scene_with_its_first_observed_point(tmp_path: Path) -> None:
+    files = [
+        export_scene(scene(each), tmp_path / f"{len(each)}.fmu", fmi="2.0")
+        for each in (OBSERVED, OBSERVED[:1])
+    ]
+    one, other = (zipfile.ZipFile(file).read("resources/structure.bin") for file in files)
+    assert one == other
