@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene.fields import Rule, listed
+from vibroimpact.orchestrator.scene.point_fields import MOST_OBSERVED, POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, WORD_TAG
 
 MOST_SAMPLES_PER_RUN = 10**8
@@ -92,13 +93,6 @@ def location_rule(doc: str, default: str) -> Rule:
     hint = "It is a fraction of the length: 0 is the clamped end, 1 the far end."
     return Rule(hint=hint, doc=doc, default=default)
 
-
-Point = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]*$")]
-POINT_RULE = Rule(
-    "a point of a body, in quotes",
-    item="a point of a body, in quotes",
-    hint='For example "ball", "chain.2" or "beam.tip".',
-)
 
 _CONSTANT = "Use 0 for a constant force."
 
@@ -358,17 +352,6 @@ class TimeSeries(SceneTable):
 
 
 _NOT_RECORDED = "not recorded"
-PointPair = Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=2)]
-
-
-def _point_or_pair(value: object) -> str:
-    return ARRAY_TAG if isinstance(value, list | tuple) else WORD_TAG
-
-
-Observed = Annotated[
-    Annotated[Point, Tag(WORD_TAG)] | Annotated[PointPair, Tag(ARRAY_TAG)], Discriminator(_point_or_pair)
-]
-MOST_OBSERVED = 32
 
 
 class Record(SceneTable):

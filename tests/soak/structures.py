@@ -12,7 +12,10 @@ import xarray as xr
 from support.drawn_structures import ENERGIES, drawn_structure
 
 import vibroimpact as vi
+from vibroimpact.analysis.dataset.naming import file_name_of
+from vibroimpact.orchestrator.run.dataset import further_points
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models.structure import label_of
 
 CASES = 20_000
 SAMPLE = 6
@@ -21,6 +24,8 @@ SECONDS = 20.0
 TURNOVER, TURNOVER_POWER = 1e-9, 1e-7
 #: Largest way beyond a rigid stop, over the displacements and the clearance.
 BEYOND = 1e-11
+#: Rounding of a displacement, m, and the outcome whose last period has no row.
+ROUNDING, IMPACT_LIMIT = 1e-11, 2
 POWER = ("hertz", "hunt_crossley")
 #: Impacts that two forms share before their rounding parts them, and the largest difference of their times.
 SHARED, APART = 6, 1e-8
@@ -37,7 +42,7 @@ def check(seed: int) -> str | None:
     return (
         _energy_problem(tables, found)
         or _room_problem(scene, found)
-        or _extremes_problem(found)
+        or _extremes_problem(scene, found)
         or _components_problem(tables, found)
     )
 
@@ -69,16 +74,17 @@ def _room_problem(scene: Scene, found: xr.Dataset) -> str | None:
     return None
 
 
-def _extremes_problem(found: xr.Dataset) -> str | None:
-    """Return the problem of an extreme that a sampled motion of the same contact point exceeds."""
-    for name in found.variables:
-        if not str(name).startswith("displacement_max"):
+def _extremes_problem(scene: Scene, found: xr.Dataset) -> str | None:
+    """Return the observed point whose samples exceed its extremes."""
+    names = ("", *(f"_{name}" for name in further_points(scene)))
+    for observed, name in zip(scene.record.observed, names, strict=False):
+        column = f"displacement_max{name}"
+        if column not in found or not found.sizes["period"] or int(found.outcome) == IMPACT_LIMIT:
             continue
-        low = found[str(name).replace("max", "min")].values
-        high = found[name].values
-        known = ~np.isnan(high)
-        if (low[known] > high[known]).any():
-            return f"{name}: the smallest displacement of a period is above the largest"
+        way = found[file_name_of(f"displacement[{label_of(observed)}]")].values
+        high, low = found[column].values.max(), found[column.replace("max", "min")].values.min()
+        if way.max() > high + ROUNDING or way.min() < low - ROUNDING:
+            return f"{label_of(observed)}: samples from {way.min()} to {way.max()}, extremes {low} and {high}"
     return None
 
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
+
 Tables = dict[str, Any]
 BOUNDARIES = ("clamped-free", "pinned-pinned", "clamped-clamped", "clamped-pinned")
 SAMPLES = 60
@@ -102,6 +104,7 @@ def drawn_structure(seed: int) -> Tables:
     observed = [_pick(random, *points), _pair(random, points)][: int(random.integers(0, 3))]
     names_of_series = [f"energy.{name}" for name in ENERGIES]
     names_of_series += [f"contact_displacement[{k}]" for k in range(1, len(stops) + len(contacts) + 1)]
+    names_of_series += [name for name in observed_variables(observed) if name.startswith("displacement")]
     tables: Tables = {
         "scene": {"units": "nondimensional"},
         "body": [body for body, _ in made],

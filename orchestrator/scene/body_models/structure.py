@@ -26,14 +26,12 @@ from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
     FEEDS_ENERGY,
-    POINT_RULE,
     Forcing,
     NotNegative,
-    Observed,
-    Point,
     SceneTable,
     Stop,
 )
+from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
 if TYPE_CHECKING:
