@@ -28,6 +28,7 @@ from vibroimpact.analysis.dataset.schema import (
     UnitSystem,
     constant_names,
     swept_names,
+    variable_rule,
 )
 from vibroimpact.analysis.files.stores import Place
 from vibroimpact.fmus.errors import DatasetError
@@ -146,6 +147,8 @@ def _missing_names(dataset: xr.Dataset) -> list[str]:
 def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
     """Return the problems of one variable."""
     rule = RULES.get(name)
+    if rule is None and variable.dims == RULES["displacement_max"].dims:
+        rule = variable_rule(name)
     problems = []
     if rule is None:
         if variable.dims not in ((), ("run",), ("sample",)):

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset.schema import (
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
+    POINT_COLUMNS,
     RAGGED,
-    RULES,
     STICK_COLUMNS,
     RunRecord,
+    known_rule,
     names_list,
+    period_columns,
 )
 from vibroimpact.fmus.errors import DatasetError
 
@@ -98,7 +100,9 @@ class RunColumns:
         return RunColumns(*(some(getattr(self, name)) for name in self.__slots__))
 
 
-def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: bool = True) -> dict[str, Any]:
+def arrays_of(
+    columns: RunColumns, omit: Collection[str] = (), *, each_period: bool = True, further: Sequence[str] = ()
+) -> dict[str, Any]:
     """Return the records of runs as arrays, by their names in a dataset and in its types.
 
     Parameters
@@ -108,6 +112,8 @@ def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: b
         Per-period variables that are left out.
     each_period : bool
         False: one element stands for all recorded periods of a run, as `of_all_periods` computes it.
+    further : sequence of str
+        Names in files of the further observed points.
     """
     found: dict[str, Any] = {
         "outcome": columns.outcome,
@@ -121,15 +127,18 @@ def arrays_of(columns: RunColumns, omit: Collection[str] = (), *, each_period: b
         found["final_state"] = columns.final_state
     if columns.periods is not None:
         periods = columns.periods if each_period else of_all_periods(columns.periods)
-        of_periods = zip(PERIOD_COLUMNS, np.moveaxis(periods, -1, 0), strict=True)
-        found |= {name: values for name, values in of_periods if name not in omit}
+        of_periods = zip(period_columns(further), np.moveaxis(periods, -1, 0), strict=True)
+        left_out = tuple(omit)
+        found |= {name: values for name, values in of_periods if not name.startswith(left_out)}
     for dimension, rows, names in (
         ("impact", columns.impacts, IMPACT_COLUMNS),
         ("stick", columns.sticks, STICK_COLUMNS),
     ):
         if rows is not None:
             found |= {RAGGED[dimension]: rows.count, **dict(zip(names, rows.rows.T, strict=True))}
-    return {name: np.ascontiguousarray(values, dtype=RULES[name].dtype) for name, values in found.items()}
+    return {
+        name: np.ascontiguousarray(values, dtype=known_rule(name).dtype) for name, values in found.items()
+    }
 
 
 def columns_of(records: Sequence[RunRecord]) -> RunColumns:
@@ -186,8 +195,8 @@ def _states(states: Sequence[Floats | None]) -> Floats | None:
 def _periods(tables: Sequence[Floats | None]) -> Floats | None:
     if all(table is None for table in tables):
         return None
-    length = max(len(table) for table in tables if table is not None)
-    values = np.full((len(tables), length, len(PERIOD_COLUMNS)), np.nan)
+    length, width = np.max([table.shape for table in tables if table is not None], axis=0)
+    values = np.full((len(tables), length, width), np.nan)
     for row, table in enumerate(tables):
         if table is not None:
             values[row, : len(table)] = table
@@ -207,21 +216,23 @@ OF_ALL_PERIODS = {
 def of_all_periods(periods: Floats) -> Floats:
     """Return the values of each run over all its periods together.
 
-    The columns are `PERIOD_COLUMNS`, shape (run, period, 5), then (run, 1, 5): largest, smallest, both strobe values
-    of the last period, mean. A run with fewer periods than the others ends in NaN; a run without any has NaN alone.
-    Values of one period stand for all as they are.
+    The columns are those of `schema.period_columns`, shape (run, period, column), then (run, 1, column): largest,
+    smallest, both strobe values of the last period, mean. A run with fewer periods than the others ends in NaN; a run
+    without any has NaN alone. Values of one period stand for all as they are.
     """
     if periods.shape[1] == 1:
         return periods
-    result = np.full((len(periods), 1, len(PERIOD_COLUMNS)), np.nan)
+    result = np.full((len(periods), 1, periods.shape[2]), np.nan)
     # each recorded period has its number of impacts, also where nothing else is recorded
     count = np.count_nonzero(~np.isnan(periods[:, :, 4]), axis=1)
     some = count > 0
     if some.any():
         known, last = periods[some], count[some] - 1
-        result[some, 0, 0] = np.fmax.reduce(known[:, :, 0], axis=1)
-        result[some, 0, 1] = np.fmin.reduce(known[:, :, 1], axis=1)
-        result[some, 0, 2:4] = known[np.arange(len(known)), last, 2:4]
+        for first in (0, *range(len(PERIOD_COLUMNS), periods.shape[2], len(POINT_COLUMNS))):
+            result[some, 0, first] = np.fmax.reduce(known[:, :, first], axis=1)
+            result[some, 0, first + 1] = np.fmin.reduce(known[:, :, first + 1], axis=1)
+            strobe = slice(first + 2, first + 4)
+            result[some, 0, strobe] = known[np.arange(len(known)), last, strobe]
         result[some, 0, 4] = np.nansum(known[:, :, 4], axis=1) / count[some]
     return result
 

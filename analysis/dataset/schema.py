@@ -8,7 +8,7 @@ explains it in words.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, IntFlag
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -91,7 +91,7 @@ class RunRecord:
         The reason, in words; empty for `Outcome.ok`.
     periods : ndarray of float, shape (period, 5), or None
         Columns `PERIOD_COLUMNS`: displacement_max, displacement_min, strobe_displacement (m),
-        strobe_velocity (m/s), impacts_per_period.
+        strobe_velocity (m/s), impacts_per_period; then the first four of each further observed point.
     impacts : ndarray of float, shape (impact, 8), or None
         Columns `IMPACT_COLUMNS`: impact_time (s), impact_phase (rad), impact_velocity (m/s),
         impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s),
@@ -268,6 +268,8 @@ def _columns(dims: tuple[str, ...]) -> tuple[str, ...]:
 
 
 PERIOD_COLUMNS = _columns(("run", "period"))
+POINT_COLUMNS = PERIOD_COLUMNS[:4]
+"""Variables of each period that an observed point has."""
 IMPACT_COLUMNS = _columns(("impact",))
 NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
 """Columns of impacts that every file has; the other columns came later."""
@@ -308,9 +310,37 @@ def unit_in(system: UnitSystem, unit: str) -> str:
     return unit if system == "SI" or unit in ("rad", "%", "1e-6") else "1"
 
 
+def variable_rule(name: str) -> VariableRule | None:
+    """Return the rule of a variable; a further observed point has the rule of the observed one, with its own name.
+
+    >>> variable_rule("displacement_max_ball").long_name, variable_rule("ball")
+    ('largest displacement in a period', None)
+    """
+    if name in RULES:
+        return RULES[name]
+    own = next((each for each in POINT_COLUMNS if name.startswith(f"{each}_")), None)
+    return None if own is None else replace(RULES[own], name=name)
+
+
+def known_rule(name: str) -> VariableRule:
+    """Return the rule of a variable of the schema."""
+    rule = variable_rule(name)
+    assert rule is not None, "a variable of the schema"
+    return rule
+
+
+def period_columns(further: Sequence[str]) -> tuple[str, ...]:
+    """Return the variables of each period: of the observed point, then of each further one by its name in files.
+
+    >>> period_columns(["ball"])[4:7]
+    ('impacts_per_period', 'displacement_max_ball', 'displacement_min_ball')
+    """
+    return (*PERIOD_COLUMNS, *(f"{name}_{point}" for point in further for name in POINT_COLUMNS))
+
+
 def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
     """Return the attributes of a schema variable in a system of units."""
-    rule = RULES[name]
+    rule = known_rule(name)
     # Wall time is measured in seconds in every system of units.
     unit = rule.unit if name == "point_seconds" else unit_in(system, rule.unit)
     return {"long_name": rule.long_name, "units": unit, **rule.extra}

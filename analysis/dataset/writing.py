@@ -37,6 +37,7 @@ from vibroimpact.analysis.dataset.schema import (
     RunRecord,
     UnitSystem,
     attributes_of,
+    known_rule,
     names_list,
     unit_in,
 )
@@ -67,6 +68,7 @@ def build_dataset(
     event_components: Sequence[str] = (),
     connections: Sequence[str] = (),
     compared: Sequence[str] = (),
+    further: Sequence[str] = (),
     measured: Mapping[str, NDArray[Any]] | None = None,
     constants: Mapping[str, Described] | None = None,
 ) -> xr.Dataset:
@@ -103,6 +105,8 @@ def build_dataset(
         `RunRecord.energy_residual`. A run without residuals has NaN.
     compared : sequence of str, optional
         Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
+    further : sequence of str, optional
+        Names in the file of further observed points, in the order of their columns in `RunRecord.periods`.
     measured : mapping of str to ndarray, shape (run,), optional
         Further columns of runs that a rig has measured, or that are orbits: some of `schema.MEASURED_COLUMNS`, or
         `schema.ORBIT_COLUMNS`.
@@ -131,7 +135,7 @@ def build_dataset(
     _check_lengths(len(runs), coordinates, direction, run_index)
     columns, records = (runs, ()) if isinstance(runs, RunColumns) else (columns_of(runs), runs)
     variables = _described({"run_index": run_index, "direction": direction}, units)
-    variables |= _column_variables(columns, units, omit, each_period)
+    variables |= _column_variables(columns, units, omit, each_period, further)
     samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
     variables |= _sample_variables(columns.samples, samples)
     variables |= _event_variables(records, event_components, units)
@@ -212,8 +216,8 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
     """Return values as variables of the schema, with its dimensions, types and attributes."""
     return {
         name: (
-            RULES[name].dims,
-            np.ascontiguousarray(column, dtype=RULES[name].dtype),
+            known_rule(name).dims,
+            np.ascontiguousarray(column, dtype=known_rule(name).dtype),
             attributes_of(name, units),
         )
         for name, column in values.items()
@@ -221,10 +225,10 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
 
 
 def _column_variables(
-    columns: RunColumns, units: UnitSystem, omit: Collection[str], each_period: bool
+    columns: RunColumns, units: UnitSystem, omit: Collection[str], each_period: bool, further: Sequence[str]
 ) -> _Variables:
     """Return the variables of the records of runs."""
-    variables = _described(arrays_of(columns, omit, each_period=each_period), units)
+    variables = _described(arrays_of(columns, omit, each_period=each_period, further=further), units)
     for name in () if each_period else OF_ALL_PERIODS.keys() & variables:
         variables[name][2]["long_name"] = OF_ALL_PERIODS[name]
     return variables

@@ -99,13 +99,13 @@ def export_component(
     changes: Sequence[str] | None,
     fmi: str,
     platform: str | None,
-    **kinds: bool,
+    **kinds: Any,
 ) -> Path:
     """Write the FMU of a component with the start values of `NAME=VALUE`."""
     path = output or Path(f"{component_name(component)}.fmu")
     starts = None if changes is None else dict(map(_start, changes))
     return export_fmu(
-        component, path, **counts, starts=starts, fmi=fmi, platform=platform, units=None, note=note, **kinds
+        component, path, **counts, **kinds, starts=starts, fmi=fmi, platform=platform, note=note
     )
 
 

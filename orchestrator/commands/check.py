@@ -31,6 +31,7 @@ from vibroimpact.orchestrator.run.summary import (
     fused_form,
     laws,
     natural_frequencies,
+    out_of_lanes,
 )
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene
@@ -67,6 +68,8 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     if remark := fused_form(scene):
         yield "fused", remark
+    if remark := out_of_lanes(scene):
+        yield "lanes", remark
     known = effects(scene)
     listed = ("stops" if scene.stops else "", "contacts")
     yield (

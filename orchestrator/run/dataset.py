@@ -19,8 +19,8 @@ from vibroimpact.analysis.dataset import (
     marked,
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
-from vibroimpact.analysis.dataset.columns import RunColumns, arrays_of
-from vibroimpact.analysis.dataset.schema import RAGGED, RULES, SWEPT_ALONG
+from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS, RunColumns, arrays_of
+from vibroimpact.analysis.dataset.schema import POINT_COLUMNS, RAGGED, RULES, SWEPT_ALONG
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
@@ -28,6 +28,12 @@ from vibroimpact.orchestrator.run.empty_record import empty_record, records_impa
 from vibroimpact.orchestrator.run.measuring.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.points import PointColumns, columns_of_points
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models.structure import (
+    MOTIONS,
+    label_of,
+    observed_variables,
+)
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -36,6 +42,8 @@ from vibroimpact.orchestrator.scene.sweep import expand, shared_dimensions
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
 FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
+_OF_MOTION = dict(zip(MOTIONS, ("m", "m s-1"), strict=True))
+_STATE_OF_MODES = "displacements (kg1/2 m), then velocities (kg1/2 m s-1), of all mass-normalised modes"
 
 
 class DatasetForm:
@@ -58,12 +66,29 @@ class DatasetForm:
             "event_components": [component.name for component in scene.components],
             "connections": _energy_connections(scene),
             "compared": compared_names(scene),
+            "further": further_points(scene),
         }
         stored = dict(zip(scene.sampled, stored_samples(scene), strict=True))
         of_channels = channel_attributes(scene).items()
         self._attributes = {stored[name]: own for name, own in of_channels} | _described(scene, self._names)
+        if scene.is_one_body and isinstance(scene.body, StructureBody):
+            self._attributes["final_state"] = {"long_name": _STATE_OF_MODES}
+            known = scene.body.long_names(scene.stops)
+            own = {stored[name]: {"long_name": known[name]} for name in scene.sampled if name in known}
+            self._attributes |= own | self._of_further(scene.body)
         if not scene.is_one_body and records_impacts(scene):
             self._attributes["impact_contact"] = _named_contacts([each.name for each in scene.meetings])
+
+    def _of_further(self, body: StructureBody) -> dict[str, dict[str, Any]]:
+        """Return the long names of the variables of each period of further observed points."""
+        scene, found = self._scene, {}
+        periods = scene.period is not None and (scene.record.extrema or scene.record.strobe)
+        for point, words in zip(self._said["further"], body.further_words if periods else (), strict=False):
+            for name in POINT_COLUMNS:
+                if name not in self.omitted:
+                    own = RULES[name].long_name if scene.record.each_period else OF_ALL_PERIODS[name]
+                    found[f"{name}_{point}"] = {"long_name": f"{words}: {own}"}
+        return found
 
     def dataset(
         self,
@@ -109,7 +134,9 @@ class DatasetForm:
 
     def arrays(self, columns: RunColumns) -> dict[str, Any]:
         """Return the results of points as arrays, with the names and the types of the dataset."""
-        found = arrays_of(columns, self.omitted, each_period=self._said["each_period"])
+        found = arrays_of(
+            columns, self.omitted, each_period=self._said["each_period"], further=self._said["further"]
+        )
         if columns.samples is not None:
             found[RAGGED["sample"]] = columns.samples.count.astype(RULES[RAGGED["sample"]].dtype)
             names = ("time", *stored_samples(self._scene))
@@ -216,6 +243,10 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         return units | stored if scene.units == "SI" else stored
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
     forcing |= dict.fromkeys(scene.channels, "V")
+    if isinstance(scene.body, StructureBody):
+        forcing |= {
+            name: _OF_MOTION[name.partition("[")[0]] for name in observed_variables(scene.record.observed)
+        }
     return forcing | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
@@ -250,6 +281,11 @@ def _named_contacts(names: Sequence[str]) -> dict[str, Any]:
         "flag_values": np.arange(1, len(names) + 1, dtype=RULES["impact_contact"].dtype),
         "flag_meanings": " ".join(file_names(names, ())),
     }
+
+
+def further_points(scene: Scene) -> tuple[str, ...]:
+    """Return the names in the file of the observed points besides the first."""
+    return file_names([label_of(each) for each in scene.record.observed[1:]], ()) if scene.is_one_body else ()
 
 
 def _omitted(scene: Scene) -> tuple[str, ...]:

@@ -8,17 +8,21 @@ import numpy as np
 
 from vibroimpact.analysis.dataset import (
     IMPACT_COLUMNS,
-    PERIOD_COLUMNS,
     STICK_COLUMNS,
     Outcome,
     RunRecord,
 )
-from vibroimpact.analysis.dataset.schema import RULES
+from vibroimpact.analysis.dataset.schema import PERIOD_COLUMNS, POINT_COLUMNS, RULES
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 
 MOST_CONTACTS = int(np.iinfo(RULES["impact_contact"].dtype).max)
 """Largest number of contacts of a scene of components that its table of impacts can number."""
+
+
+def columns_of_periods(scene: Scene) -> int:
+    """Return the number of columns of a table of periods: see `RunRecord`."""
+    return len(PERIOD_COLUMNS) + len(POINT_COLUMNS) * len(scene.record.observed[1:])
 
 
 def records_impacts(scene: Scene) -> bool:
@@ -44,7 +48,7 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     return RunRecord(
         outcome=outcome,
         message=message,
-        periods=np.empty((0, len(PERIOD_COLUMNS))) if periods else None,
+        periods=np.empty((0, columns_of_periods(scene))) if periods else None,
         impacts=np.empty((0, len(IMPACT_COLUMNS))) if records_impacts(scene) else None,
         sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and scene.is_one_body else None,
         samples=np.empty((0, 1 + len(names))) if names else None,

@@ -12,6 +12,7 @@ from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.structure_file import structure_file
 from vibroimpact.orchestrator.run.parameters import exported_floats, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 
 
 def export_scene(
@@ -63,6 +64,8 @@ def export_scene(
             f"{scene.source}: exciter.distance: expected a force that does not depend on the displacement, as an FMU "
             "of a body has it, got one that falls with the distance. Leave it out, or connect an Exciter to the FMU."
         )
+    if isinstance(scene.body, StructureBody):
+        scene = scene.model_copy(update={"bodies": (scene.body.observing_one(),)})
     integers = integer_parameters(scene)
     starts, arrays = without_arrays(exported_floats(scene))
     structure = structure_file(arrays, coupled=bool(integers["coupled"])) if arrays else None

@@ -108,6 +108,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
         "measuring chain": scene.is_measured or scene.exciter is not None,
         "laws": any(stop.law != "restitution" for stop in scene.stops) and not _yields_in_lanes(scene),
         "time series": scene.record.time_series is not None and not _samples_in_lanes(scene),
+        "further points": len(scene.record.observed) > 1,
         "many contacts": len(scene.stops) > core.MOST_CONTACTS,
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),

@@ -21,6 +21,7 @@ from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.run.empty_record import columns_of_periods
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, loop_of
@@ -34,6 +35,7 @@ from vibroimpact.orchestrator.run.parameters import (
 )
 from vibroimpact.orchestrator.run.points import PointColumns, State
 from vibroimpact.orchestrator.run.record import (
+    ROW_FURTHER,
     ROW_PERIOD,
     DeadlineReached,
     ImpactLimitReached,
@@ -145,7 +147,8 @@ class PointRunner(Runner):
         began = time.perf_counter()
         scene = self.scene.at(values) if values else self.scene
         self._reopen_if_other(scene)
-        run = _Run(scene, self.driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
+        plan = self._plan.at(scene) if values else self._plan
+        run = _Run(scene, self.driver, plan, without_padding(start, len(state_variables(scene)) // 2))
         outcome, message = run.run()
         message = message or "; ".join(self.driver.warnings)
         record = run.record(outcome, message, time.perf_counter() - began)
@@ -355,7 +358,13 @@ class _Run:
         return (angle + self.parameters["forcing.phase"]) % TWO_PI
 
     def _period_rows(self) -> NDArray[np.float64] | None:
-        return self.driver.rows.of_kind(ROW_PERIOD)[:, 1:6] if self._has_periods() else None
+        if not self._has_periods():
+            return None
+        rows = self.driver.rows
+        periods = rows.of_kind(ROW_PERIOD)[:, 1:6]
+        further = rows.of_kind(ROW_FURTHER)[:, 2:6]
+        width = columns_of_periods(self.scene) - periods.shape[1]
+        return np.hstack([periods, further.reshape(len(periods), width)]) if width else periods
 
     def _sample_rows(self) -> NDArray[np.float64] | None:
         series = self.scene.record.time_series

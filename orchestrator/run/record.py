@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.importer.events import StepWatcher
 
 ROW_WIDTH = 8
 ROW_CAPACITY = 512
-ROW_IMPACT, ROW_STICK, ROW_PERIOD, ROW_PEAK = 1.0, 2.0, 3.0, 4.0
+ROW_IMPACT, ROW_STICK, ROW_PERIOD, ROW_PEAK, ROW_FURTHER = 1.0, 2.0, 3.0, 4.0, 5.0
 IMPACT_WIDTH = 8
 """Number of columns of an impact: the seven of its row, and the largest force from the row after it."""
 _NOTHING: NDArray[np.float64] = np.empty(0)

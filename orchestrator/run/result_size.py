@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from vibroimpact.analysis.dataset import PERIOD_COLUMNS
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.empty_record import columns_of_periods
 from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
@@ -24,7 +24,7 @@ def bytes_of_a_run(scene: Scene) -> int:
     rate = scene.sampling_rate
     samples = round(rate * _recorded_seconds(scene)) if rate else 0
     periods = periods if record.each_period else min(periods, 1)
-    numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(scene.sampled))
+    numbers = periods * columns_of_periods(scene) + samples * (1 + len(scene.sampled))
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
 
 

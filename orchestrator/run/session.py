@@ -125,7 +125,7 @@ class Session:
                 "Open a scene that says so."
             )
         self._inputs.values[:] = 0.0
-        self._forcing = scene.forcing
+        self._forcing, self._plan = scene.forcing, self._plan.at(scene)
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)
         self._driver.record(impacts=True, extrema=False, periods=False)

@@ -101,6 +101,14 @@ def fused_form(scene: Scene) -> str:
     return "these bodies and contacts are one structure, too, and faster as [[body]] and [[contact]]"
 
 
+def out_of_lanes(scene: Scene) -> str:
+    """Return a remark on observed points that keep a sweep out of lanes; empty for other scenes."""
+    alone = scene.record.model_copy(update={"observed": scene.record.observed[:1]})
+    if not scene.record.observed[1:] or not goes_by_lanes(scene.model_copy(update={"record": alone})):
+        return ""
+    return "none, as record.observed has more than one entry: the points run one by one"
+
+
 def _met(contact: StopContactSpec | PairSpec) -> str:
     if isinstance(contact, PairSpec):
         return f"{contact.name}, {contact.law}"

@@ -35,7 +35,11 @@ class TimeSeriesPlan:
         series_names = series.variables if series is not None else ()
         self.all_names: tuple[str, ...] = series_names if names is None else tuple(names)
         self.names = tuple(name for name in self.all_names if name not in CHANNELS)
-        parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
+        weights = [scene.body.weights_of(name) for name in self.names]
+        parts = [
+            tuple(own) or fmu_variables(name, len(scene.stops))
+            for name, own in zip(self.names, weights, strict=True)
+        ]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
         self.energies = scene.body.IS_STRUCTURE and follow_energies(self.names)
         yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
@@ -44,11 +48,17 @@ class TimeSeriesPlan:
         # a beam has a moving base in its FMU; other bodies get only forces on their masses
         self._relative = not scene.body.KNOWS_BASE
         self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
+        self._weights = [np.array(list(each.values())) for each in weights]
+
+    def at(self, scene: Scene) -> TimeSeriesPlan:
+        """Return the plan at a point of the scene's sweep, whose bodies may have other modes."""
+        return TimeSeriesPlan(scene, self.all_names) if any(map(len, self._weights)) else self
 
     def is_plain(self, forcing: Forcing | None) -> bool:
         """Return whether the sampled variables are the FMU's own, one by one, so that `row` changes nothing."""
         untouched = forcing is None or not any(n.startswith(("forcing", "acceleration")) for n in self.names)
-        return untouched and self._columns == [[place] for place in range(len(self.names))]
+        plain = untouched and self._columns == [[place] for place in range(len(self.names))]
+        return plain and not any(map(len, self._weights))
 
     def row(
         self,
@@ -66,8 +76,9 @@ class TimeSeriesPlan:
             cosine = math.cos(forcing.angular_frequency * time + parameters["forcing.phase"])
         base = forcing.scalar_amplitude * cosine if forcing and self._is_relative(forcing) else 0.0
         row = []
-        for name, columns in zip(self.names, self._columns, strict=True):
-            value = math.fsum(values[column] for column in columns)
+        for name, columns, weights in zip(self.names, self._columns, self._weights, strict=True):
+            own = values[columns] * weights if len(weights) else values[columns]
+            value = math.fsum(own.tolist())
             if name.startswith("forcing"):
                 value = _amplitude(forcing, name) * cosine
             elif name.startswith("acceleration"):
@@ -103,11 +114,14 @@ class TimeSeriesPlan:
         own = [place[name] for name in self.variables]
         found = np.zeros((len(times), len(self.names)))
         base = self.base(forcing, parameters, times)
-        for column, (name, parts) in enumerate(zip(self.names, self._columns, strict=True)):
+        for column, (name, parts, weights) in enumerate(
+            zip(self.names, self._columns, self._weights, strict=True)
+        ):
             if name.startswith("forcing") and forcing is not None:
                 found[:, column] = _amplitude(forcing, name) * _cosines(forcing, parameters, times)
                 continue
-            found[:, column] = _sums(values[:, [own[part] for part in parts]])
+            terms = values[:, [own[part] for part in parts]]
+            found[:, column] = _sums(terms * weights if len(weights) else terms)
             if name.startswith("acceleration"):
                 found[:, column] += base
         return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -229,16 +229,26 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
     mass = 2.5 # kg
     stiffness = 4.0
     """
+    import tomlkit  # the import takes time, and few scenes are written anew
+
     target = parse_toml(text)
     _put_all(target, values, recordings)
-    # the import takes time, and few scenes are written anew
+
+    def edit(text: str) -> str:
+        document = tomlkit.parse(text)
+        _put_all(document, values, recordings)
+        return tomlkit.dumps(document)
+
+    return edited_text(text, edit, target)
+
+
+def edited_text(text: str, edit: Callable[[str], str], target: Mapping[str, Any]) -> str:
+    """Return a TOML text after an edit that keeps comments; without comments if it is not the text of `target`."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
     try:
-        document = tomlkit.parse(text)
-        _put_all(document, values, recordings)
-        edited = tomlkit.dumps(document)
+        edited = edit(text)
         if parse_toml(edited) == target:
             return edited
     except (TOMLKitError, ValueError):

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, LinkTable, StructureBody
+from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, Key, number_of, numeric_key
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
@@ -117,12 +118,12 @@ class Draft(DraftTables):
         self.parts: tuple[Draft, ...] = ()
         self.links: tuple[LinkTable | None, ...] = ()
         self.meetings: tuple[Contact | None, ...] = ()
+        self.record = _sampling_observed(self.table(Record, "record", {}))
         self.body: Body | None = self._structure() if self.is_structure else self._body()
         self.forcing = self.table(Forcing, "forcing")
         self.stops: tuple[OwnStop | None, ...] = tuple(
             self.variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
         )
-        self.record = self.table(Record, "record", {})
         self.execution = self.table(Execution, "execution", {})
         self.sensor = self.table(Sensor, "sensor")
         self.load_cell = self.table(LoadCell, "load_cell")
@@ -162,7 +163,10 @@ class Draft(DraftTables):
         parts = tuple(body for body in bodies if body is not None and not isinstance(body, StructureBody))
         if not whole or not parts or len(parts) < len(self.names):
             return None
-        return StructureBody.model_construct(names=tuple(names), parts=parts, links=tuple(links))
+        observed = () if self.record is None else self.record.observed
+        return StructureBody.model_construct(
+            names=tuple(names), parts=parts, links=tuple(links), observed=observed
+        )
 
     @property
     def sweeps_modes(self) -> bool:
@@ -228,6 +232,15 @@ class Draft(DraftTables):
             return self.span("forcing.angular_frequency")
         span = self.span("forcing.frequency")
         return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
+
+
+def _sampling_observed(record: Record | None) -> Record | None:
+    """Return a record whose time series, if it names no variables, samples each observed point."""
+    series = None if record is None else record.time_series
+    if record is None or series is None or not record.observed or "variables" in series.model_fields_set:
+        return record
+    variables = observed_variables(record.observed)
+    return record.model_copy(update={"time_series": series.model_copy(update={"variables": variables})})
 
 
 def with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:

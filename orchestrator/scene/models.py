@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene.fields import Rule, listed
+from vibroimpact.orchestrator.scene.point_fields import MOST_OBSERVED, POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, WORD_TAG
 
 MOST_SAMPLES_PER_RUN = 10**8
@@ -92,13 +93,6 @@ def location_rule(doc: str, default: str) -> Rule:
     hint = "It is a fraction of the length: 0 is the clamped end, 1 the far end."
     return Rule(hint=hint, doc=doc, default=default)
 
-
-Point = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]*$")]
-POINT_RULE = Rule(
-    "a point of a body, in quotes",
-    item="a point of a body, in quotes",
-    hint='For example "ball", "chain.2" or "beam.tip".',
-)
 
 _CONSTANT = "Use 0 for a constant force."
 
@@ -346,7 +340,7 @@ class TimeSeries(SceneTable):
         ),
     ] = None
     variables: Annotated[
-        tuple[Annotated[str, Field(min_length=1, max_length=60)], ...],
+        tuple[Annotated[str, Field(min_length=1, max_length=200)], ...],
         Field(strict=False, min_length=1),
         Rule(
             "an array of variable names",
@@ -392,6 +386,18 @@ class Record(SceneTable):
             "and smallest displacement, the mean number of impacts, the strobe of the last period"
         ),
     ] = True
+    observed: Annotated[
+        tuple[Observed, ...],
+        Field(strict=False, max_length=MOST_OBSERVED),
+        Rule(
+            f"an array of at most {MOST_OBSERVED} points and pairs of points",
+            item="a point of a body, or an array of two points",
+            hint='For example ["ball", ["ball", "frame"]].',
+            doc='several bodies: points such as `"ball"`, and pairs such as `["ball", "frame"]` for the first '
+            "displacement minus the second; each has extremes and a strobe, the first as the observed point",
+            default="the first stop's point, else the first contact's first point, else the last body",
+        ),
+    ] = ()
     time_series: Annotated[
         TimeSeries | None,
         Rule(

@@ -89,6 +89,8 @@ class Parts(SceneTable):
         """Return the document by which campaigns identify a scene, with the original part names of each form."""
         document: dict[str, Any] = serialized(self)
         parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
+        if not self.record.observed:
+            del document["record"]["observed"]
         if self.is_one_body:
             for table in (document["forcing"], *parts["contacts"]):
                 if table and table.get("at", "") is None:

@@ -16,7 +16,12 @@ from pydantic import Field
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import Either, Message, message
-from vibroimpact.orchestrator.scene.changes import changed_document, changed_values, with_resting_start
+from vibroimpact.orchestrator.scene.changes import (
+    changed_document,
+    changed_values,
+    edited_text,
+    with_resting_start,
+)
 from vibroimpact.orchestrator.scene.draft import with_swept_keys
 from vibroimpact.orchestrator.scene.file import (
     parse_scene_toml,
@@ -28,7 +33,7 @@ from vibroimpact.orchestrator.scene.keys import coordinate_name, is_missing, wit
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
-from vibroimpact.orchestrator.scene.several_bodies import with_one_body
+from vibroimpact.orchestrator.scene.several_bodies import with_one_body, with_one_body_in_text
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.tables import read_tables
 from vibroimpact.orchestrator.scene.views import ViewedScene
@@ -304,6 +309,8 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     fields, problems = read_tables(document, Path(source).parent)
     if problems:
         raise SceneError(lines_of(problems, source, changed))
-    if changed or document != written:
+    if changed:
         text = tomli_w.dumps(document)
+    elif document != written:
+        text = edited_text(text, with_one_body_in_text, document)
     return Scene(source=source, text=text, **fields)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, MutableMapping
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -14,6 +15,8 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 JOINING_TABLES = ("link", "contact")
 """Tables that make a structure even of one `[[body]]`."""
+_TABLE, _LIST = (re.compile(rf"^[ \t]*{re.escape(head)}", re.M) for head in ("[body]", "[[body]]"))
+_SWEPT, _SWEPT_OF_LIST = (re.compile(rf"^([ \t]*\"){re.escape(key)}", re.M) for key in ("body.", "body[1]."))
 
 
 def is_structure(document: Mapping[str, Any]) -> bool:
@@ -56,12 +59,38 @@ def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(bodies, list) or len(bodies) != 1 or not isinstance(bodies[0], dict):
         return document
     found = _renamed(deepcopy(document), "body[1].", "body.")
-    body = found["body"] = found["body"][0]
+    found["body"] = found["body"][0]
+    _leave_out_names(found)
+    return found
+
+
+def with_one_body_in_text(text: str) -> str:
+    """Return the text of `with_one_body` for the text of a valid scene, with its comments where the layout is usual.
+
+    Examples
+    --------
+    >>> print(with_one_body_in_text('[[body]]\\nname = "ball"\\nmass = 1.0 # kg'))
+    [body]
+    mass = 1.0 # kg
+    """
+    import tomlkit  # the import takes time, and few scenes are written anew
+
+    if any(name in tomlkit.parse(text) for name in JOINING_TABLES):
+        return _SWEPT.sub(r"\1body[1].", _TABLE.sub("[[body]]", text))
+    document = tomlkit.parse(_SWEPT_OF_LIST.sub(r"\1body.", _LIST.sub("[body]", text)))
+    if isinstance(document["body"], list):  # written in one line, or by a quoted name
+        document["body"] = document["body"][0]
+    _leave_out_names(document)
+    return tomlkit.dumps(document)
+
+
+def _leave_out_names(document: MutableMapping[str, Any]) -> None:
+    """Take the name from the table `[body]`, and the points with this name from the other tables."""
+    body = document["body"]
     name = body.pop("name", None)
-    for table in (found.get("forcing"), *_tables(found.get("stop"))):
+    for table in (document.get("forcing"), *_tables(document.get("stop"))):
         if isinstance(table, dict) and isinstance(table.get("at"), str):
             _place(table, name, body)
-    return found
 
 
 def _renamed(document: dict[str, Any], before: str, after: str) -> dict[str, Any]:

@@ -3,6 +3,9 @@
 Newton's cradle of five balls with restitution 1 swings until it has made the given number of impulses, in FMI 3.0 and
 2.0. Two chains pound, and two masses on springs hit each other with a compliant law. The results are the processor
 time for each impulse (or contact), and the relative change of the energy.
+
+A ball in the cavity of an oscillator runs as one structure over 200 forcing periods. Its points run one after the
+other, and at once in lanes. The results are the processor times of a point.
 Run with `python tests/benchmarks/bench_bodies_in_contact.py [--impacts 10000]`.
 """
 
@@ -17,6 +20,12 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.pair_parts import PairRun, cradle, hit, pair, run_of
+from support.places import EXAMPLES
+
+from vibroimpact.orchestrator.run.opening import open_runner
+from vibroimpact.orchestrator.run.points import columns_of_points
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import expand
 
 #: Largest relative change of the energy.
 MOST_CHANGE = 1e-12
@@ -34,6 +43,26 @@ def yielding_masses() -> PairRun:
     """Return two masses on springs with Hertz's law between them."""
     bodies = [hit("a", displacement_start=-1.0), hit("b", stiffness=3.0)]
     return run_of(bodies, [pair("a", "b", clearance=0.1, law="hertz", stiffness=1e5)])
+
+
+#: Periods and points of the ball in a cavity, and the goals of the issue: ms a point, one by one and at once.
+PERIODS, POINTS, MOST_MILLISECONDS = 200, 64, {"fused": 2.0, "lanes": 1.0}
+
+
+def absorber(execution: str, repetitions: int = 5) -> float:
+    """Return the processor time of a point of a ball in a cavity, ms; the least of several repetitions."""
+    record = {"recorded_periods": PERIODS, "each_period": False}
+    scene = Scene.from_file(EXAMPLES / "impact_damper_cavity.toml").with_values({"record": record})
+    count = POINTS if execution == "lanes" else 8
+    scene = scene.with_sweep({"forcing.angular_frequency": {"start": 0.98, "stop": 1.02, "points": count}})
+    points = columns_of_points(expand(scene), 0, count)
+    with open_runner(scene, execution) as runner:
+        times = []
+        for _ in range(repetitions + 1):
+            began = time.process_time()
+            runner.rows(points)
+            times.append(1e3 * (time.process_time() - began) / count)
+    return min(times[1:])
 
 
 def measure(name: str, make: Callable[[], PairRun], impacts: int) -> bool:
@@ -64,6 +93,11 @@ def main() -> None:
         measure("chains that pound", pounding_chains, impacts // 10),
     ]
     measure("hertz, 30 steps", yielding_masses, impacts // 100)
+    times = {execution: absorber(execution) for execution in MOST_MILLISECONDS}
+    for execution, most in MOST_MILLISECONDS.items():
+        print(
+            f"ball in a cavity, {PERIODS} periods, {execution}: {times[execution]:.2f} ms a point, goal {most:g} ms"
+        )
     if not all(kept):
         raise SystemExit(f"energy: expected a relative change of at most {MOST_CHANGE:g}, got a larger one.")
     print(f"Impacts with restitution 1 keep the energy to {MOST_CHANGE:g}.")

@@ -174,6 +174,9 @@ def with_gaps(values: Floats, places: npt.NDArray[np.intp]) -> Floats:
 
 def _quantity(variable: xr.DataArray) -> str:
     """Return the common name of the variables in a panel: displacement for displacement_2."""
+    name, bracket, _ = str(variable.attrs.get("component_variable", "")).partition("[")
+    if bracket and "." not in name:
+        return name  # of an observed point: displacement[ball]
     if "component_variable" in variable.attrs:
         return ""
     return _PARTICULARS.sub("", str(variable.name))

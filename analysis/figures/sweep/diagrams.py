@@ -23,7 +23,14 @@ from vibroimpact.analysis.dataset.derived import (
     largest_impact_velocity,
     mean_of_periods,
 )
-from vibroimpact.analysis.dataset.schema import SCATTERED, SWEPT_ALONG, scene_of, standing_for, swept_names
+from vibroimpact.analysis.dataset.schema import (
+    POINT_COLUMNS,
+    SCATTERED,
+    SWEPT_ALONG,
+    scene_of,
+    standing_for,
+    swept_names,
+)
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.analysis.figures.sweep.map_overview import block_values, edges_of_blocks
@@ -165,8 +172,9 @@ def edges(values: Any) -> Any:
 
 def drawable_variables(dataset: xr.Dataset) -> list[str]:
     """Return the variables that can be drawn over a swept parameter: of runs, their periods and their impacts."""
-    known = (*_OF_PERIODS, *_OF_IMPACTS)
-    return [name for name in known if name in dataset.variables]
+    names = [name for name in (*_OF_PERIODS, *_OF_IMPACTS) if name in dataset.variables]
+    further = (str(name) for name, variable in dataset.variables.items() if "period" in variable.dims)
+    return [*names, *(name for name in further if name not in names and name.startswith(POINT_COLUMNS))]
 
 
 def refuse_variable(dataset: xr.Dataset, variable: str, whose: str) -> None:

@@ -143,6 +143,20 @@ static void check_matrix(const modal_structure *s, char *message)
     }
 }
 
+/* Shapes of the further observed points lie behind those of the contacts. */
+static void check_further_points(const modal_structure *s, char *message)
+{
+    const int contacts = vi_body_ports(&s->body);
+    if (s->further_points < 0 || s->further_points > VI_PORTS - contacts) {
+        vi_complain(message, "further_points: expected 0 to %d, of %d points and contacts in all, got %lld",
+                    VI_PORTS - contacts, VI_PORTS, (long long)s->further_points);
+        return;
+    }
+    for (int r = contacts; r < contacts + (int)s->further_points; ++r) {
+        vi_check_each(message, vi_check_finite, "mode.contact_shape", s->body.model.shape[r], (int)s->modes);
+    }
+}
+
 static void check_shapes(const modal_structure *s, char *message)
 {
     const int n = (int)s->modes;
@@ -159,6 +173,7 @@ static void check_shapes(const modal_structure *s, char *message)
                                  " whose mobility is %g 1/kg", k + 1, n, mobility);
         }
     }
+    check_further_points(s, message);
     vi_check_each(message, vi_check_finite, "mode.observed_shape", s->body.model.observed, n);
     vi_check_each(message, vi_check_finite, "mode.forcing", s->forcing, n);
     vi_check_each(message, vi_check_finite, "mode.base", s->base, n);
@@ -239,6 +254,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     find_forcing(s, force);
     model->modes = (int32_t)s->modes;
     model->contacts = vi_body_ports(&s->body);
+    s->body.record.further = model->further = (int32_t)s->further_points;
     model->coupled = s->coupled;
     memcpy(model->impulse, model->shape, sizeof model->impulse);
     for (int j = 0; j < VI_MODES; ++j) {

@@ -13,6 +13,7 @@ typedef struct {
     /* parameters; rows of one number for each mode */
     int64_t modes, modes_described;
     int64_t modes_of_file; /* 0: there is no file */
+    int64_t further_points;
     int32_t coupled;       /* the damping matrix is read, not the damping ratios */
     double natural[VI_MODES], damping_ratio[VI_MODES];
     double forcing[VI_MODES], base[VI_MODES], force_shape[VI_MODES];

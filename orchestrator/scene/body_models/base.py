@@ -130,6 +130,10 @@ class BodyTable(SceneTable):
     def own_variables(self) -> tuple[str, ...]:
         """Variables of a time series that only this kind of body has, or has in this number."""
 
+    def weights_of(self, name: str) -> dict[str, float]:
+        """Return the weights of variables of the FMU whose sum is a sampled variable; none for the FMU's own."""
+        return {}
+
     # ---- parameters of the FMU ----
 
     @abstractmethod

@@ -26,19 +26,19 @@ from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
     FEEDS_ENERGY,
-    POINT_RULE,
     Forcing,
     NotNegative,
-    Point,
     SceneTable,
     Stop,
 )
+from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
 if TYPE_CHECKING:
     from vibroimpact.fmus.bodies.assembly import Assembly, Part
 
 MOST_LINKS = 256
+MOTIONS = ("displacement", "velocity")
 NOT_IN_STRUCTURES = (
     *("modes", "residual", "observed_mass", "impact_projection", "poisson_ratio"),
     *("frequency_slope", "damping_slope", "damping_reciprocal"),
@@ -79,6 +79,7 @@ class StructureBody(BodyTable):
     names: Annotated[tuple[str, ...], Rule(sweepable=False)]
     parts: Annotated[tuple[OneBody, ...], Rule(sweepable=False)]
     links: Annotated[tuple[LinkTable, ...], Rule(sweepable=False)] = ()
+    observed: Annotated[tuple[Observed, ...], Rule(sweepable=False)] = ()
 
     @property
     def size(self) -> int:
@@ -93,13 +94,18 @@ class StructureBody(BodyTable):
 
     @property
     def own_variables(self) -> tuple[str, ...]:
-        """The motion and the energy of each mode."""
+        """The motion of each observed point, and the motion and the energy of each mode."""
         names = "modal_displacement", "modal_velocity", "modal_energy"
-        return tuple(one for name in names for one in each_of(name, self.size))
+        return (
+            *observed_variables(self.observed),
+            *(one for name in names for one in each_of(name, self.size)),
+        )
 
     def with_numbers(self, parts: Sequence[OneBody], links: Sequence[LinkTable]) -> StructureBody:
         """Return these bodies with other numbers, which are known to be valid."""
-        return StructureBody.model_construct(names=self.names, parts=tuple(parts), links=tuple(links))
+        return StructureBody.model_construct(
+            names=self.names, parts=tuple(parts), links=tuple(links), observed=self.observed
+        )
 
     # ---- points ----
 
@@ -109,11 +115,13 @@ class StructureBody(BodyTable):
         assert not isinstance(found, NoPoint), "the rules of scenes refuse it"
         return found
 
-    def observed_point(self, stops: Stops) -> PointOfBody:
-        """Return the point whose displacement is recorded: of the first stop or contact, or the last body."""
-        if stops:
-            return self.point(stops[0].at or stops[0].between[0])
-        return self.point(self.names[-1])
+    def first_observed(self, stops: Stops) -> Observed:
+        """Return the point or the pair whose displacement has extremes: as given, or `limited_point`."""
+        return self.observed[0] if self.observed else self.limited_point(stops)
+
+    def limited_point(self, stops: Stops) -> str:
+        """Return the point of the first stop, else of the first contact, else the last body."""
+        return stops[0].at or stops[0].between[0] if stops else self.names[-1]
 
     def place_of(self, stop: Stop) -> float:
         """Return a number of the point of a stop, which differs between points; NaN for a contact of two points."""
@@ -121,7 +129,28 @@ class StructureBody(BodyTable):
 
     def observed_place(self, stops: Stops, sensor: Sensor | None) -> float:
         """Return the number of the point of the recorded displacement, as by `place_of`."""
-        return _number_of(self.observed_point(stops))
+        observed = self.first_observed(stops)
+        return _number_of(self.point(observed)) if isinstance(observed, str) else math.nan
+
+    def long_names(self, stops: Stops) -> dict[str, str]:
+        """Return the motion of each observed point, contact and mode in words, by its name in a time series."""
+        found: dict[str, str] = {}
+        for motion in MOTIONS:
+            found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
+            met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
+            found |= {f"contact_{motion}[{number}]": f"{motion} of {words}" for number, words in met}
+        return found
+
+    @property
+    def further_words(self) -> tuple[str, ...]:
+        """The observed points besides the first, in words."""
+        return tuple(map(_words, self.observed[1:]))
+
+    def observing_one(self) -> StructureBody:
+        """Return these bodies without the observed points that only a record needs."""
+        return StructureBody.model_construct(
+            names=self.names, parts=self.parts, links=self.links, observed=self.observed[:1]
+        )
 
     # ---- modes ----
 
@@ -142,19 +171,33 @@ class StructureBody(BodyTable):
         """Whether the damping couples the modes."""
         return self.assembly.is_coupled
 
-    def _shape_of(self, stop: Stop) -> NDArray[np.float64]:
-        """Return the row of a stop over the coordinates: its point, or the difference of the two points."""
-        assembly = self.assembly
-        if stop.at is not None:
-            return assembly.point(self.point(stop.at))
-        first, second = (assembly.point(self.point(end)) for end in stop.between)
+    def _shape_of(self, observed: Observed) -> NDArray[np.float64]:
+        """Return the row of a point over the coordinates, or of the first point of a pair minus the second."""
+        if isinstance(observed, str):
+            return self.assembly.point(self.point(observed))
+        first, second = (self.assembly.point(self.point(end)) for end in observed)
         return first - second
+
+    def weights_of(self, name: str) -> dict[str, float]:
+        """Return the weight of each variable of the FMU in the sampled motion of an observed point; none for others.
+
+        Examples
+        --------
+        >>> StructureBody.model_construct(names=("a",), parts=(), links=()).weights_of("displacement")
+        {}
+        """
+        for each in self.observed:
+            for motion in MOTIONS:
+                if name == f"{motion}[{label_of(each)}]":
+                    row = self.assembly.in_modes(self._shape_of(each)).tolist()
+                    return dict(zip(each_of(f"modal_{motion}", self.size), row, strict=True))
+        return {}
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the modes, their start, their shapes at contacts, and their loads, mass-normalised, SI."""
         assembly = self.assembly
-        observed = assembly.point(self.observed_point(stops))
-        forced = observed if forcing is None or forcing.at is None else assembly.point(self.point(forcing.at))
+        observed = self._shape_of(self.first_observed(stops))
+        forced = self._shape_of((forcing and forcing.at) or self.limited_point(stops))
         participation = np.concatenate([part.participation for part in assembly.parts])
         base = -assembly.modal(participation)
         force = assembly.in_modes(forced)
@@ -169,7 +212,8 @@ class StructureBody(BodyTable):
             ),
             "velocity_start": assembly.modal(np.concatenate([part.velocities for part in assembly.parts])),
         }
-        tables = {"contact_shape": [assembly.in_modes(self._shape_of(stop)) for stop in stops]}
+        points = (*(stop.at or stop.between for stop in stops), *self.observed[1:])
+        tables = {"contact_shape": [assembly.in_modes(self._shape_of(each)) for each in points]}
         if assembly.is_coupled:
             tables["damping"] = list(assembly.damping)
         else:
@@ -190,8 +234,31 @@ class StructureBody(BodyTable):
         return found
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return the number of modes, and whether their damping couples them."""
-        return {"modes": self.size, "coupled": self.is_coupled}
+        """Return the number of modes and of further observed points, and whether the damping couples the modes."""
+        further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
+        return {"modes": self.size, "coupled": self.is_coupled, **further}
+
+
+def label_of(observed: Observed) -> str:
+    """Return an observed point or pair in the names of its sampled variables.
+
+    >>> label_of("beam.tip"), label_of(("ball", "frame"))
+    ('beam.tip', 'ball - frame')
+    """
+    return observed if isinstance(observed, str) else " - ".join(observed)
+
+
+def _words(observed: Observed) -> str:
+    return observed if isinstance(observed, str) else " relative to ".join(observed)
+
+
+def observed_variables(observed: Sequence[Observed]) -> tuple[str, ...]:
+    """Return the sampled variables of observed points and pairs.
+
+    >>> observed_variables(["ball", ("ball", "frame")])[1:3]
+    ('velocity[ball]', 'displacement[ball - frame]')
+    """
+    return tuple(f"{name}[{label_of(each)}]" for each in observed for name in MOTIONS)
 
 
 def _number_of(point: PointOfBody) -> float:

@@ -34,7 +34,7 @@ DraftRule = Callable[[Draft], Iterator[Problem]]
 def rule_problems(draft: Draft) -> list[Problem]:
     """Return all problems between the tables of a scene."""
     rules = (
-        *(_several_bodies(draft) if draft.is_structure else (*_DAMPING_RULES, *BODY_RULES, *STOP_RULES)),
+        *(_several_bodies(draft) if draft.is_structure else _of_one_body()),
         _frequency_is_given_once,
         _units_agree,
         *_recording_rules(draft),
@@ -45,6 +45,10 @@ def rule_problems(draft: Draft) -> list[Problem]:
     )
     problems = [problem for rule in rules for problem in rule(draft)]
     return [*problems, *sweep_problems(draft.axes)] if draft.axes else problems
+
+
+def _of_one_body() -> Iterator[DraftRule]:
+    yield from (*_DAMPING_RULES, *BODY_RULES, *STOP_RULES, _several_points_are_observed)
 
 
 def _several_bodies(draft: Draft) -> Iterator[DraftRule]:
@@ -99,6 +103,12 @@ def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
         yield Problem(
             "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
         )
+
+
+def _several_points_are_observed(draft: Draft) -> Iterator[Problem]:
+    if draft.record is not None and draft.record.observed:
+        hint = "A scene of one body observes the point of its stop, observed_mass, or [sensor]."
+        yield Problem("record.observed", "several bodies beside it", "one body", hint)
 
 
 _DAMPING_RULES: tuple[DraftRule, ...] = (_damping_is_given_once, _damping_ratio_has_a_spring)

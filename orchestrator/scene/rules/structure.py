@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
@@ -14,12 +15,16 @@ from vibroimpact.orchestrator.scene.body_models.points import (
     PointOfBody,
     find_point,
 )
-from vibroimpact.orchestrator.scene.body_models.structure import MOST_LINKS, NOT_IN_STRUCTURES
+from vibroimpact.orchestrator.scene.body_models.structure import (
+    MOST_LINKS,
+    NOT_IN_STRUCTURES,
+    label_of,
+)
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
-from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
+from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 _ALONE = "beside one body alone"
@@ -60,7 +65,7 @@ def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
         for key in part.written("body"):
             if key not in NOT_IN_STRUCTURES or key == "poisson_ratio":
                 continue
-            if key == "modes" and keeps_modes and not part.finds_modes:
+            if key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes)):
                 continue
             where = f"body[{number}].{key}"
             if key == "modes" and keeps_modes:
@@ -87,6 +92,11 @@ def _counts_are_few(draft: Draft) -> Iterator[Problem]:
         hint = "Each mass of an oscillator or a chain counts, and each mode of a beam."
         yield Problem("body", f"at most {MOST_MODES} modes in all", f"{sum(sizes)}", hint)
     contacts, most = len(draft.stops) + len(draft.meetings), StructureBody.MOST_STOPS
+    observed = () if draft.record is None else draft.record.observed
+    if contacts <= most < contacts + len(observed) - 1:
+        got = f"{contacts} and {len(observed) - 1}"
+        expected = f"at most {most} stops, contacts and observed points after the first in all"
+        yield Problem("record.observed", expected, got, "Leave some of them out.")
     if contacts > most:
         yield Problem(
             "contact", f"at most {most} stops and contacts in all", f"{contacts}", "Remove some of them."
@@ -127,10 +137,10 @@ class _Points:
         draft = self._draft
         for place, link in enumerate(draft.links):
             if link is not None:
-                yield from self._between(("link", place), link.between, GROUND)
+                yield from self._between(("link", place, "between"), link.between, GROUND)
         for place, contact in enumerate(draft.meetings):
             if contact is not None:
-                yield from self._between(("contact", place), contact.between, "")
+                yield from self._between(("contact", place, "between"), contact.between, "")
         for number, stop in enumerate(draft.stops, start=1):
             if stop is not None and stop.at is not None:
                 yield from self._problem(f"stop[{number}].at", stop.at)
@@ -139,9 +149,20 @@ class _Points:
                 yield Problem(f"stop[{number}].at", "the point that it limits", "nothing", hint)
         if draft.forcing is not None and draft.forcing.at is not None:
             yield from self._problem("forcing.at", draft.forcing.at)
+        yield from self._observed()
 
-    def _between(self, owner: tuple[str, int], between: Sequence[str], fixed: str) -> Iterator[Problem]:
-        where = (*owner, "between")
+    def _observed(self) -> Iterator[Problem]:
+        """Yield the problems of observed points: not there, the same twice in a pair, or listed twice."""
+        for place, each in enumerate(self._body.observed):
+            if isinstance(each, str):
+                yield from self._problem(key_path(("record", "observed", place)), each)
+            else:
+                yield from self._between(("record", "observed", place), each, "")
+        for each, times in Counter(map(label_of, self._body.observed)).items():
+            if times > 1:
+                yield Problem("record.observed", "each point once", f"{quoted(each)} {times} times")
+
+    def _between(self, where: KeyPath, between: Sequence[str], fixed: str) -> Iterator[Problem]:
         wrong = [
             problem
             for end, text in enumerate(between)
@@ -150,7 +171,9 @@ class _Points:
         ]
         if GROUND in between and not fixed:
             end = list(between).index(GROUND)
-            hint = "A stop limits a point against the ground: [[stop]] with at."
+            hint = "A point alone moves against the ground."
+            if where[0] == "contact":
+                hint = "A stop limits a point against the ground: [[stop]] with at."
             wrong = [Problem(key_path((*where, end)), "a point of a body", quoted(GROUND), hint)]
         yield from wrong
         first, second = (None if text == fixed else self._find(text) for text in between)

@@ -36,7 +36,7 @@ void vi_record_switched(vi_record *record)
 
 bool vi_record_full(const vi_record *record)
 {
-    return record->count > VI_RECORD_CAPACITY - VI_RECORD_RESERVE;
+    return record->count > VI_RECORD_CAPACITY - VI_RECORD_RESERVE - record->further;
 }
 
 bool vi_record_ends_step(vi_record *record)
@@ -93,6 +93,33 @@ void vi_record_extend(vi_record *record, double displacement)
     if (displacement < record->displacement_min) {
         record->displacement_min = displacement;
     }
+}
+
+void vi_record_point_begin(vi_record *record, int point, double displacement)
+{
+    if (record->extrema && !record->open) {
+        record->point[point].displacement_max = record->point[point].displacement_min = displacement;
+    }
+}
+
+void vi_record_point_extend(vi_record *record, int point, double displacement)
+{
+    vi_record_point *p = &record->point[point];
+    p->displacement_max = displacement > p->displacement_max ? displacement : p->displacement_max;
+    p->displacement_min = displacement < p->displacement_min ? displacement : p->displacement_min;
+}
+
+void vi_record_point_period(vi_record *record, int point, double displacement, double velocity)
+{
+    vi_record_point *p = &record->point[point];
+    if (record->period_open) {
+        const double high = record->extrema ? p->displacement_max : NAN;
+        const double low = record->extrema ? p->displacement_min : NAN;
+        const double row[] = {VI_ROW_FURTHER, record->period_start, (double)(point + 1), high, low,
+                              p->strobe_displacement, p->strobe_velocity, 0.0};
+        append(record, row);
+    }
+    *p = (vi_record_point){displacement, displacement, displacement, velocity};
 }
 
 void vi_record_period(vi_record *record, double time, double displacement, double velocity)

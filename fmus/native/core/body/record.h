@@ -14,7 +14,12 @@
 
 /* Rows kept free: one event writes at most two rows for each contact and one row of a period. */
 enum { VI_RECORD_CAPACITY = 512, VI_RECORD_WIDTH = 8, VI_RECORD_RESERVE = 2 * VI_PORTS + 1 };
-enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3, VI_ROW_PEAK = 4 };
+enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3, VI_ROW_PEAK = 4, VI_ROW_FURTHER = 5 };
+
+/* The open period of a further observed point. */
+typedef struct {
+    double displacement_max, displacement_min, strobe_displacement, strobe_velocity;
+} vi_record_point;
 
 typedef struct {
     /* inputs */
@@ -31,6 +36,8 @@ typedef struct {
     double period_start; /* s */
     double strobe_displacement, strobe_velocity;
     int64_t period_impacts;
+    int64_t further; /* number of further observed points, set by the component */
+    vi_record_point point[VI_PORTS];
     double rows[VI_RECORD_CAPACITY * VI_RECORD_WIDTH]; /* last member: only the used part is saved with a state */
 } vi_record;
 
@@ -59,6 +66,15 @@ void vi_record_stick(vi_record *record, double start, double end, int contact, d
 
 /* Extend the extremes to a displacement of the body. */
 void vi_record_extend(vi_record *record, double displacement);
+
+/* A recording of extremes begins in this step: a further observed point is at this displacement. */
+void vi_record_point_begin(vi_record *record, int point, double displacement);
+
+/* Extend the extremes of a further observed point. */
+void vi_record_point_extend(vi_record *record, int point, double displacement);
+
+/* A forcing period begins for a further observed point; called before vi_record_period, which closes the period. */
+void vi_record_point_period(vi_record *record, int point, double displacement, double velocity);
 
 /* A forcing period begins: write the ending period (if it was followed from its start) and open the next. */
 void vi_record_period(vi_record *record, double time, double displacement, double velocity);

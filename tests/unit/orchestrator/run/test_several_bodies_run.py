@@ -114,29 +114,7 @@ def test_a_base_that_moves_is_the_inertia_of_all_bodies() -> None:
 
 def test_a_ball_in_a_cavity_moves_as_its_components_until_chaos_parts_them() -> None:
     fused = example("impact_damper_cavity")
-    frame = {"mass": 1.0, "stiffness": 1.0, "damping": 0.002, "displacement_start": 0.05}
-    frame |= {"forcing.amplitude": 0.002, "forcing.angular_frequency": 1.0}
-    contact = {"restitution": 0.8, "clearance": 0.05}
-    coupled = vi.run(
-        Scene.from_dict(
-            {
-                "scene": {"units": "nondimensional"},
-                "component": {
-                    "frame": {"fmu": "Oscillator", "parameters": frame},
-                    "ball": {
-                        "fmu": "Oscillator",
-                        "parameters": {"mass": 0.02, "stiffness": 0.0, "velocity_start": 0.02},
-                    },
-                },
-                "contact": [
-                    contact | {"between": ["frame", "ball"]},
-                    contact | {"between": ["ball", "frame"]},
-                ],
-                "record": {"recorded_time": 70.0},
-                "execution": {"macro_step": 1.0},
-            }
-        )
-    )
+    coupled = example("impact_damper_cavity_coupled")
     assert_same_impacts(fused, coupled, BEFORE_CHAOS)
 
 
@@ -312,7 +290,8 @@ def test_orbits_refuse_by_name_what_they_cannot_follow(changes: dict[str, Any], 
 
 
 def test_components_that_meet_only_each_other_have_a_fused_form() -> None:
-    assert "[[body]]" in fused_form(Scene.from_file(EXAMPLES / "newtons_cradle.toml"))
+    for name in ("newtons_cradle", "pounding", "impact_damper_cavity_coupled"):
+        assert "[[body]]" in fused_form(Scene.from_file(EXAMPLES / f"{name}.toml")), name
     others = ("two_oscillators", "impact_damper_cavity", "coupled_p11")
     assert [fused_form(Scene.from_file(EXAMPLES / f"{name}.toml")) for name in others] == [""] * 3
 

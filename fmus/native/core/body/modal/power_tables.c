@@ -13,7 +13,7 @@ static bool same_body(const vi_power_tables *t, const vi_structure_model *model)
 {
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
     bool same = t->modes == vi_structure_modes(model) && t->contacts == model->contacts
-                && t->angular_frequency == model->clock.angular_frequency
+                && t->rows == model->rows && t->angular_frequency == model->clock.angular_frequency
                 && memcmp(t->observed, model->observed, size) == 0;
     for (int j = 0; j < vi_structure_modes(model) && same; ++j) {
         const vi_mode *mode = &model->mode[j];
@@ -21,6 +21,9 @@ static bool same_body(const vi_power_tables *t, const vi_structure_model *model)
     }
     for (int k = 0; k < model->contacts && same; ++k) {
         same = memcmp(t->shape[k], model->shape[k], size) == 0 && t->press[k].kind == model->press[k].kind;
+    }
+    for (int r = model->contacts; r < model->rows && same; ++r) {
+        same = memcmp(t->shape[r], model->shape[r], size) == 0;
     }
     return same;
 }
@@ -33,6 +36,7 @@ bool vi_power_tables_fit(vi_power_tables *t, const vi_structure_model *model)
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
     t->modes = vi_structure_modes(model);
     t->contacts = model->contacts;
+    t->rows = model->rows;
     t->angular_frequency = model->clock.angular_frequency;
     t->exist = model->fastest > 0.0;
     memcpy(t->observed, model->observed, size);
@@ -45,8 +49,10 @@ bool vi_power_tables_fit(vi_power_tables *t, const vi_structure_model *model)
         t->force[j] = model->mode[j].force;
         t->exist = t->exist && vi_moments_exist(&model->mode[j]);
     }
+    for (int r = 0; r < model->rows; ++r) {
+        memcpy(t->shape[r], model->shape[r], size);
+    }
     for (int k = 0; k < model->contacts; ++k) {
-        memcpy(t->shape[k], model->shape[k], size);
         t->press[k] = model->press[k];
     }
     for (int l = 0; l < VI_POWER_LEVELS; ++l) {
@@ -155,6 +161,22 @@ static void make_contact(const vi_power_tables *t, vi_power_level *level, int k,
     respond_to_wave(t, t->shape[k], wave, i, way->v, level->wave_rate[k]);
 }
 
+/* Responses at node i of a further observed point, whose row of shape is r, to the forces and the forcing. */
+static void make_point(const vi_power_tables *t, vi_power_level *level, int r, int i, double wave[2][VI_NODES],
+                       way_responses *way)
+{
+    double weight[VI_MODES];
+    for (int l = 0; l < t->contacts; ++l) {
+        for (int j = 0; j < t->modes; ++j) {
+            weight[j] = t->shape[r][j] * t->shape[l][j];
+        }
+        if (t->press[l].kind == VI_PRESS_POWER) {
+            respond(t, i, weight, way->x, level->yield[vi_pair_of_contacts(r, l)]);
+        }
+    }
+    respond_to_wave(t, t->shape[r], wave, i, way->x, level->wave[r]);
+}
+
 /* Responses at node i. */
 static void make_node(const vi_power_tables *t, vi_power_level *level, const vi_structure_model *model, int i)
 {
@@ -173,6 +195,9 @@ static void make_node(const vi_power_tables *t, vi_power_level *level, const vi_
         if (t->press[k].kind == VI_PRESS_POWER) {
             make_contact(t, level, k, i, wave, &way);
         }
+    }
+    for (int r = t->contacts; r < t->rows; ++r) {
+        make_point(t, level, r, i, wave, &way);
     }
     respond_to_wave(t, t->observed, wave, i, way.x, level->wave_seen);
 }

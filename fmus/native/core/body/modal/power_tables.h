@@ -48,7 +48,7 @@ typedef struct {
 
 /* Cache, no part of a body's state: its contents follow from the model. */
 struct vi_power_tables {
-    int32_t modes, contacts, exist, prepared; /* exist: do all modes have closed forms? */
+    int32_t modes, contacts, rows, exist, prepared; /* exist: do all modes have closed forms? */
     double angular_frequency;
     /* of the body for which they were made, with zeros behind the last mode */
     double stiffness[VI_POWER_ROW], decay[VI_POWER_ROW], force[VI_POWER_ROW];

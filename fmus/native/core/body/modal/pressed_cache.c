@@ -85,9 +85,9 @@ static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
 static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const vi_pressed_body *body)
 {
     const size_t size = (size_t)vi_structure_modes(model) * sizeof(double);
-    bool same = pressed->contacts == model->contacts && same_body(body, &pressed->body)
+    bool same = pressed->contacts == model->contacts && pressed->rows == model->rows && same_body(body, &pressed->body)
                 && memcmp(pressed->observed, model->observed, size) == 0;
-    for (int l = 0; l < model->contacts && same; ++l) {
+    for (int l = 0; l < model->rows && same; ++l) {
         same = memcmp(pressed->shape[l], model->shape[l], size) == 0;
     }
     return same;
@@ -106,7 +106,7 @@ static void weigh(const vi_pressed_modes *modes, const double shape[], vi_comple
 
 static void weigh_all(vi_pressed *pressed, const vi_structure_model *model)
 {
-    for (int l = 0; l < model->contacts; ++l) {
+    for (int l = 0; l < model->rows; ++l) {
         weigh(&pressed->modes, model->shape[l], pressed->weight[l]);
     }
     weigh(&pressed->modes, model->observed, pressed->weight[VI_SEEN_OBSERVED]);
@@ -133,6 +133,7 @@ static void begin(vi_pressed_cache *cache, vi_pressed *pressed, const vi_structu
     pressed->searched = 0;
     pressed->still.known = pressed->harmonic.known = 0;
     pressed->contacts = model->contacts;
+    pressed->rows = model->rows;
     pressed->body = *body;
     memcpy(pressed->port, port, sizeof pressed->port);
     memcpy(pressed->shape, model->shape, sizeof pressed->shape);

@@ -25,7 +25,7 @@ typedef enum { VI_MODES_NOT_FOUND = 0, VI_MODES_OF_ONE = 1, VI_MODES_OF_ALL = 2 
 typedef struct {
     int32_t known;          /* vi_modes_known */
     int32_t searched;       /* the modes of all contacts have been searched for */
-    int32_t contacts;       /* of the body */
+    int32_t contacts, rows; /* of the body: contacts, and with further observed points */
     int32_t port[VI_PORTS]; /* contact of the body, for each pressed contact */
     vi_pressed_body body;
     double shape[VI_PORTS][VI_MODES], observed[VI_MODES];

@@ -43,6 +43,7 @@ static double twofold_dot(const vi_structure_model *model, const double shape[],
 
 void vi_structure_prepare(vi_structure_model *model)
 {
+    model->rows = model->contacts + model->further;
     for (int k = 0; k < model->contacts; ++k) {
         for (int l = 0; l < model->contacts; ++l) {
             model->mobility[k][l] = twofold_dot(model, model->shape[k], model->impulse[l], &model->mobility_low[k][l]);

@@ -27,6 +27,8 @@ typedef struct {
     /* set by the component */
     int32_t modes;         /* number of modes in use, 1 to VI_MODES */
     int32_t contacts;      /* number of ports in use, 0 to VI_PORTS */
+    int32_t further;       /* further observed points; their shapes are behind those of the contacts */
+    int32_t rows;          /* rows of shape in use: contacts + further; derived by vi_structure_prepare */
     int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
     double tolerance;      /* relative error of a contact whose force is a power of the penetration */
     vi_clock clock;

@@ -25,9 +25,35 @@ enum { CLIMB = 8 };
 
 /* ---- extremes ---- */
 
-static void extend(const vi_structure *s, double displacement)
+/* The points whose extremes are kept: OBSERVED, then the further ones from 0. */
+enum { OBSERVED = -1 };
+
+static const double *shape_of(const vi_structure *s, int point)
 {
-    vi_record_extend(s->record, vi_structure_within(s, displacement));
+    return point == OBSERVED ? s->model->observed : s->model->shape[s->model->contacts + point];
+}
+
+static double displacement_of(const vi_structure *s, int point)
+{
+    return point == OBSERVED ? vi_structure_observed(s) : vi_structure_at(s->model, shape_of(s, point), s->state->q);
+}
+
+static void extend(const vi_structure *s, int point, double displacement)
+{
+    if (point == OBSERVED) {
+        vi_record_extend(s->record, vi_structure_within(s, displacement));
+    } else {
+        vi_record_point_extend(s->record, point, displacement);
+    }
+}
+
+/* The largest displacement * sign so far. */
+static double largest_so_far(const vi_structure *s, int point, double sign)
+{
+    const vi_record_point *p = &s->record->point[point < 0 ? 0 : point];
+    const double high = point == OBSERVED ? s->record->displacement_max : p->displacement_max;
+    const double low = point == OBSERVED ? s->record->displacement_min : p->displacement_min;
+    return sign < 0.0 ? -low : high;
 }
 
 /* Climb from u to the next turning point of the observed displacement times sign; returns the time of this point. */
@@ -49,17 +75,13 @@ static double climb(const vi_flight *flight, const vi_point *point, double u, do
 }
 
 /* Find the largest displacement * sign over the flight; regions below the largest value so far are skipped. */
-static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
+static void extreme(const vi_structure *s, const vi_flight *flight, int seen, double sign, double end)
 {
     vi_flight_instant now;
     vi_point point;
-    const double here = vi_structure_observed(s);
-    double best = s->record->displacement_max, u = 0.0;
-    if (sign < 0.0) {
-        best = -s->record->displacement_min;
-    }
-    best = vi_max(best, sign * here);
-    vi_point_start(&point, flight, s->model->observed, sign, best - sign * here);
+    const double here = displacement_of(s, seen), best = vi_max(largest_so_far(s, seen, sign), sign * here);
+    double u = 0.0;
+    vi_point_start(&point, flight, shape_of(s, seen), sign, best - sign * here);
     const double start = point.offset, least = VI_ROUNDING * point.scale;
     for (int evaluation = 0; u < end; ++evaluation) {
         const double least_step = vi_least_step(end, 1e-9, evaluation);
@@ -80,15 +102,23 @@ static void extreme(const vi_structure *s, const vi_flight *flight, double sign,
     }
     vi_flight_at(flight, end, &now);
     point.offset += vi_max(0.0, -vi_point_approach(&point, flight, &now).clearance);
-    extend(s, sign * (best + (point.offset - start)));
+    extend(s, seen, sign * (best + (point.offset - start)));
 }
 
 void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u)
 {
+    vi_extremes_here(s);
+    for (int point = OBSERVED; point < s->model->further && u > 0.0; ++point) {
+        extreme(s, flight, point, 1.0, u);
+        extreme(s, flight, point, -1.0, u);
+    }
+}
+
+void vi_extremes_here(const vi_structure *s)
+{
     vi_record_extend(s->record, vi_structure_observed(s));
-    if (u > 0.0) {
-        extreme(s, flight, 1.0, u);
-        extreme(s, flight, -1.0, u);
+    for (int point = 0; point < s->model->further; ++point) {
+        vi_record_point_extend(s->record, point, displacement_of(s, point));
     }
 }
 
@@ -111,15 +141,14 @@ static double next_turn(const double polynomial[VI_ORDER + 1], double from, doub
     return fall.found ? fall.time : HUGE_VAL;
 }
 
-void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+static void extremes_of_point(const vi_structure *s, const vi_drift *drift, int point, double end)
 {
     double polynomial[VI_ORDER + 1], value[4], from = 0.0;
-    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
-    const double end = vi_drift_variable(drift, u);
-    vi_drift_point(drift, s->model->observed, polynomial);
-    extend(s, here);
+    const double here = vi_structure_at(s->model, shape_of(s, point), s->state->q);
+    vi_drift_point(drift, shape_of(s, point), polynomial);
+    extend(s, point, here);
     vi_polynomial_at(polynomial, end, value);
-    extend(s, here + value[0]);
+    extend(s, point, here + value[0]);
     if (vi_polynomial_size(polynomial, end) <= VI_ROUNDING * fabs(here)) {
         return; /* the point is held: its polynomial is mere rounding */
     }
@@ -129,8 +158,15 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
             return;
         }
         vi_polynomial_at(polynomial, at, value);
-        extend(s, here + value[0]);
+        extend(s, point, here + value[0]);
         from = at + 1e-3 * end;
+    }
+}
+
+void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+{
+    for (int point = OBSERVED; point < s->model->further; ++point) {
+        extremes_of_point(s, drift, point, vi_drift_variable(drift, u));
     }
 }
 

@@ -24,8 +24,10 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
 /* Largest forces of recorded contacts over the first u seconds of a drift. Thin contacts have no force there. */
 void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u);
 
-/* ---- extremes of the observed point ---- */
+/* ---- extremes of the observed point and of the further ones ---- */
 
+/* Extend the extremes to the present state. */
+void vi_extremes_here(const vi_structure *s);
 void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u);
 void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u);
 

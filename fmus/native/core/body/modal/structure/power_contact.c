@@ -173,17 +173,46 @@ static double relative_error(const vi_structure *s, const vi_power_contact *cont
                   terms / (OF_FORCE * tolerance * (largest + stopping) + noise_of_force));
 }
 
-/* Extend the extremes. Returns false where the observed point moves too quickly for them. */
+/* Do the last terms of a series matter neither beside its spread nor beside the displacement at its start? */
+static bool series_ends(const vi_structure *s, const double series[VI_NODES], double here)
+{
+    const double last = fabs(series[VI_NODES - 1]) + fabs(series[VI_NODES - 2]);
+    return last <= s->model->tolerance * vi_legendre_spread(series) + NOISE * DBL_EPSILON * fabs(here);
+}
+
+/* Extend the extremes of a further observed point, as follow_extremes. */
+static bool follow_point(const vi_structure *s, const vi_power_start *start, const vi_power_level *level,
+                         const vi_power_course course[], int point)
+{
+    double moved[VI_NODES], series[VI_NODES];
+    const int row = s->model->contacts + point;
+    vi_power_other(start, level, course, row, 1.0, 0.0, moved);
+    vi_legendre_series(&start->tables->basis, moved, series);
+    const double here = vi_structure_at(s->model, s->model->shape[row], s->state->q);
+    if (!series_ends(s, series, here)) {
+        return false;
+    }
+    const vi_legendre *basis = &start->tables->basis;
+    vi_record_point_extend(s->record, point, here + vi_legendre_largest(basis, series, moved, 1.0, 0.0));
+    vi_record_point_extend(s->record, point, here - vi_legendre_largest(basis, series, moved, -1.0, 0.0));
+    return true;
+}
+
+/* Extend the extremes. Returns false where an observed point moves too quickly for them. */
 static bool follow_extremes(const vi_structure *s, const vi_power_start *start, const vi_power_level *level,
                             const vi_power_course course[])
 {
     double moved[VI_NODES], series[VI_NODES];
     vi_power_observe(start, level, course, moved);
     vi_legendre_series(&start->tables->basis, moved, series);
-    const double spread = vi_legendre_spread(series), here = vi_structure_observed(s);
-    const double last = fabs(series[VI_NODES - 1]) + fabs(series[VI_NODES - 2]);
-    if (!(last <= s->model->tolerance * spread + NOISE * DBL_EPSILON * fabs(here))) {
+    const double here = vi_structure_observed(s);
+    if (!series_ends(s, series, here)) {
         return false;
+    }
+    for (int point = 0; point < s->model->further; ++point) {
+        if (!follow_point(s, start, level, course, point)) {
+            return false;
+        }
     }
     vi_record_extend(s->record, here + vi_legendre_largest(&start->tables->basis, series, moved, 1.0, 0.0));
     vi_record_extend(s->record, here - vi_legendre_largest(&start->tables->basis, series, moved, -1.0, 0.0));

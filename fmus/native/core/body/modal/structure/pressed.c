@@ -8,6 +8,7 @@
 #include "body/modal/held.h"
 #include "body/modal/pressed_energies.h"
 #include "body/modal/pressed_flow.h"
+#include "body/modal/structure/extremes.h"
 #include "motion/majorant.h"
 
 /* Segments by series after which a rest counts as long, for stops that yield and for held contacts. Most contacts with
@@ -133,6 +134,14 @@ static double largest_so_far(const vi_structure *s, double sign)
     return vi_max(sign * here, sign > 0.0 ? s->record->displacement_max : -s->record->displacement_min);
 }
 
+/* The same of a further observed point. */
+static double largest_of_point(const vi_structure *s, int point, double sign)
+{
+    const vi_record_point *p = &s->record->point[point];
+    const double here = vi_structure_at(s->model, s->model->shape[s->model->contacts + point], s->state->q);
+    return vi_max(sign * here, sign > 0.0 ? p->displacement_max : -p->displacement_min);
+}
+
 /* Rounding of the observed point's velocity. */
 static double speed_noise(const vi_pressed_sight *sight, double speed, double fastest)
 {
@@ -189,6 +198,16 @@ static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double s
     vi_record_extend(s->record, vi_structure_within(s, sign * sight.offset));
 }
 
+/* The same of a further observed point. */
+static void extreme_of_point(const vi_structure *s, const vi_pressed_flow *flow, int point, double sign, double fastest,
+                             double end)
+{
+    const int seen = s->model->contacts + point;
+    vi_pressed_sight sight = vi_pressed_sight_of(flow, seen, sign, largest_of_point(s, point, sign), end);
+    raise_bar(s, flow, &sight, fastest, end);
+    vi_record_point_extend(s->record, point, sign * sight.offset);
+}
+
 /* Update the largest force of the i-th pressed contact over the rest. */
 static void peak(const vi_structure *s, const vi_pressed_flow *flow, int i, double fastest, double end)
 {
@@ -220,6 +239,10 @@ static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fast
         extreme(s, flow, 1.0, fastest, u);
         extreme(s, flow, -1.0, fastest, u);
     }
+    for (int point = 0; point < s->model->further && s->record->extrema; ++point) {
+        extreme_of_point(s, flow, point, 1.0, fastest, u);
+        extreme_of_point(s, flow, point, -1.0, fastest, u);
+    }
     for (int i = 0; i < flow->pressed->body.contacts; ++i) {
         const int k = flow->pressed->port[i];
         if (state->status[k] == VI_CONTACT_YIELDING) {
@@ -238,7 +261,7 @@ static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fast
     }
     vi_pressed_flow_reach(s);
     if (s->record->extrema) {
-        vi_record_extend(s->record, vi_structure_observed(s));
+        vi_extremes_here(s);
     }
 }
 

@@ -48,6 +48,11 @@ static bool stops_here(const vi_structure *s, vi_instant target, const vi_step_r
 static void record_period(const vi_structure *s)
 {
     vi_structure_count_contacts(s);
+    for (int point = 0; point < s->model->further; ++point) {
+        const double *shape = s->model->shape[s->model->contacts + point];
+        vi_record_point_period(s->record, point, vi_structure_at(s->model, shape, s->state->q),
+                               vi_structure_at(s->model, shape, s->state->p));
+    }
     vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now), vi_structure_observed(s),
                      vi_structure_at(s->model, s->model->observed, s->state->p));
 }
@@ -334,6 +339,10 @@ static bool loads_are_finite(const vi_structure *s)
 
 static void begin_step(const vi_structure *s)
 {
+    for (int point = 0; point < s->model->further; ++point) {
+        const double *shape = s->model->shape[s->model->contacts + point];
+        vi_record_point_begin(s->record, point, vi_structure_at(s->model, shape, s->state->q));
+    }
     if (vi_record_begin_step(s->record, vi_structure_observed(s))) {
         vi_structure_begin_recording(s);
     }

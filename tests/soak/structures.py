@@ -1,0 +1,121 @@
+"""Random scenes of several bodies of every kind: energy balances, every run ends, nothing is beyond a rigid stop.
+
+Scenes of free oscillators that meet only each other run as components, too: the first impacts are the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from support.drawn_structures import ENERGIES, drawn_structure
+
+import vibroimpact as vi
+from vibroimpact.analysis.dataset.naming import file_name_of
+from vibroimpact.orchestrator.run.dataset import further_points
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models.structure import label_of
+
+CASES = 20_000
+SAMPLE = 6
+SECONDS = 20.0
+#: Largest error of the energy over the energy turned over; the second for power laws, each solved to 1e-10.
+TURNOVER, TURNOVER_POWER = 1e-9, 1e-7
+#: Largest way beyond a rigid stop, over the displacements and the clearance.
+BEYOND = 1e-11
+#: Rounding of a displacement, m, and the outcome whose last period has no row.
+ROUNDING, IMPACT_LIMIT = 1e-11, 2
+POWER = ("hertz", "hunt_crossley")
+#: Impacts that two forms share before their rounding parts them, and the largest difference of their times.
+SHARED, APART = 6, 1e-8
+
+
+def check(seed: int) -> str | None:
+    """Return the fault of the scene of a seed."""
+    tables = drawn_structure(seed)
+    scene = Scene.from_dict(tables)
+    found = vi.run(scene)
+    outcome = int(found.outcome)
+    if outcome > 2:
+        return f"outcome {outcome}: {found.message.item()}"
+    return (
+        _energy_problem(tables, found)
+        or _room_problem(scene, found)
+        or _extremes_problem(scene, found)
+        or _components_problem(tables, found)
+    )
+
+
+def _limits(tables: dict[str, Any]) -> list[dict[str, Any]]:
+    return [*tables.get("stop", []), *tables["contact"]]
+
+
+def _energy_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
+    kinetic, potential, work, loss, contact = (found[f"energy_{name}"].values for name in ENERGIES)
+    if not len(kinetic):
+        return None
+    energy = kinetic + potential
+    balance = energy - energy[0] - (work - work[0]) + (loss - loss[0]) + (contact - contact[0])
+    ways = (np.abs(np.diff(each)).sum() for each in (energy, work, loss, contact))
+    power = any(each.get("law") in POWER for each in _limits(tables))
+    allowed = (TURNOVER_POWER if power else TURNOVER) * (energy.max() + sum(ways)) + 1e-14
+    worst = float(np.abs(balance).max())
+    return None if worst <= allowed else f"energy off by {worst:.3g}, of {allowed:.3g} allowed"
+
+
+def _room_problem(scene: Scene, found: xr.Dataset) -> str | None:
+    for k, stop in enumerate(scene.stops, start=1):
+        way = found[f"contact_displacement_{k}"].values
+        sign = 1.0 if stop.side == "upper" else -1.0
+        beyond = float((sign * (way - stop.position)).max(initial=0.0))
+        if stop.law == "restitution" and beyond > BEYOND * (1.0 + np.abs(way).max(initial=0.0)):
+            return f"{beyond:.3g} beyond {scene.stop_keys[k - 1]}"
+    return None
+
+
+def _extremes_problem(scene: Scene, found: xr.Dataset) -> str | None:
+    """Return the observed point whose samples exceed its extremes."""
+    names = ("", *(f"_{name}" for name in further_points(scene)))
+    for observed, name in zip(scene.record.observed, names, strict=False):
+        column = f"displacement_max{name}"
+        if column not in found or not found.sizes["period"] or int(found.outcome) == IMPACT_LIMIT:
+            continue
+        way = found[file_name_of(f"displacement[{label_of(observed)}]")].values
+        high, low = found[column].values.max(), found[column.replace("max", "min")].values.min()
+        if way.max() > high + ROUNDING or way.min() < low - ROUNDING:
+            return f"{label_of(observed)}: samples from {way.min()} to {way.max()}, extremes {low} and {high}"
+    return None
+
+
+def _components_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
+    """Compare the first impacts with those of components, where free oscillators meet only each other rigidly."""
+    bodies, contacts = tables["body"], tables["contact"]
+    plain = all("kind" not in body for body in bodies) and not tables.keys() & {"link", "stop", "forcing"}
+    if not plain or any("law" in contact or contact["clearance"] < 1e-3 for contact in contacts):
+        return None
+    owners = [tuple(contact["between"]) for contact in contacts]
+    if len(owners) != len({frozenset(pair) for pair in owners}):
+        return None
+    component = {
+        body["name"]: {
+            "fmu": "Oscillator",
+            "parameters": {key: value for key, value in body.items() if key != "name"},
+        }
+        for body in bodies
+        if any(body["name"] in pair for pair in owners)
+    }
+    coupled = Scene.from_dict(
+        {
+            "scene": tables["scene"],
+            "component": component,
+            "contact": contacts,
+            "record": {"recorded_time": tables["record"]["recorded_time"]},
+            "execution": {"macro_step": 0.5},
+        }
+    )
+    other = vi.run(coupled)
+    ours, theirs = found.impact_time.values[:SHARED], other.impact_time.values[:SHARED]
+    if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=0.0, atol=APART):
+        return f"impacts at {ours}, those of components at {theirs}"
+    return None
