@@ -34,7 +34,8 @@ def find_orbits(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; the sweep is ignored.
+        An oscillator, a chain, a beam or several bodies on restitution stops under a harmonic force;
+        the sweep is ignored.
     impacts, periods : int, optional
         p and q of P(p,q). By default all orbits P(1,1) are found, and the orbit that a long run ends on.
     seed : sequence of (phase, stop), optional
@@ -91,7 +92,8 @@ def follow(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force; the sweep is ignored.
+        An oscillator, a chain, a beam or several bodies on restitution stops under a harmonic force;
+        the sweep is ignored.
     parameter : str
         Key of a number in the scene, for example `forcing.angular_frequency`.
     start, stop : float
@@ -190,7 +192,7 @@ def basins(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops under a harmonic force.
+        An oscillator, a chain, a beam or several bodies on restitution stops under a harmonic force.
     x, y : tuple of float, optional
         Ranges of the initial displacement (m) and velocity (m/s). The default is twice the range of the scene's motion.
     points : tuple of int
@@ -290,8 +292,8 @@ def transients(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain or a beam on restitution stops; the sweep is ignored. Without a harmonic force the
-        period is the period of the first mode.
+        An oscillator, a chain, a beam or several bodies on restitution stops; the sweep is ignored.
+        Without a harmonic force the period is the period of the first mode.
     path : path, optional
         Dataset file to write as well (.nc).
     starts : int

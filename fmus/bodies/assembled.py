@@ -6,7 +6,7 @@ import numpy as np
 
 from vibroimpact.fmus.bodies.body_points import row_of
 from vibroimpact.fmus.bodies.impacting_body import Floats, Numbers
-from vibroimpact.fmus.bodies.structure import Structure, StructurePoints
+from vibroimpact.fmus.bodies.structure import Structure, StructurePoints, ratios_of
 
 
 class AssembledPoints(StructurePoints):
@@ -30,8 +30,7 @@ class AssembledPoints(StructurePoints):
         frequencies, coupling = row("angular_frequency"), self._coupling(numbers)
         ratios = row("damping_ratio")
         if coupling is not None:
-            moves = frequencies > 0.0
-            ratios = np.where(moves, coupling.diagonal() / (2.0 * np.where(moves, frequencies, 1.0)), 0.0)
+            ratios = ratios_of(coupling, frequencies)
         same = np.eye(count)
         return Structure(
             frequencies,

@@ -11,7 +11,7 @@ import numpy as np
 
 from vibroimpact.fmus.bodies.beam import BeamPoints
 from vibroimpact.fmus.bodies.impacting_body import Floats, Integers, Numbers
-from vibroimpact.fmus.bodies.structure import DIAGONAL
+from vibroimpact.fmus.bodies.structure import couples, ratios_of
 from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes, spring_modes
 from vibroimpact.fmus.errors import UsageError
 
@@ -263,18 +263,13 @@ class Assembly:
     @property
     def damping_ratios(self) -> Floats:
         """Damping ratio of each mode, from the diagonal of the modal damping; 0 without a spring."""
-        moves = self.frequencies > 0.0
-        own = self.damping.diagonal() / (2.0 * np.where(moves, self.frequencies, 1.0))
-        return np.where(moves, own, 0.0)
+        return ratios_of(self.damping, self.frequencies)
 
     @cached_property
     def is_coupled(self) -> bool:
         """Whether the damping couples the modes, or damps a mode without a spring, which has no damping ratio."""
-        own = self.damping.diagonal()
-        off = np.abs(self.damping - np.diag(own))
-        if (own[self.frequencies == 0.0] != 0.0).any():
-            return True
-        return not self._commutes() or bool((off > DIAGONAL * (own[:, None] + own)).any())
+        drags_free_mode = bool((self.damping.diagonal()[self.frequencies == 0.0] != 0.0).any())
+        return drags_free_mode or not self._commutes() or couples(self.damping)
 
     def _commutes(self) -> bool:
         """Return whether C M^-1 K = K M^-1 C within rounding."""

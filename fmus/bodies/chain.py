@@ -48,11 +48,6 @@ class ChainPoints(StructurePoints):
             np.append(row_of(numbers, "damping", masses), numbers["far_damping"]),
         )
 
-    @property
-    def natural_frequencies(self) -> Floats:
-        """Natural angular frequencies of one point, with damping that couples its modes, too: see `BodyPoints`."""
-        return self._modes(self.floats).frequencies[: self.sizes[0]]
-
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
         numbers, (kept, masses, _) = self.floats, self.sizes

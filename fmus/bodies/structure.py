@@ -26,14 +26,14 @@ DIAGONAL = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Modes of a chain or a beam."""
+    """Modes of a chain, a beam, or several bodies."""
 
     frequencies: Floats
     """Natural angular frequencies, rad/s, shape (mode,)."""
     damping_ratios: Floats
     """Damping ratios, shape (mode,)."""
     mass: float
-    """Modal mass, kg; 1 for a chain."""
+    """Modal mass, kg; 1 where modes are mass-normalised."""
     load: Floats
     """Modal force over modal mass, per unit of each amplitude of the forcing, shape (mode, amplitude)."""
     held: Floats
@@ -59,15 +59,32 @@ class Structure:
     @property
     def is_coupled(self) -> bool:
         """Whether modes damp each other."""
-        if self.coupling is None:
-            return False
-        own = self.coupling.diagonal()
-        off = np.abs(self.coupling - np.diag(own))
-        return bool((off > DIAGONAL * (own[:, None] + own)).any())
+        return self.coupling is not None and couples(self.coupling)
+
+
+def couples(damping: Floats) -> bool:
+    """Return whether a modal damping matrix couples the modes, by more than `DIAGONAL`.
+
+    >>> couples(np.diag([0.1, 0.0])), couples(np.array([[0.1, 0.01], [0.01, 0.1]]))
+    (False, True)
+    """
+    own = damping.diagonal()
+    off = np.abs(damping - np.diag(own))
+    return bool((off > DIAGONAL * (own[:, None] + own)).any())
+
+
+def ratios_of(damping: Floats, frequencies: Floats) -> Floats:
+    """Return the damping ratios on the diagonal of a modal damping matrix (1/s); 0 without a spring.
+
+    >>> ratios_of(np.diag([0.1, 0.4]), np.array([0.0, 2.0])).tolist()
+    [0.0, 0.1]
+    """
+    moves = frequencies > 0.0
+    return np.where(moves, damping.diagonal() / (2.0 * np.where(moves, frequencies, 1.0)), 0.0)
 
 
 class StructurePoints(BodyPoints):
-    """Chains and beams: a subclass computes the modes from the parameters of one point."""
+    """Bodies of several modes: a subclass computes the modes from the parameters of one point."""
 
     START: str
     """Prefix of the names of start values, which set masses or modes."""
@@ -87,10 +104,10 @@ class StructurePoints(BodyPoints):
         names = [n for n in self.floats if not n.startswith(OF_THE_RUN) and not n.endswith(OF_A_STOP)]
         kinds, which = _different(np.stack([self.floats[name] for name in names]))
         return tuple(
-            self._structure_or_none(dict(zip(names, one.tolist(), strict=True))) for one in kinds.T
+            self._structure_or_nan(dict(zip(names, one.tolist(), strict=True))) for one in kinds.T
         ), which
 
-    def _structure_or_none(self, numbers: Numbers) -> Structure:
+    def _structure_or_nan(self, numbers: Numbers) -> Structure:
         """Return the modes of one point; all NaN if it has none, or if damping couples them."""
         try:
             with np.errstate(all="ignore"):
@@ -139,9 +156,8 @@ class StructurePoints(BodyPoints):
 
     @property
     def natural_frequencies(self) -> Floats:
-        """Natural angular frequencies of one point: see `BodyPoints`; empty without modes."""
-        found = self.structure_of(self.floats)
-        return np.empty(0) if found is None else found.frequencies
+        """Natural angular frequencies of one point: see `BodyPoints`."""
+        return self.structure_of(self.floats).frequencies
 
     def mass_normalised(self) -> ImpactingBody:
         """Return one point as mass-normalised modes under its harmonic force: see `BodyPoints`."""

@@ -15,9 +15,9 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDatase
 class Energies(Operation):
     """Show the energy flow between the modes of an impacting body: by force, damping and impacts.
 
-    Exact integrals cover the periodic orbit of each run. The body is an oscillator, a chain or a beam on restitution
-    stops. A scene is run first. A run without a periodic orbit (chaos, sticking, no impacts) is listed with the
-    reason.
+    Exact integrals cover the periodic orbit of each run. The body is an oscillator, a chain, a beam or several
+    bodies on restitution stops. A scene is run first. A run without a periodic orbit (chaos, sticking, no impacts) is
+    listed with the reason.
 
     Example: vibroimpact energies examples/thesis/figure_6_15.toml --figure energies.png
     """

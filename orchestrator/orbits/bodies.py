@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 def impacting_body(scene: Scene) -> ImpactingBody:
-    """Return the modes, the force and the contacts of a scene: an Oscillator, a Chain or a Beam on rigid stops.
+    """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on rigid stops.
 
     Parameters
     ----------

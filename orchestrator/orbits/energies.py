@@ -169,8 +169,8 @@ def energies(
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain or a beam on
-        restitution stops, and impacts are recorded.
+        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain, a beam or
+        several bodies on restitution stops, and impacts are recorded.
     run : int, optional
         `run_index` of a single run; its result also has each impact.
     progress : Progress, optional

@@ -82,8 +82,8 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset or path
-        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain or a beam on
-        restitution stops. 200 impacts must count, or two rounds of a periodic orbit.
+        As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain, a beam or
+        several bodies on restitution stops. 200 impacts must count, or two rounds of a periodic orbit.
 
     Returns
     -------

@@ -125,8 +125,8 @@ def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder. Only `forcing.angular_frequency` or
-        `forcing.frequency` is swept. The body is an oscillator, a chain or a beam on restitution stops, and impacts
-        and extrema are recorded.
+        `forcing.frequency` is swept. The body is an oscillator, a chain, a beam or several bodies on restitution
+        stops, and impacts and extrema are recorded.
 
     Returns
     -------

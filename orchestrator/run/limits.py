@@ -42,7 +42,9 @@ class Limit:
 
 _NONE = "0 where orbits are followed"
 LIMITS = {
-    "body": Limit(lanes=True, orbits="an oscillator, a chain or a beam whose orbits are followed"),
+    "body": Limit(
+        lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
+    ),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
     "law": Limit(orbits='"restitution": impacts without duration'),

@@ -281,7 +281,7 @@ def test_rows_that_find_no_room_are_asked_for() -> None:
 
 
 BAD = {
-    "stiffness": (math.nan, -1.0, 0.0, math.inf),
+    "stiffness": (math.nan, -1.0, math.inf),
     "decay": (math.nan, -0.1),
     "force": (math.nan, math.inf),
     "angular_frequency": (math.nan, -1.0, 1e-305),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -278,9 +278,8 @@ def _start_is_on_the_free_side(draft: Draft, points: _Points) -> Iterator[Proble
             yield Problem(limit.key, expected, got, "Start on it or away from it, or move it.")
 
 
-def part_problems(draft: Draft, rules: Sequence[object]) -> Iterator[Problem]:
+def part_problems(draft: Draft, rules: Sequence[Callable[[Draft], Iterator[Problem]]]) -> Iterator[Problem]:
     """Yield the problems of each body by rules of one body, with its keys among several."""
     for number, part in enumerate(draft.parts, start=1):
         for rule in rules:
-            assert callable(rule)
             yield from (of_part(number, problem) for problem in rule(part))

@@ -26,8 +26,8 @@ int vi_door_beam_residual_shapes(int boundary, int natural, int points, const do
 int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
                         double natural[], double damping_ratio[], double shape[], double coupling[]);
 
-/* Frequencies and shapes of a structure of springs, from the matrix spring[row * columns + column]: the force of each
- * spring, in units of sqrt(stiffness), for a displacement of 1 / sqrt(mass). value[] has the `rank` angular frequencies
+/* Frequencies and shapes of a structure of springs. spring[row * columns + column] is the elongation of a spring times
+ * sqrt(stiffness), for a displacement of 1 / sqrt(mass) of a coordinate. value[] has the `rank` angular frequencies
  * above 0, ascending, and vector[k * columns + column] their unit vectors. Returns the rank, or -1 for a bad argument. */
 int vi_door_spring_modes(int rows, int columns, const double spring[], double value[], double vector[]);
 

@@ -136,6 +136,7 @@ def test_the_natural_frequencies_are_those_of_the_modes(fmu: str) -> None:
 
 def test_damping_that_couples_the_modes_of_a_chain_leaves_its_natural_frequencies() -> None:
     coupled = body("Chain", **{"damping[2]": 0.5})
+    assert coupled.mass_normalised().coupling is not None
     np.testing.assert_array_equal(coupled.natural_frequencies, body("Chain").natural_frequencies)
 
 
@@ -143,3 +144,11 @@ def test_residual_vectors_have_no_natural_frequency() -> None:
     floats, integers = BODIES["Beam"]
     one = POINTS_OF_FMU["Beam"](floats, integers | {"residual": 1}, 1)
     np.testing.assert_array_equal(one.natural_frequencies, body("Beam").natural_frequencies[:2])
+
+
+def test_several_bodies_have_natural_frequencies_coupled_or_loose_too() -> None:
+    damping = {f"mode.damping[{i},{j}]": 0.1 for i in (1, 2) for j in (1, 2)}
+    floats, integers = BODIES["Structure"]
+    loose = floats | damping | {"mode.angular_frequency[1]": 0.0}
+    one = POINTS_OF_FMU["Structure"](loose, integers | {"coupled": True}, 1)
+    assert one.natural_frequencies.tolist() == [0.0, 4.0]

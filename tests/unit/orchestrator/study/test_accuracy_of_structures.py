@@ -108,12 +108,12 @@ def test_a_structure_on_yielding_stops_is_followed_by_held_forces_and_by_step_re
                 "stop": [SOFT | {"location": 0.6}],
                 "forcing": {"amplitude": 0.3, "angular_frequency": 165.0},
             },
-            "plain steps of equal size and step revision: a Beam takes one force, where it is forced",
+            "plain steps of equal size and step revision: a body with one force takes it where it is forced",
             None,
         ),
         (
             {"stop": [RIGID, RIGID | {"location": 0.6}]},
-            "step revision: a Beam takes one force",
+            "step revision: a body with one force takes it",
             "plain steps",
         ),
         (
