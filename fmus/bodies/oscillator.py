@@ -65,7 +65,7 @@ class OscillatorPoints(BodyPoints):
 
 
 def _damping_ratio(mass: float, stiffness: float, damping: float) -> float:
-    """Return the damping ratio; without a spring infinite with damping, else 0."""
+    """Return the damping ratio; without a spring it is 0, or infinite with damping."""
     if damping == 0.0:
         return 0.0
     return float(0.5 * damping / np.sqrt(stiffness * mass)) if stiffness > 0.0 else float(np.inf)

@@ -72,8 +72,9 @@ class OrbitBody:
         contacts, self.modes = self._arrays["shape"].shape
         addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
         tied = self._arrays["natural"] > 0.0
-        is_coupled = coupling is not None and bool(tied.any())
-        self._terms = self._coupled(angular_frequency, coupling, tied) if is_coupled else None
+        self._terms = None
+        if coupling is not None and tied.any():
+            self._terms = self._coupled(angular_frequency, coupling, tied)
         terms = None if self._terms is None else self._terms.ctypes.data
         self.address = BODY(self.modes, contacts, angular_frequency, *addresses, terms)
 
