@@ -322,6 +322,10 @@ def test_the_orbit_of_a_ball_in_a_cavity_is_the_motion_of_its_run(damping: float
     assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-9)
     period = orbit.phases[0] + np.array([0.0, 2.0 * np.pi])
     assert np.ptp(orbit.at(period)[0]) == pytest.approx(0.0, abs=1e-12)
+    recorded = vi.run(scene.with_values({"record": long | {"recorded_periods": 40, "impacts": True}}))
+    expected = np.sort(np.log(np.abs(orbit.multipliers)) / 2.0)
+    assert np.sort(vi.lyapunov(recorded).lyapunov_exponent.values) == pytest.approx(expected, abs=1e-9)
+    assert vi.energies(recorded).identity_error < 1e-12
 
 
 def test_components_that_meet_only_each_other_have_a_fused_form() -> None:
