@@ -193,7 +193,8 @@ class OrbitEnergies:
         ends = np.append(orbit.phases[1:], orbit.phases[0] + TURN * orbit.periods)
         start = np.empty((*self._after[0].shape, 4))
         # a constant force shifts the rest position; its work over the orbit is zero
-        start[..., 0] = body.frequencies * self._after[0] - body.held / body.frequencies
+        tied = np.where(body.frequencies > 0.0, body.frequencies, np.inf)
+        start[..., 0] = body.frequencies * self._after[0] - body.held / tied
         start[..., 1] = self._after[1]
         start[..., 2] = np.cos(orbit.phases)[:, None] * body.force
         start[..., 3] = np.sin(orbit.phases)[:, None] * body.force
@@ -262,7 +263,8 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     Raises
     ------
     UsageError
-        An impact of the orbit has no speed: at a graze no energy is exchanged.
+        An impact of the orbit has no speed: at a graze no energy is exchanged. Or a constant force acts on a mode
+        without a spring.
 
     Examples
     --------
@@ -276,4 +278,8 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     """
     if not (orbit.velocities > 0.0).all():
         raise UsageError(f"energies: {orbit.name}: expected impacts with a speed, got a graze.")
+    if orbit.body.held[: orbit.body.loose].any():
+        raise UsageError(
+            f"energies: {orbit.name}: expected no constant force on bodies without a spring, got one."
+        )
     return OrbitEnergies(orbit)

@@ -149,7 +149,7 @@ def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
     slow = body.slowest_decay
     if not slow > 0.0:
         raise ExponentError(
-            "lyapunov: expected damping of all modes, without which a state is never forgotten, got none."
+            "lyapunov: expected damping of all modes with springs, without which a state is never forgotten, got none."
         )
     forgotten = impacts.times[0] - np.log(FORGOTTEN) / slow
     return int(np.searchsorted(impacts.times, forgotten)) + SETTLING

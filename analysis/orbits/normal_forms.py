@@ -145,6 +145,8 @@ def one_mode(body: ImpactingBody) -> tuple[float, float, float]:
         raise OrbitError(
             f"maps: expected a body of one mode and one stop, got {body.frequencies.size} and {len(body.contacts)}."
         )
+    if body.loose:
+        raise OrbitError("maps: expected a body on a spring, got one without.")
     contact = body.contacts[0]
     natural = float(body.frequencies[0])
     return natural, float(body.damping_ratios[0]) * natural, contact.direction * float(contact.shape[0])

@@ -136,7 +136,10 @@ class PeriodicOrbit:
     @property
     def is_physical(self) -> bool:
         """Whether it hits its stops from inside, and never lies beyond one."""
-        return bool((self.velocities > 0.0).all()) and self.highest[0] <= TOUCHES * self.body.scale
+        return (
+            bool((self.velocities > least_speed(self.body)).all())
+            and self.highest[0] <= TOUCHES * self.body.scale
+        )
 
     @cached_property
     def turns(self) -> int:
@@ -173,6 +176,14 @@ class PeriodicOrbit:
         return _observed(self, phases)
 
 
+def least_speed(body: ImpactingBody) -> float:
+    """Return the speed, m/s, up to which an impact has none.
+
+    Impulses on a body without a spring balance each other. A single impact then has the speed of rounding.
+    """
+    return TOUCHES * body.scale * body.angular_frequency if body.loose else 0.0
+
+
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
     """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them."""
     found = body.kernel.evaluate(contacts, phases, periods)
@@ -186,6 +197,11 @@ def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, 
         raise OrbitError(
             "orbit: expected coupled modes away from critical damping, or slower than 1e5 times the force, got others. "
             "Change a dashpot by a thousandth."
+        )
+    if found.end is OrbitEnd.adrift:
+        raise OrbitError(
+            "orbit: expected impacts that place each body without a spring, got a body that could be anywhere. "
+            "Tie it to the ground, or let it hit a body or a stop that is tied."
         )
     if found.end is not OrbitEnd.done:
         raise OrbitError(
@@ -300,7 +316,7 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
     orbits = []
     for phase in dict.fromkeys(float(np.mod(middle + side * off, TURN)) for side in (1.0, -1.0)):
         velocity = evaluated(body, hit, np.array([phase]), periods).velocities
-        if velocity[0] > 0.0:
+        if velocity[0] > least_speed(body):
             orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
     return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
 
@@ -327,6 +343,8 @@ def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
     now = _steady(body, phases)
     x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
     moved, faster = _free(body, u, x, v)
+    pushed = np.where(body.frequencies == 0.0, body.held, 0.0)
+    moved, faster = moved + 0.5 * pushed * u**2, faster + pushed * u
     return (moved + now[0]) @ body.observed, (faster + now[1]) @ body.observed
 
 
@@ -334,14 +352,16 @@ def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats,
     """Return displacements and velocities of the modes, free from (x, v) for u seconds, shape (time, mode)."""
     w, z = body.frequencies, body.damping_ratios
     if body.coupling is not None:
+        loose, w = body.loose, w[body.loose :]
         rates, vectors = body.complex_modes
-        parts = np.linalg.solve(vectors, np.concatenate([w * x, v], axis=1).T)
+        parts = np.linalg.solve(vectors, np.concatenate([w * x[:, loose:], v[:, loose:]], axis=1).T)
         later = (vectors @ (parts * np.exp(rates * u).T)).real.T
-        return later[:, : w.size] / w, later[:, w.size :]
+        moved = np.concatenate([x[:, :loose] + v[:, :loose] * u, later[:, : w.size] / w], axis=1)
+        return moved, np.concatenate([v[:, :loose], later[:, w.size :]], axis=1)
     decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w
     # exponentials that decay, never a cosh that overflows: equations.md 1.2
     fast = np.where(z > 1.0, -(decay + rate), -decay - 1j * rate)
-    slow = np.where(z > 1.0, -(w**2) / (decay + rate), -decay + 1j * rate)
+    slow = np.where(z > 1.0, -(w**2) / np.where(z > 1.0, decay + rate, 1.0), -decay + 1j * rate)
     left, gone = np.exp(slow * u), np.exp(fast * u)
     apart = np.where(rate == 0.0, 1.0, slow - fast)
     c = 0.5 * (left + gone)
@@ -352,4 +372,4 @@ def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats,
 def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
     w = body.angular_frequency
     turned = body.steady(w) * np.exp(1j * phases)[:, None]
-    return turned.real + body.held / body.frequencies**2, (1j * w * turned).real
+    return turned.real + body.levels, (1j * w * turned).real

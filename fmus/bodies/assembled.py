@@ -77,11 +77,6 @@ class AssembledPoints(StructurePoints):
         """Return whether one force input can act at all contacts: nowhere but at the forced point."""
         return False
 
-    @property
-    def is_loose(self) -> bool:
-        """Whether a mode has no spring: nothing ties a group of the masses to the ground."""
-        return not self.floats["mode.angular_frequency[1]"] > 0.0
-
 
 def without_arrays(numbers: Numbers) -> tuple[dict[str, float], dict[str, Floats]]:
     """Return the parameters that are variables of their own, and the arrays `mode.NAME` of the others.

@@ -97,11 +97,6 @@ class BeamPoints(StructurePoints):
         found = {f"sensor[{k}].location": place for k, place in enumerate(where, start=1)}
         return found | ({"forcing_location": where[0]} if self.is_pushed() else {})
 
-    @property
-    def is_loose(self) -> bool:
-        """False: a boundary ties each beam to the ground."""
-        return False
-
 
 def _mass_of(numbers: Numbers) -> float:
     """Return the mass of a beam, kg."""

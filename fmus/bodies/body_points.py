@@ -102,11 +102,6 @@ class BodyPoints(ABC):
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of states (m, shape (state, element)) in mass-normalised modes, kg^(1/2) m."""
 
-    @property
-    @abstractmethod
-    def is_loose(self) -> bool:
-        """Whether nothing ties the body to the ground."""
-
     # ---- contacts, in the coordinates of the state ----
 
     @abstractmethod

@@ -77,8 +77,3 @@ class ChainPoints(StructurePoints):
     def variables_at_contacts(self, what: str) -> tuple[str, ...]:
         """Return the variables of the mass of each contact."""
         return tuple(f"{what}[{hit + 1}]" for hit in self._hit)
-
-    @property
-    def is_loose(self) -> bool:
-        """Whether nothing ties the chain to the ground."""
-        return not self._modes(self.floats).frequencies[0] > 0.0

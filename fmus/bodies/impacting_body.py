@@ -49,7 +49,8 @@ class Contact:
 class ImpactingBody:
     """A body of mass-normalised modes: q'' + 2 z w q' + w^2 q = force cos(phase) + held.
 
-    Damping that couples the modes takes the place of 2 z w: a matrix.
+    Damping that couples the modes takes the place of 2 z w: a matrix. Modes without a spring (w = 0) come first. Orbits
+    need them without damping: equations.md 4.7.
 
     Attributes
     ----------
@@ -75,6 +76,24 @@ class ImpactingBody:
     contacts: tuple[Contact, ...]
     observed: Floats
     coupling: Floats | None = None
+
+    @cached_property
+    def loose(self) -> int:
+        """Number of modes without a spring."""
+        return int(np.count_nonzero(self.frequencies == 0.0))
+
+    @property
+    def is_dragged(self) -> bool:
+        """Whether a mode without a spring has damping, which orbits cannot take."""
+        drag = self.damping_ratios[: self.loose] if self.coupling is None else self.coupling[: self.loose]
+        return bool((drag != 0.0).any())
+
+    @cached_property
+    def levels(self) -> Floats:
+        """Displacements of the modes under the constant force, kg^(1/2) m; 0 without a spring."""
+        found = np.zeros(self.frequencies.size)
+        found[self.loose :] = self.held[self.loose :] / self.frequencies[self.loose :] ** 2
+        return found
 
     @property
     def period(self) -> float:
@@ -102,27 +121,32 @@ class ImpactingBody:
 
     @cached_property
     def rates(self) -> NDArray[np.complex128]:
-        """Rates of the free motions e^(rate t), 1/s, shape (2 modes,): equations.md 1.2, 4.7."""
+        """Rates of the free motions e^(rate t) of the modes with springs, 1/s: equations.md 1.2, 4.7."""
         if self.coupling is None:
-            decay = self.frequencies * self.damping_ratios
-            swing = self.frequencies * np.sqrt(self.damping_ratios.astype(np.complex128) ** 2 - 1.0)
+            natural, ratios = self.frequencies[self.loose :], self.damping_ratios[self.loose :]
+            decay = natural * ratios
+            swing = natural * np.sqrt(ratios.astype(np.complex128) ** 2 - 1.0)
             # the slow rate of an overdamped mode from the fast one: their difference would cancel
             fast = -decay - swing
-            return np.concatenate([fast, self.frequencies**2 / fast])
+            return np.concatenate([fast, natural**2 / fast])
         return self.complex_modes[0]
 
     @cached_property
     def complex_modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """Rates, 1/s, shape (2 modes,), and vectors (w q, q') in columns, of modes that the damping couples."""
-        spring = np.diag(self.frequencies)
-        motion = np.block([[np.zeros_like(spring), spring], [-spring, -np.asarray(self.coupling)]])
+        """Rates, 1/s, and vectors (w q, q') in columns, of modes with springs that the damping couples."""
+        spring = np.diag(self.frequencies[self.loose :])
+        damping = np.asarray(self.coupling)[self.loose :, self.loose :]
+        motion = np.block([[np.zeros_like(spring), spring], [-spring, -damping]])
         rates, vectors = np.linalg.eig(motion)
         return rates.astype(np.complex128), vectors.astype(np.complex128)
 
     @cached_property
     def slowest_decay(self) -> float:
-        """Rate at which the free motion that lasts longest decays, 1/s; 0 or less where one does not decay."""
-        return -float(self.rates.real.max())
+        """Rate at which the free motion that lasts longest decays, 1/s; 0 or less where one does not decay.
+
+        Modes without a spring do not count: no impact depends on their state (equations.md 4.7).
+        """
+        return -float(self.rates.real.max(initial=-np.inf))
 
     def steady(self, angular_frequency: float | Floats) -> NDArray[np.complex128]:
         """Return the steady displacements Re(q e^(i phase)) of the modes, kg^(1/2) m: equations.md 1.3, 4.7.

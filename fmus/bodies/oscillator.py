@@ -37,7 +37,7 @@ class OscillatorPoints(BodyPoints):
         shape = np.array([1.0 / root])
         return ImpactingBody(
             np.array([np.sqrt(stiffness / mass)]),
-            np.array([0.5 * damping / np.sqrt(stiffness * mass)]),
+            np.array([_damping_ratio(mass, stiffness, damping)]),
             np.array([numbers["forcing.amplitude"] / root]),
             np.array([numbers.get("force", 0.0) / root]),
             numbers["forcing.angular_frequency"],
@@ -55,11 +55,6 @@ class OscillatorPoints(BodyPoints):
         """Return displacements of a state in mass-normalised modes: see `BodyPoints`."""
         return np.asarray(displacements * np.sqrt(self.floats["mass"]))
 
-    @property
-    def is_loose(self) -> bool:
-        """Whether the oscillator has no spring."""
-        return not self.floats["stiffness"] > 0.0
-
     def contact_shapes(self) -> Floats:
         """Return a shape of 1 for each contact."""
         return np.ones((self.stops, 1))
@@ -67,3 +62,10 @@ class OscillatorPoints(BodyPoints):
     def contact_masses(self) -> Floats:
         """Return the mass at each contact, kg."""
         return np.full(self.stops, self.floats["mass"])
+
+
+def _damping_ratio(mass: float, stiffness: float, damping: float) -> float:
+    """Return the damping ratio; without a spring it is 0, or infinite with damping."""
+    if damping == 0.0:
+        return 0.0
+    return float(0.5 * damping / np.sqrt(stiffness * mass)) if stiffness > 0.0 else float(np.inf)

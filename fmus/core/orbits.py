@@ -26,6 +26,7 @@ class OrbitEnd(IntEnum):
     resonant = 2
     singular = 3
     critical = 4
+    adrift = 5
 
 
 class BODY(Structure):
@@ -56,33 +57,37 @@ class OrbitBody:
     angular_frequency : float
         Angular frequency of the force, rad/s.
     natural, damping_ratio, cosine, sine, held : array, shape (modes,)
-        Natural angular frequencies (rad/s), damping ratios, modal force = cosine cos(phase) + sine sin(phase) + held.
+        Natural angular frequencies (rad/s; modes of 0 first) and damping ratios. The modal force is
+        cosine cos(phase) + sine sin(phase) + held.
     shape, impulse : array, shape (contacts, modes)
         Displacement of each contact for unit modal displacements; modal velocities that give the contact 1 m/s.
     direction, position, restitution : array, shape (contacts,)
         +1 for a stop above, -1 below; position, m; coefficient of restitution.
     coupling : array, shape (modes, modes), optional
-        Damping that couples the modes, 1/s; it replaces the damping ratios.
+        Damping that couples the modes, 1/s; it replaces the damping ratios. No damping of modes without a spring.
     """
 
     def __init__(self, angular_frequency: float, *, coupling: Array | None = None, **arrays: Array) -> None:
         self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
         contacts, self.modes = self._arrays["shape"].shape
         addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
-        self._terms = None if coupling is None else self._coupled(angular_frequency, coupling)
+        tied = self._arrays["natural"] > 0.0
+        self._terms = None
+        if coupling is not None and tied.any():
+            self._terms = self._coupled(angular_frequency, coupling, tied)
         terms = None if self._terms is None else self._terms.ctypes.data
         self.address = BODY(self.modes, contacts, angular_frequency, *addresses, terms)
 
-    def _coupled(self, angular_frequency: float, coupling: Array) -> Array:
-        """Return the complex modes in the form of C, as bytes in an array of numbers."""
+    def _coupled(self, angular_frequency: float, coupling: Array, tied: NDArray[np.bool_]) -> Array:
+        """Return the complex modes of the modes with springs in the form of C, as bytes in an array of numbers."""
         library = _library()
         found = np.empty(library.vi_door_orbit_coupling_size() // 8 + 1)
         work = np.empty(library.vi_door_orbit_coupling_work_size() // 8 + 1)
-        damping = _numbers(coupling, (self.modes, self.modes))
-        given = (self._arrays["natural"], damping, self._arrays["cosine"], self._arrays["sine"], found, work)
-        end = library.vi_door_orbit_couple(
-            self.modes, angular_frequency, *(each.ctypes.data for each in given)
-        )
+        damping = np.ascontiguousarray(_numbers(coupling, (self.modes, self.modes))[np.ix_(tied, tied)])
+        rows = [np.ascontiguousarray(self._arrays[name][tied]) for name in ("natural", "cosine", "sine")]
+        given = (rows[0], damping, rows[1], rows[2], found, work)
+        modes = int(np.count_nonzero(tied))
+        end = library.vi_door_orbit_couple(modes, angular_frequency, *(each.ctypes.data for each in given))
         _check(OrbitEnd.refused if end else OrbitEnd.done)
         return found
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ImpactingBody
-from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen, seen_of_loose
+from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen, seen_of_drag
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
 
@@ -28,9 +28,9 @@ def impacting_body(scene: Scene) -> ImpactingBody:
     """
     refuse_orbits(scene, seen(scene))
     body = body_points(scene)
-    if body.is_loose:
-        refuse_orbits(scene, [seen_of_loose(scene)])
     found = body.mass_normalised()
+    if found.is_dragged:
+        refuse_orbits(scene, [seen_of_drag(scene)])
     for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
         if not contact.shape @ contact.shape > 0.0:
             refuse_orbits(scene, [Seen("held", key, "one that is held")])

@@ -15,6 +15,7 @@ from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
+from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
@@ -164,7 +165,7 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
             raise UsageError(f"orbit: seed: expected stops 1 to {len(body.contacts)}, got {stop}.")
     phases, contacts = [phase for phase, _ in seed], [stop - 1 for _, stop in seed]
     orbit = find_orbit(body, phases, contacts, periods)
-    if not (orbit.velocities > 0.0).all():
+    if not (orbit.velocities > least_speed(body)).all():
         raise OrbitError(
             "orbit: expected impacts towards the stops near to the seed, got velocities "
             f"{orbit.velocities.round(6).tolist()}. Try other phases."

@@ -208,7 +208,7 @@ def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: 
     size = float(np.abs(contact.shape).max())
     if side not in dataset or np.abs(contact.shape - body.observed).max() > _AGREEMENT * size:
         return nothing
-    rest = contact.direction * float(contact.shape @ (body.held / body.frequencies**2))
+    rest = contact.direction * float(contact.shape @ body.levels)
     extreme = dataset[side] if "period" not in dataset[side].dims else dataset[side].min("period")
     if contact.direction < 0.0 and "period" in dataset[side].dims:
         extreme = dataset[side].max("period")

@@ -149,7 +149,7 @@ class Transients(Study[Floats]):
     @property
     def linear_contraction(self) -> float:
         """Factor per period of the body without impacts, in its slowest mode."""
-        return math.exp(-self.body.slowest_decay * self.body.period)
+        return 1.0 if self.body.loose else math.exp(-self.body.slowest_decay * self.body.period)
 
     def made(self) -> xr.Dataset:
         """Return the distances, and the end of each start."""
@@ -279,7 +279,7 @@ def _refuse(study: Transients) -> None:
 
 
 def _with_the_first_mode(scene: Scene) -> Scene:
-    """Return a scene without a force as a scene with zero force, with the period of its first mode."""
+    """Return a scene without a force as a scene with zero force, with the period of its first mode on a spring."""
 
     def forced(frequency: float) -> Scene:
         record = {"transient_periods": 0, "recorded_periods": 1}
@@ -287,7 +287,10 @@ def _with_the_first_mode(scene: Scene) -> Scene:
             {"record": record, "forcing": {"amplitude": 0.0, "angular_frequency": frequency}}
         )
 
-    return forced(float(impacting_body(forced(1.0)).frequencies[0]))
+    body = impacting_body(forced(1.0))
+    if body.loose == body.frequencies.size:
+        raise UsageError(f"{scene.source}: forcing: expected one where no body has a spring, got none.")
+    return forced(float(body.frequencies[body.loose]))
 
 
 def _size(flow: BodyFlow, body: ImpactingBody) -> Floats:

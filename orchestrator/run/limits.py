@@ -60,8 +60,7 @@ LIMITS = {
     "places": Limit(
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
-    "spring": Limit(orbits="a spring where orbits are followed"),
-    "loose": Limit(orbits="bodies that springs tie to the ground"),
+    "dragged": Limit(orbits="no damping of bodies that no spring ties to the ground"),
     "held": Limit(orbits="a point that moves"),
     "force": Limit(
         pushed="a body with one force takes it where it is forced, and its stops are not all there"
@@ -155,11 +154,11 @@ def _yields_in_lanes(scene: Scene) -> bool:
     )
 
 
-def seen_of_loose(scene: Scene) -> Seen:
-    """Return the feature that keeps orbits from a scene's body, which is loose: see `is_loose` of `BodyPoints`."""
-    several = isinstance(scene.body, StructureBody)
-    loose = Seen("loose", "body" if several else "body.stiffnesses", "one that is loose")
-    return loose if scene.body.IS_STRUCTURE else Seen("spring", "body.stiffness", "none")
+def seen_of_drag(scene: Scene) -> Seen:
+    """Return the feature that keeps orbits from a scene's body, whose mode without a spring has damping."""
+    return Seen(
+        "dragged", "body" if isinstance(scene.body, StructureBody) else "body.damping", "a dashpot on one"
+    )
 
 
 def refuse_orbits(scene: Scene, found: Iterable[Seen]) -> None:

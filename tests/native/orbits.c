@@ -141,9 +141,11 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
     draw(&s, seed, most_modes);
     if (coupled) {
         couple(&s, seed);
+    } else if (choice(seed, 2)) {
+        s.natural[0] = s.damping_ratio[0] = 0.0;
     }
     const int end = vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster);
-    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT, "end %d", end);
+    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT || end == VI_ORBIT_ADRIFT, "end %d", end);
     if (end != VI_ORBIT_DONE) {
         return;
     }
@@ -180,7 +182,16 @@ static void check_refusals(uint64_t *seed)
     double velocity[VI_ORBIT_IMPACTS], distance[VI_ORBIT_IMPACTS], slope[25], faster[25];
     draw(&s, seed, 3);
     s.natural[0] = 0.0;
-    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "a loose mode");
+    s.damping_ratio[0] = 0.1;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "a dragged mode");
+    do {
+        draw(&s, seed, 3);
+    } while (s.body.modes < 2);
+    s.natural[1] = s.damping_ratio[1] = 0.0;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "a late loose mode");
+    s.natural[0] = s.damping_ratio[0] = 0.0;
+    s.train.impacts = 1;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_ADRIFT, "a mode adrift");
     draw(&s, seed, 3);
     s.contact[0] = (int32_t)VI_PORTS;
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "no contact");

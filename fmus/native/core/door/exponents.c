@@ -30,6 +30,8 @@ static void orthonormalize(int n, double column[][VI_ORBIT_STATES], double stret
     }
 }
 
+/* Carry the state over a flight. Modes without a spring miss their constant forces: no impact depends on where they are
+ * (equations.md 4.2). */
 static void fly(const vi_orbit_response *response, double from, double to, double u, double state[])
 {
     const int modes = response->body->modes;

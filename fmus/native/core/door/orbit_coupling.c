@@ -158,8 +158,8 @@ static bool solve(int n, double a[][VI_STATES], int sides, double b[][VI_STATES]
     return true;
 }
 
-bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], double length,
-                               double state[][VI_STATES])
+bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], int stride,
+                               double length, double state[][VI_STATES])
 {
     const int modes = coupling->body.modes;
     double left[VI_STATES][VI_STATES]; /* 1 - Phi(length), in (w x, v) */
@@ -174,7 +174,7 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     }
     for (int k = 0; k < contacts; ++k) {
         memset(state[k], 0, sizeof state[k]);
-        memcpy(state[k] + modes, impulse + (ptrdiff_t)k * modes, (size_t)modes * sizeof state[k][0]);
+        memcpy(state[k] + modes, impulse + (ptrdiff_t)k * stride, (size_t)modes * sizeof state[k][0]);
     }
     if (!solve(2 * modes, left, contacts, state, 4.0 * DBL_EPSILON * (1.0 + coupling->fastest * length))) {
         return false;

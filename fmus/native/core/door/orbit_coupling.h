@@ -1,4 +1,5 @@
-/* Complex modes of a body whose damping couples its modes, as orbits take them: equations.md 4.7. */
+/* Complex modes of a body whose damping couples its modes, as orbits take them: equations.md 4.7. All these modes have
+ * springs. */
 #ifndef VIBROIMPACT_ORBIT_COUPLING_H
 #define VIBROIMPACT_ORBIT_COUPLING_H
 
@@ -29,9 +30,9 @@ VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const doub
 void vi_orbit_series(const vi_orbit_coupling *coupling, double u, double x[], double v[]);
 
 /* Find displacements and velocities just after a unit impulse that recurs after each `length` seconds, by the series;
- * impulse[contacts][modes]. False where an undamped motion grows without bound. */
-bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], double length,
-                               double state[][VI_STATES]);
+ * impulse[contacts][stride]. False where an undamped motion grows without bound. */
+bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], int stride,
+                               double length, double state[][VI_STATES]);
 
 /* e^(rate u) of each term. */
 void vi_orbit_turns(const vi_orbit_coupling *coupling, double u, vi_complex turn[]);

@@ -39,17 +39,18 @@ static void begin(flight *own, const vi_orbit_response *response, int contact, c
         return;
     }
     const vi_pressed_modes *terms = &body->coupling->terms;
-    vi_pressed_parts(terms, own->x, own->v, own->weight);
+    const int loose = response->loose;
+    vi_pressed_parts(terms, own->x + loose, own->v + loose, own->weight);
     for (int m = 0; m < terms->terms; ++m) {
         vi_complex moved = {0.0, 0.0};
-        for (int j = 0; j < body->modes; ++j) {
-            moved = vi_complex_add(moved, vi_complex_scale(shape[j], terms->vector[m][j]));
+        for (int j = loose; j < body->modes; ++j) {
+            moved = vi_complex_add(moved, vi_complex_scale(shape[j], terms->vector[m][j - loose]));
         }
         own->weight[m] = vi_complex_multiply(own->weight[m], moved);
     }
 }
 
-/* Free motion of the contact `u` seconds after the start, by terms e^(rate u) that never grow. */
+/* Free motion of the contact by coupled modes `u` seconds after the start, by terms e^(rate u) that never grow. */
 static seen coupled_motion(const flight *own, double u)
 {
     const vi_orbit_coupling *coupling = own->response->body->coupling;
@@ -82,7 +83,7 @@ static seen series_motion(const flight *own, double u)
     vi_orbit_drag(response, shape, once);
     vi_orbit_drag(response, once, twice);
     seen sum = {0.0, 0.0, 0.0, 0.0};
-    for (int j = 0; j < body->modes; ++j) {
+    for (int j = response->loose; j < body->modes; ++j) {
         const double stiffness = response->mode[j].stiffness, along = twice[j] - stiffness * shape[j];
         sum.beyond += shape[j] * x[j];
         sum.velocity += shape[j] * v[j];
@@ -94,13 +95,19 @@ static seen series_motion(const flight *own, double u)
     return sum;
 }
 
-/* Free motion of the contact `u` seconds after the start, mode by mode. */
-static seen free_motion(const flight *own, double u)
+/* Free motion of the contact by the first `modes` modes `u` seconds after the start, mode by mode. A constant force moves
+ * a mode without a spring, and has no third derivative. */
+static seen free_motion(const flight *own, int modes, double u)
 {
     const vi_orbit_body *body = own->response->body;
     const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
     seen sum = {0.0, 0.0, 0.0, 0.0};
-    for (int j = 0; j < body->modes; ++j) {
+    for (int j = 0; j < own->response->loose; ++j) {
+        sum.beyond += shape[j] * 0.5 * u * u * body->held[j];
+        sum.velocity += shape[j] * u * body->held[j];
+        sum.acceleration += shape[j] * body->held[j];
+    }
+    for (int j = 0; j < modes; ++j) {
         const vi_mode *mode = &own->response->mode[j];
         const double x = own->x[j], v = own->v[j];
         double phi[4];
@@ -124,9 +131,12 @@ static seen look(const flight *own, double u)
     const vi_orbit_body *body = response->body;
     const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
     const double w = body->angular_frequency, angle = own->phase + w * u, c = cos(angle), s = sin(angle);
-    seen sum = !body->coupling                     ? free_motion(own, u)
-               : body->coupling->terms.terms == 0 ? series_motion(own, u)
-                                                   : coupled_motion(own, u);
+    seen sum = free_motion(own, body->coupling ? response->loose : body->modes, u);
+    if (body->coupling) {
+        const seen more = body->coupling->terms.terms == 0 ? series_motion(own, u) : coupled_motion(own, u);
+        sum = (seen){sum.beyond + more.beyond, sum.velocity + more.velocity, sum.acceleration + more.acceleration,
+                     sum.bound + more.bound};
+    }
     double cosine = 0.0, sine = 0.0;
     for (int j = 0; j < body->modes; ++j) {
         sum.beyond += shape[j] * response->level[j];

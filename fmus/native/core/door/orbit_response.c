@@ -17,8 +17,9 @@ static bool is_body(const vi_orbit_body *body)
     bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS
                 && body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
     for (int j = 0; good && j < body->modes; ++j) {
-        good = body->natural[j] > 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
-               && isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j]);
+        good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
+               && isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j])
+               && (body->natural[j] > 0.0 || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
         good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0
@@ -74,6 +75,12 @@ static bool by_series(const vi_orbit_body *body)
     return body->coupling && body->coupling->terms.terms == 0;
 }
 
+/* Number of modes, from the first, that move each by itself: all, or those without a spring beside coupled modes. */
+static int of_one_mode(const vi_orbit_response *response)
+{
+    return response->body->coupling ? response->loose : response->body->modes;
+}
+
 int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
 {
     if (!is_body(body)) {
@@ -84,7 +91,9 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
         return VI_ORBIT_CRITICAL;
     }
     response->body = body;
+    response->loose = 0;
     for (int j = 0; j < body->modes; ++j) {
+        response->loose += body->natural[j] == 0.0;
         vi_mode *mode = &response->mode[j];
         const double natural = body->natural[j], w = body->angular_frequency;
         vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0, w);
@@ -92,10 +101,10 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
         const double size = vi_magnitude(detuning, drag);
         const double along = detuning / size / size, across = drag / size / size;
         const double c = body->cosine[j], s = body->sine[j];
-        response->level[j] = body->held[j] / mode->stiffness;
-        if (body->coupling) {
-            response->steady_cos[j] = body->coupling->steady[j].re;
-            response->steady_sin[j] = -body->coupling->steady[j].im;
+        response->level[j] = j < response->loose ? 0.0 : body->held[j] / mode->stiffness;
+        if (body->coupling && j >= response->loose) {
+            response->steady_cos[j] = body->coupling->steady[j - response->loose].re;
+            response->steady_sin[j] = -body->coupling->steady[j - response->loose].im;
         } else {
             response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
             response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
@@ -118,18 +127,21 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
     }
     response->train = train;
     response->length = TURN * train->periods / body->angular_frequency;
-    for (int j = 0; !body->coupling && j < body->modes; ++j) {
-        if (!start_of_train(&response->mode[j], response->length, response->start[j])) {
+    for (int j = 0; j < of_one_mode(response); ++j) {
+        if (j < response->loose) {
+            response->start[j][0] = -response->length / 12.0;
+            response->start[j][1] = 0.5;
+        } else if (!start_of_train(&response->mode[j], response->length, response->start[j])) {
             return VI_ORBIT_RESONANT;
         }
     }
     if (by_series(body)
-        && !vi_orbit_recurring_states(body->coupling, body->contacts, body->impulse, response->length,
-                                      response->state)) {
+        && !vi_orbit_recurring_states(body->coupling, body->contacts, body->impulse + response->loose, body->modes,
+                                      response->length, response->state)) {
         return VI_ORBIT_RESONANT;
     }
     for (int k = 0; by_terms(body) && k < body->contacts; ++k) {
-        const double *impulse = body->impulse + (ptrdiff_t)k * body->modes;
+        const double *impulse = body->impulse + (ptrdiff_t)k * body->modes + response->loose;
         if (!vi_orbit_recurring_parts(body->coupling, impulse, response->length, response->part[k])) {
             return VI_ORBIT_RESONANT;
         }
@@ -140,16 +152,16 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
 static void carry_coupled(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES])
 {
     const vi_orbit_coupling *coupling = response->body->coupling;
-    const int modes = response->body->modes;
+    const int modes = response->body->modes, loose = response->loose;
     vi_complex turn[VI_TERMS], part[VI_TERMS];
     if (by_terms(response->body)) {
         vi_orbit_turns(coupling, u, turn);
     }
     for (int c = 0; c < columns; ++c) {
         double x[VI_MODES], v[VI_MODES];
-        for (int j = 0; j < modes; ++j) {
-            x[j] = change[j][c];
-            v[j] = change[modes + j][c];
+        for (int j = loose; j < modes; ++j) {
+            x[j - loose] = change[j][c];
+            v[j - loose] = change[modes + j][c];
         }
         if (by_terms(response->body)) {
             vi_pressed_parts(&coupling->terms, x, v, part);
@@ -157,9 +169,9 @@ static void carry_coupled(const vi_orbit_response *response, double u, int colum
         } else {
             vi_orbit_series(coupling, u, x, v);
         }
-        for (int j = 0; j < modes; ++j) {
-            change[j][c] = x[j];
-            change[modes + j][c] = v[j];
+        for (int j = loose; j < modes; ++j) {
+            change[j][c] = x[j - loose];
+            change[modes + j][c] = v[j - loose];
         }
     }
 }
@@ -169,9 +181,8 @@ void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, do
     const int modes = response->body->modes;
     if (response->body->coupling) {
         carry_coupled(response, u, columns, change);
-        return;
     }
-    for (int j = 0; j < modes; ++j) {
+    for (int j = 0; j < of_one_mode(response); ++j) {
         double phi[4];
         vi_mode_propagator(&response->mode[j], u, phi);
         for (int c = 0; c < columns; ++c) {
@@ -192,34 +203,46 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k)
 void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
+    const int loose = response->loose, coupled = body->modes - loose;
     if (by_terms(body)) {
         vi_complex turn[VI_TERMS];
         vi_orbit_turns(body->coupling, u, turn);
-        vi_orbit_turned_sum(body->coupling, response->part[contact], turn, x, v);
+        vi_orbit_turned_sum(body->coupling, response->part[contact], turn, x + loose, v + loose);
     } else if (by_series(body)) {
-        memcpy(x, response->state[contact], (size_t)body->modes * sizeof x[0]);
-        memcpy(v, response->state[contact] + body->modes, (size_t)body->modes * sizeof v[0]);
-        vi_orbit_series(body->coupling, u, x, v);
+        memcpy(x + loose, response->state[contact], (size_t)coupled * sizeof x[0]);
+        memcpy(v + loose, response->state[contact] + coupled, (size_t)coupled * sizeof v[0]);
+        vi_orbit_series(body->coupling, u, x + loose, v + loose);
     }
     for (int j = 0; j < body->modes; ++j) {
-        if (body->coupling) {
-            x[j] = -x[j];
-            v[j] = -v[j];
-            continue;
-        }
         const double *start = response->start[j], impulse = body->impulse[(ptrdiff_t)contact * body->modes + j];
         double phi[4];
-        vi_mode_propagator(&response->mode[j], u, phi);
-        x[j] = -(phi[0] * start[0] + phi[1] * start[1]) * impulse;
-        v[j] = -(phi[2] * start[0] + phi[3] * start[1]) * impulse;
+        if (j < loose) {
+            x[j] = -(start[0] + u * (start[1] - 0.5 * u / response->length)) * impulse;
+            v[j] = -(start[1] - u / response->length) * impulse;
+        } else if (body->coupling) {
+            x[j] = -x[j];
+            v[j] = -v[j];
+        } else {
+            vi_mode_propagator(&response->mode[j], u, phi);
+            x[j] = -(phi[0] * start[0] + phi[1] * start[1]) * impulse;
+            v[j] = -(phi[2] * start[0] + phi[3] * start[1]) * impulse;
+        }
     }
+}
+
+double vi_orbit_evening(const vi_orbit_response *response, int contact, int j)
+{
+    const vi_orbit_body *body = response->body;
+    return j < response->loose ? body->impulse[(ptrdiff_t)contact * body->modes + j] / response->length : 0.0;
 }
 
 void vi_orbit_drag(const vi_orbit_response *response, const double v[], double drag[])
 {
     const vi_orbit_body *body = response->body;
     for (int j = 0; j < body->modes; ++j) {
-        drag[j] = body->coupling ? vi_pressed_drag(&body->coupling->body, j, v) : 2.0 * response->mode[j].decay * v[j];
+        drag[j] = j < of_one_mode(response)
+                      ? 2.0 * response->mode[j].decay * v[j]
+                      : vi_pressed_drag(&body->coupling->body, j - response->loose, v + response->loose);
     }
 }
 
@@ -227,17 +250,15 @@ void vi_orbit_free(const vi_orbit_response *response, double u, double x[], doub
 {
     const vi_orbit_body *body = response->body;
     if (by_series(body)) {
-        vi_orbit_series(body->coupling, u, x, v);
-        return;
+        vi_orbit_series(body->coupling, u, x + response->loose, v + response->loose);
     }
     if (by_terms(body)) {
         vi_complex turn[VI_TERMS], part[VI_TERMS];
         vi_orbit_turns(body->coupling, u, turn);
-        vi_pressed_parts(&body->coupling->terms, x, v, part);
-        vi_orbit_turned_sum(body->coupling, part, turn, x, v);
-        return;
+        vi_pressed_parts(&body->coupling->terms, x + response->loose, v + response->loose, part);
+        vi_orbit_turned_sum(body->coupling, part, turn, x + response->loose, v + response->loose);
     }
-    for (int j = 0; j < body->modes; ++j) {
+    for (int j = 0; j < of_one_mode(response); ++j) {
         const double displacement = x[j], velocity = v[j];
         double phi[4];
         vi_mode_propagator(&response->mode[j], u, phi);

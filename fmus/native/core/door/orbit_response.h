@@ -17,15 +17,16 @@ enum {
     VI_ORBIT_REFUSED = 1,  /* numbers outside their range */
     VI_ORBIT_RESONANT = 2, /* an undamped mode's response to the force, or to its impacts, is unbounded */
     VI_ORBIT_SINGULAR = 3, /* no velocities solve the equations for these phases */
-    VI_ORBIT_CRITICAL = 4  /* coupled modes next to critical damping, and far more rates than the force: no series */
+    VI_ORBIT_CRITICAL = 4, /* coupled modes next to critical damping, and far more rates than the force: no series */
+    VI_ORBIT_ADRIFT = 5    /* no impact of the train tells the position of a mode without a spring */
 };
 
 /* A body of mass-normalised modes; shapes are [contact][mode]. */
 typedef struct {
     int32_t modes, contacts;
     double angular_frequency;     /* of the force, rad/s */
-    const double *natural;        /* [modes] rad/s, > 0 */
-    const double *damping_ratio;  /* [modes]; from the diagonal of a damping that couples the modes */
+    const double *natural;        /* [modes] rad/s, >= 0; modes of 0 (no spring) come first */
+    const double *damping_ratio;  /* [modes]; from the diagonal of a damping that couples the modes; 0: no spring */
     const double *cosine, *sine;  /* [modes] modal force = cosine cos(phase) + sine sin(phase) */
     const double *held;           /* [modes] constant modal force */
     const double *shape;          /* displacement of each contact */
@@ -33,7 +34,7 @@ typedef struct {
     const double *direction; /* [contacts] +1: the stop is above, -1: below */
     const double *position; /* [contacts] m */
     const double *restitution; /* [contacts] */
-    const vi_orbit_coupling *coupling; /* complex modes where the damping couples the modes, else NULL */
+    const vi_orbit_coupling *coupling; /* complex modes where damping couples the modes that have springs, else NULL */
 } vi_orbit_body;
 
 /* Impacts in their order: the contact and the phase of each, rad, 0 <= phase[0] < phase[1] < ... < 2 pi periods. */
@@ -47,6 +48,7 @@ typedef struct {
     const vi_orbit_body *body;
     const vi_orbit_train *train;
     double length; /* of the train, s */
+    int32_t loose; /* modes without a spring */
     vi_mode mode[VI_MODES];
     double steady_cos[VI_MODES], steady_sin[VI_MODES], level[VI_MODES];
     double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
@@ -66,13 +68,17 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k);
 /* Response of all modes, `u` seconds after an impact at a contact that takes a unit of speed, once in each train. */
 void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[]);
 
+/* Constant acceleration of mode j in the response of vi_orbit_train_answer: it evens the impulses of a mode without a
+ * spring out (equations.md 4.7). 0 for the other modes. */
+double vi_orbit_evening(const vi_orbit_response *response, int contact, int j);
+
 /* Accelerations that the damping takes from modal velocities v. */
 void vi_orbit_drag(const vi_orbit_response *response, const double v[], double drag[]);
 
-/* Free motion of all modes for `u` seconds. */
+/* Free motion of all modes for `u` seconds, without constant forces. */
 void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[]);
 
-/* Steady response of mode j to the force. */
+/* Steady response of mode j to the force; the constant force counts only for a mode with a spring. */
 void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v);
 
 /* Apply an impact to a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: towards

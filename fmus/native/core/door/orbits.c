@@ -4,6 +4,9 @@
 #include <stdbool.h>
 #include <string.h>
 
+/* Share of a mode's displacement that no other mode gives to the contacts, below which its position is not known. */
+static const double ADRIFT = 1e-9;
+
 /* ---- linear equations of the velocities ---- */
 
 /* Solve a x = b for several right-hand sides, b[row][sides], by elimination with pivots; false where a is singular. */
@@ -64,7 +67,94 @@ static void answer(const vi_orbit_response *response, int i, int k, double g[3])
         const double weight = factor * shape[j];
         g[0] += weight * x[j];
         g[1] += weight * v[j];
-        g[2] += weight * (-response->mode[j].stiffness * x[j] - drag[j]);
+        g[2] += weight
+                * (vi_orbit_evening(response, contact[k], j) - response->mode[j].stiffness * x[j] - drag[j]);
+    }
+}
+
+/* ---- modes without a spring ---- */
+
+/* Displacements that the modes without a spring give to the contacts of the impacts: q r, with orthonormal columns q. */
+typedef struct {
+    double q[VI_MODES][VI_ORBIT_IMPACTS], r[VI_MODES][VI_MODES];
+} placing;
+
+/* Find the displacements; false where no impact tells the position of a mode, or two modes move all contacts alike. */
+static bool find_placing(const vi_orbit_response *response, placing *found)
+{
+    const vi_orbit_body *body = response->body;
+    const int n = response->train->impacts;
+    for (int l = 0; l < response->loose; ++l) {
+        double *column = found->q[l], size = 0.0, left = 0.0;
+        for (int i = 0; i < n; ++i) {
+            const int32_t contact = response->train->contact[i];
+            column[i] = body->direction[contact] * body->shape[(ptrdiff_t)contact * body->modes + l];
+            size += column[i] * column[i];
+        }
+        for (int before = 0; before < l; ++before) {
+            double along = 0.0;
+            for (int i = 0; i < n; ++i) {
+                along += found->q[before][i] * column[i];
+            }
+            for (int i = 0; i < n; ++i) {
+                column[i] -= along * found->q[before][i];
+            }
+            found->r[before][l] = along;
+        }
+        for (int i = 0; i < n; ++i) {
+            left += column[i] * column[i];
+        }
+        if (!(left > ADRIFT * ADRIFT * size)) {
+            return false;
+        }
+        found->r[l][l] = sqrt(left);
+        for (int i = 0; i < n; ++i) {
+            column[i] /= found->r[l][l];
+        }
+    }
+    return true;
+}
+
+/* Put the modes where the squares of the distances[impact][stride] have their least sum. `place`: their displacements. */
+static void put_in_place(const vi_orbit_response *response, const placing *placed, double distance[], int stride,
+                         double place[])
+{
+    const int n = response->train->impacts;
+    for (int l = 0; l < response->loose; ++l) {
+        place[l] = 0.0;
+        for (int i = 0; i < n; ++i) {
+            place[l] -= placed->q[l][i] * distance[i * stride];
+        }
+        for (int i = 0; i < n; ++i) {
+            distance[i * stride] += placed->q[l][i] * place[l];
+        }
+    }
+    for (int l = response->loose - 1; l >= 0; --l) {
+        for (int later = l + 1; later < response->loose; ++later) {
+            place[l] -= placed->r[l][later] * place[later];
+        }
+        place[l] /= placed->r[l][l];
+    }
+}
+
+/* Let the modes drift for one radian by the momentum that a train adds. The momentum follows from the speeds[impact]
+ * [stride] and from `held` times the constant forces. The drift is 0 for an orbit. */
+static void drift(const vi_orbit_response *response, const double speed[], double held, double distance[], int stride)
+{
+    const vi_orbit_body *body = response->body;
+    const int n = response->train->impacts;
+    for (int l = 0; l < response->loose; ++l) {
+        double momentum = held * response->length * body->held[l];
+        for (int k = 0; k < n; ++k) {
+            const int32_t contact = response->train->contact[k];
+            momentum -= (1.0 + body->restitution[contact]) * body->direction[contact] * speed[k * stride]
+                        * body->impulse[(ptrdiff_t)contact * body->modes + l];
+        }
+        for (int i = 0; i < n; ++i) {
+            const int32_t contact = response->train->contact[i];
+            distance[i * stride] += body->direction[contact] * body->shape[(ptrdiff_t)contact * body->modes + l]
+                                    * momentum / body->angular_frequency;
+        }
     }
 }
 
@@ -75,6 +165,10 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
     const int refused = vi_orbit_respond(&response, body, train);
     if (refused != VI_ORBIT_DONE) {
         return refused;
+    }
+    placing placed;
+    if (!find_placing(&response, &placed)) {
+        return VI_ORBIT_ADRIFT;
     }
     const int n = train->impacts;
     double equations[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS], kept[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS];
@@ -120,6 +214,13 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
             velocity_slope[i * n + m] = right[i][m] * second;
         }
     }
+    double place[VI_MODES];
+    put_in_place(&response, &placed, distance, 1, place);
+    drift(&response, velocity, 1.0, distance, 1);
+    for (int m = 0; m < n; ++m) {
+        put_in_place(&response, &placed, distance_slope + m, n, place);
+        drift(&response, velocity_slope + m, 0.0, distance_slope + m, n);
+    }
     return VI_ORBIT_DONE;
 }
 
@@ -145,6 +246,28 @@ static void after_impact(const vi_orbit_response *response, const double velocit
     }
 }
 
+/* Put the modes without a spring where the impacts are at their stops. */
+static void place_states(const vi_orbit_response *response, const placing *placed, double state[])
+{
+    const vi_orbit_body *body = response->body;
+    const int n = response->train->impacts;
+    double distance[VI_ORBIT_IMPACTS], place[VI_MODES];
+    for (int i = 0; i < n; ++i) {
+        const int32_t contact = response->train->contact[i];
+        double at = -body->position[contact];
+        for (int j = 0; j < body->modes; ++j) {
+            at += body->shape[(ptrdiff_t)contact * body->modes + j] * state[(ptrdiff_t)i * 2 * body->modes + j];
+        }
+        distance[i] = body->direction[contact] * at;
+    }
+    put_in_place(response, placed, distance, 1, place);
+    for (int i = 0; i < n; ++i) {
+        for (int l = 0; l < response->loose; ++l) {
+            state[(ptrdiff_t)i * 2 * body->modes + l] += place[l];
+        }
+    }
+}
+
 VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train *train, const double velocity[],
                                  double state[], double monodromy[])
 {
@@ -154,10 +277,15 @@ VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train
     if (refused != VI_ORBIT_DONE) {
         return refused;
     }
+    placing placed;
+    if (!find_placing(&response, &placed)) {
+        return VI_ORBIT_ADRIFT;
+    }
     const int modes = body->modes, states = 2 * modes, n = train->impacts;
     for (int i = 0; i < n; ++i) {
         after_impact(&response, velocity, i, state + (ptrdiff_t)i * states);
     }
+    place_states(&response, &placed, state);
     for (int row = 0; row < states; ++row) {
         for (int c = 0; c < states; ++c) {
             change[row][c] = row == c ? 1.0 : 0.0;

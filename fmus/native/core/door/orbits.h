@@ -4,6 +4,9 @@
  * train of impulses has a closed form (equations.md 4.7). So p linear equations give the velocities from the phases.
  * The remaining p equations put the contact at its stop at each impact. No equation divides by a velocity, so an orbit
  * may be followed to a graze and through it. Stability is that of the flow with the saltation matrices of 4.2.
+ *
+ * A mode without a spring has a position that nothing but the impacts tells. Its impulses must balance its constant
+ * force over the train. The p equations hold both: see 4.7.
  */
 #ifndef VIBROIMPACT_ORBITS_H
 #define VIBROIMPACT_ORBITS_H

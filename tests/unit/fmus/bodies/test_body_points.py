@@ -96,7 +96,7 @@ def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> Non
             assert getattr(together, name)[..., point].tobytes() == getattr(alone, name)[..., 0].tobytes()
 
 
-def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_without_a_tie_by_orbits() -> None:
+def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_with_a_drag_and_no_tie_by_orbits() -> None:
     none = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
     tied = body("Chain")
     assert tied.mass_normalised().coupling is None, "its dampings are in proportion to its stiffnesses"
@@ -106,9 +106,11 @@ def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_without_a_tie_by_
     assert (at_points(loose, at_two).in_state_coordinates().stiffness[0] == 0.0).all()
     dragged = body("Chain", **none | {"damping[1]": 0.1, "far_damping": 0.2, "damping[2]": 0.0})
     assert at_points(dragged, at_two).in_state_coordinates().decay[:, 0] == pytest.approx([0.05, 0.05])
-    assert (tied.is_loose, coupled.is_loose, loose.is_loose) == (False, False, True)
-    assert body("Oscillator", stiffness=0.0).is_loose
-    assert not body("Beam").is_loose
+    bodies = [each.mass_normalised() for each in (tied, coupled, loose, dragged, body("Beam"))]
+    assert [each.loose for each in bodies] == [0, 0, 1, 1, 0]
+    assert [each.is_dragged for each in bodies] == [False, False, False, True, False]
+    alone = [body("Oscillator", stiffness=0.0, damping=c).mass_normalised() for c in (0.0, 0.1)]
+    assert [(each.loose, each.is_dragged) for each in alone] == [(1, False), (1, True)]
 
 
 def test_the_damping_between_the_modes_of_a_chain_is_that_of_its_dashpots() -> None:

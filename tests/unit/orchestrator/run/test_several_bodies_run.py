@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from support.places import EXAMPLES
 
 import vibroimpact as vi
+from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
@@ -274,8 +275,8 @@ def test_a_dashpot_between_bodies_leaves_orbits_and_exponents() -> None:
     ("changes", "expected"),
     [
         (
-            {"body": [*TABLES["body"], {"name": "c", "mass": 1.0, "stiffness": 0.0}]},
-            "body: expected bodies that springs",
+            {"body": [*TABLES["body"], {"name": "c", "mass": 1.0, "stiffness": 0.0, "damping": 0.1}]},
+            "body: expected no damping of bodies that no spring",
         ),
         (
             {"contact": [{"between": ["a", "b"], "law": "hertz", "stiffness": 1.0}]},
@@ -287,6 +288,44 @@ def test_orbits_refuse_by_name_what_they_cannot_follow(changes: dict[str, Any], 
     with pytest.raises(UsageError) as refused:
         vi.find_orbits(Scene.from_dict(TABLES | changes))
     assert expected in str(refused.value)
+
+
+def test_orbits_leave_out_a_body_that_no_impact_places() -> None:
+    alone = {"body": [*TABLES["body"], {"name": "c", "mass": 1.0, "stiffness": 0.0}]}
+    with pytest.raises(OrbitError, match="a body that could be anywhere"):
+        vi.find_orbits(Scene.from_dict(TABLES | alone))
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.2])
+def test_the_orbit_of_a_ball_in_a_cavity_is_the_motion_of_its_run(damping: float) -> None:
+    long = {"transient_periods": 600, "recorded_periods": 2}
+    bodies = [{"name": "frame", "mass": 1.0, "stiffness": 1.0, "damping": 0.1}]
+    bodies += [{"name": "far", "mass": 0.5, "stiffness": 3.0}]
+    bodies += [{"name": "ball", "mass": 0.1, "stiffness": 0.0, "velocity_start": 0.4}]
+    pairs = ["frame", "ball"], ["ball", "frame"]
+    scene = Scene.from_dict(
+        {
+            "scene": {"units": "nondimensional"},
+            "body": bodies,
+            "link": [{"between": ["frame", "far"], "stiffness": 0.3, "damping": damping}],
+            "contact": [{"between": each, "restitution": 0.5, "clearance": 0.4} for each in pairs],
+            "forcing": {"at": "frame", "amplitude": 0.3, "angular_frequency": 1.4},
+            "record": long,
+        }
+    )
+    run = vi.run(scene)
+    impacts = run.vibroimpact.impacts()
+    (orbit,) = vi.find_orbits(scene)  # one impact a period gives the ball momentum: no P(1,1)
+    assert (orbit.name, orbit.is_stable) == ("P(2,1)", True)
+    assert np.sort(impacts.impact_velocity.values[:2]) == pytest.approx(np.sort(orbit.velocities), abs=1e-10)
+    assert np.sort(impacts.impact_phase.values[:2]) == pytest.approx(orbit.phases, abs=1e-10)
+    assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-9)
+    period = orbit.phases[0] + np.array([0.0, 2.0 * np.pi])
+    assert np.ptp(orbit.at(period)[0]) == pytest.approx(0.0, abs=1e-12)
+    recorded = vi.run(scene.with_values({"record": long | {"recorded_periods": 40, "impacts": True}}))
+    expected = np.sort(np.log(np.abs(orbit.multipliers)) / 2.0)
+    assert np.sort(vi.lyapunov(recorded).lyapunov_exponent.values) == pytest.approx(expected, abs=1e-9)
+    assert vi.energies(recorded).identity_error < 1e-12
 
 
 def test_components_that_meet_only_each_other_have_a_fused_form() -> None:
