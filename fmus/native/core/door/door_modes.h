@@ -20,15 +20,15 @@ int vi_door_beam_residual(int boundary, int natural, int points, const double po
 int vi_door_beam_residual_shapes(int boundary, int natural, int points, const double point[], int places,
                                  const double s[], double shape[]);
 
-/* Modes of chain_modes.h: stiffness and damping have `masses` + 1 elements, shape is [mass][mode], coupling is the
+/* Modes of chain_modes.h. stiffness and damping have `masses` + 1 elements, and shape is [mass][mode]. coupling is the
  * damping between the modes [mode][mode], 1/s. Returns 0, or -1 for a bad argument, or 1 where the damping couples the
  * modes; damping_ratio is then from the diagonal. */
 int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
                         double natural[], double damping_ratio[], double shape[], double coupling[]);
 
-/* Frequencies and shapes of a structure of springs, from the matrix spring[row * columns + column]: the force of each
- * spring, in units of sqrt(stiffness), for a displacement of 1 / sqrt(mass). value[] has the `rank` angular frequencies
- * above 0, ascending, and vector[k * columns + column] their unit vectors. Returns the rank, or -1 for a bad argument. */
+/* Frequencies and shapes of a structure of springs. Rows of spring[row * columns + column] are the forces of the
+ * springs, in units of sqrt(stiffness), for a displacement of 1 / sqrt(mass). value[] has the `rank` angular frequencies
+ * above 0, ascending. vector[k * columns + column] has their unit vectors. Returns the rank, or -1 for a bad argument. */
 int vi_door_spring_modes(int rows, int columns, const double spring[], double value[], double vector[]);
 
 #endif
