@@ -210,7 +210,7 @@ def test_a_figure_draws_the_extremes_of_an_observed_point(tmp_path: Path) -> Non
     assert "displacement_max_ball" in drawable_variables(found)
     vi.draw(found, variable="displacement_max_ball").savefig(tmp_path / "ball.png")
     series = vi.draw(vi.run(scene(OBSERVED, recorded_periods=2, time_series={"rate": 9.0})))
-    assert [axis.get_ylabel() for axis in series.axes] == ["displacement (m)", "velocity (m s$^{-1}$)"]
+    assert [axis.get_ylabel() for axis in series.axes] == ["displacement (m)", "velocity (m/s)"]
 
 
 def test_an_export_is_the_scene_with_its_first_observed_point(tmp_path: Path) -> None:
