@@ -68,6 +68,23 @@ def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
     return ShownStop(float(written["position"]), -1.0 if written.get("side") == "lower" else 1.0, point)
 
 
+def contact_label(dataset: xr.Dataset, number: int) -> str:
+    """Return the name of a contact, counted from 1: a stop by its number, contacts of bodies by their points."""
+    meanings = str(dataset.variables["impact_contact"].attrs.get("flag_meanings", "")).split()
+    if meanings:
+        return meanings[number - 1]
+    written = limiting_tables(dataset)
+    points = written[number - 1].get("between") if number <= len(written) else None
+    return " - ".join(points) if points else f"stop {number}"
+
+
+def limiting_tables(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the tables of the stops of the scene, then of the contacts of its bodies."""
+    scene = scene_of(dataset.attrs)
+    found = (scene.get(name) for name in ("stop", "contact") if "body" in scene)
+    return [each for tables in found if isinstance(tables, list) for each in tables]
+
+
 def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
     """Return the stops that limit the point of the recorded displacement."""
     found = stops(dataset)
@@ -79,7 +96,8 @@ def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
         tip = body.get("boundary", "clamped-free") == "clamped-free"
         observed = table(scene, "sensor").get("location", 1.0 if tip else first)
     else:
-        observed = scene["stop"][0].get("at") if scene.get("stop") else None
+        written = table(scene, "record").get("observed") or [None if isinstance(first, tuple) else first]
+        observed = tuple(written[0]) if isinstance(written[0], list) else written[0]
     return [stop for stop in found if stop.point == observed]
 
 

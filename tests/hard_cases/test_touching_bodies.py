@@ -150,3 +150,46 @@ def test_random_rows_follow_the_sequence_and_balance_their_energy(
     q, p = run.final_state.values.reshape(2, -1)
     if restitution > 0.0:
         assert 0.5 * (p @ p + q @ q) + lost == pytest.approx(0.5 * m[0], rel=1e-10)
+
+
+def test_a_row_with_forces_of_unlike_sizes_goes_on() -> None:
+    """Seven bodies with stops at one place: forces of 0.1 N and of 1e-17 N decide at one instant, after 26.5 s."""
+    masses = [6.691310059954052, 4.2825960119971, 0.2245490599131724, 0.11393032658242408]
+    masses += [1.7012581665586313, 2.3500871561213788, 2.7731711941435315]
+    speeds = [
+        0.0,
+        -1.2459109472530652,
+        1.0425133694426776,
+        0.0,
+        0.0,
+        -0.15922500991447772,
+        -0.12961363369296769,
+    ]
+    bodies = [
+        {"name": f"b{i}", "mass": mass, "stiffness": 0.0, "velocity_start": speed}
+        for i, (mass, speed) in enumerate(zip(masses, speeds, strict=True))
+    ]
+    bodies[0]["stiffness"] = 6.60552479805031
+    restitutions = [0.35779519670907023, 0.32186939107594215, 0.33791122550713326]
+    restitutions += [0.8902743520047923, 0.6231871446860424, 0.0]
+    contacts = [
+        {"between": [f"b{i}", f"b{i + 1}"], "restitution": restitution, "clearance": 0.0}
+        for i, restitution in enumerate(restitutions)
+    ]
+    of_stops = {"b2": 0.8764842308107038, "b3": 0.3361170605456604}
+    of_stops |= {"b4": 0.450339366649287, "b6": 0.05202130106440961}
+    scene = vi.Scene.from_dict(
+        {
+            "body": bodies,
+            "contact": contacts,
+            "stop": [{"at": at, "position": 0.0, "restitution": each} for at, each in of_stops.items()],
+            "link": [{"between": ["b6", "b3"], "stiffness": 10.374917068196309, "damping": 0.1}],
+            "forcing": {
+                "at": "b4",
+                "amplitude": 1.4923917463750624,
+                "angular_frequency": 0.9991417509051704,
+            },
+            "record": {"recorded_periods": 5, "impacts": False},
+        }
+    )
+    assert int(vi.run(scene).outcome) == 0

@@ -107,6 +107,26 @@ static void redundant_contacts(uint64_t *seed)
     }
 }
 
+/* Bodies apart from each other, with loads of very unlike sizes: the smallest loads are balanced, too. */
+static void loads_of_unlike_sizes(uint64_t *seed)
+{
+    enum { BODIES = VI_PORTS / 4, OF_ONE = 4 };
+    double g[VI_PORTS][VI_PORTS] = {{0.0}}, b[VI_PORTS], p[VI_PORTS], own[VI_PORTS][VI_PORTS];
+    for (int run = 0; run < PROBLEMS; ++run) {
+        for (int body = 0; body < BODIES; ++body) {
+            const double scale = pow(10.0, uniform(seed, -20.0, 20.0)), largest = random_matrix(seed, OF_ONE, OF_ONE, own);
+            for (int i = 0; i < OF_ONE; ++i) {
+                b[body * OF_ONE + i] = scale * uniform(seed, -1.0, 1.0);
+                for (int j = 0; j < OF_ONE; ++j) {
+                    g[body * OF_ONE + i][body * OF_ONE + j] = own[i][j] + (i == j ? largest : 0.0);
+                }
+            }
+        }
+        vi_complementary(BODIES * OF_ONE, g, b, p);
+        check_conditions(BODIES * OF_ONE, g, b, p, 1e-12, run);
+    }
+}
+
 static void the_same_point_twice_shares_evenly(void)
 {
     double g[VI_PORTS][VI_PORTS] = {{2.0, 2.0}, {2.0, 2.0}}, b[VI_PORTS] = {3.0, 3.0}, p[VI_PORTS];
@@ -119,6 +139,7 @@ int main(void)
     uint64_t seed = 4;
     random_problems(&seed);
     redundant_contacts(&seed);
+    loads_of_unlike_sizes(&seed);
     the_same_point_twice_shares_evenly();
     return 0;
 }

@@ -125,6 +125,7 @@ def run(program: Path, name: str) -> None:
         subprocess.run(
             [itself],
             executable=program,
+            cwd=folder,
             check=True,
             capture_output=True,
             text=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,8 @@ def native(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(run_sanitized, "NATIVE", core.parent)
     monkeypatch.setattr(run_sanitized, "HERE", tests)
     monkeypatch.setattr(run_sanitized, "KEPT", tmp_path / "kept")
-    monkeypatch.setattr(run_sanitized, "core_sources", lambda of_one_mode: [core / "twice.c"])
+    kind_of = partial(run_sanitized.CoreKind, (core / "twice.c",))
+    monkeypatch.setattr(run_sanitized, "core_of", lambda folder: kind_of((f"-DCORE_OF={folder}",)))
     # no compiler is asked for its sanitizers here
     monkeypatch.setattr(run_sanitized, "supported", lambda compiler, sanitizers: False)
     return tmp_path
@@ -52,7 +54,7 @@ def test_a_program_that_fails_ends_the_run_with_1_and_what_is_the_same_is_not_co
     (native / "fmus" / "core" / "twice.h").write_text(f"{HEADER}/* edited */\n")
     assert run_sanitized.main([]) == 0
     # both programs, and an object for each kind of core
-    assert len(compiled(native).items() - second.items()) == 4
+    assert len(compiled(native).items() - second.items()) == 5
 
 
 def test_a_core_that_does_not_compile_ends_the_run_with_1_in_the_compilers_words(

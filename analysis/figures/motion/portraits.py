@@ -33,7 +33,7 @@ from vibroimpact.analysis.figures.page import (
     title,
     unit_symbol,
 )
-from vibroimpact.analysis.figures.scene_text import limits, swept_keys, table
+from vibroimpact.analysis.figures.scene_text import contact_label, limits, swept_keys, table
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
@@ -145,9 +145,8 @@ def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(75)
     axis = figure.subplots()
     owner = hits["impact_contact"].values
-    _draw_dots(
-        figure, axis, {stop: (phase[owner == stop], velocity[owner == stop]) for stop in np.unique(owner)}
-    )
+    hit = {int(stop): (phase[owner == stop], velocity[owner == stop]) for stop in np.unique(owner)}
+    _draw_dots(figure, axis, _named(dataset, hit))
     axis.set_xlim(0.0, 2.0 * math.pi)
     axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
     axis.set_ylim(0.0, max(axis.get_ylim()[1], 1.05 * float(np.max(velocity))))
@@ -155,11 +154,18 @@ def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
     return figure
 
 
+def _named(
+    dataset: xr.Dataset, points: dict[int, tuple[Floats, Floats]]
+) -> list[tuple[str, tuple[Floats, Floats]]]:
+    """Return points of the impacts on each contact with the name of the contact."""
+    return [(contact_label(dataset, number), pair) for number, pair in points.items()]
+
+
 def _draw_dots(
-    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY_IMPACTS
+    figure: Figure, axis: Axes, points: list[tuple[str, tuple[Floats, Floats]]], many: int = _MANY_IMPACTS
 ) -> None:
     """Draw points of the impacts on each stop, small where they are many; several stops are named."""
-    for place, (stop, (x, y)) in enumerate(points.items()):
+    for place, (name, (x, y)) in enumerate(points):
         axis.plot(
             x,
             y,
@@ -168,7 +174,7 @@ def _draw_dots(
             markersize=_DOT if len(x) > many else 3.0,
             markeredgewidth=0.0,
             color=COLOURS[place % len(COLOURS)] if len(points) > 1 else MARK,
-            label=f"stop {stop}",
+            label=name,
             rasterized=True,
         )
     if len(points) > 1:
@@ -192,7 +198,7 @@ def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(82)
     axis = figure.subplots()
     pairs = {stop: (values[:-1], values[1:]) for stop, values in chains.items()}
-    _draw_dots(figure, axis, pairs, _MANY_IMPACTS - 1)  # there is one pair less than impacts
+    _draw_dots(figure, axis, _named(dataset, pairs), _MANY_IMPACTS - 1)  # there is one pair less than impacts
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])

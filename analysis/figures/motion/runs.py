@@ -31,7 +31,7 @@ from vibroimpact.analysis.figures.page import (
     legend_above,
     legend_outside,
 )
-from vibroimpact.analysis.figures.scene_text import ShownStop, observed_stops, stops
+from vibroimpact.analysis.figures.scene_text import ShownStop, contact_label, observed_stops, stops
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import Argument, message
@@ -137,7 +137,7 @@ def _draw_periods(dataset: xr.Dataset, run: int | None) -> Figure:
     one = chosen.isel(run=0)
     panels: dict[str, Callable[[Axes], None]] = {
         "displacement_max": lambda axis: _draw_extremes(axis, one, observed_stops(dataset)),
-        "impact_velocity": lambda axis: _draw_impacts(axis, dataset.vibroimpact.impacts(**selected(run))),
+        "impact_velocity": lambda axis: _draw_impacts(axis, dataset, run),
         "strobe_velocity": lambda axis: draw_section(axis, one),
     }
     drawers = [draw_panel for name, draw_panel in panels.items() if name in dataset.variables]
@@ -160,15 +160,16 @@ def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> No
     legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
 
 
-def _draw_impacts(axis: Axes, hits: xr.Dataset) -> None:
+def _draw_impacts(axis: Axes, dataset: xr.Dataset, run: int | None) -> None:
     """Draw the velocity of each impact against time."""
+    hits = dataset.vibroimpact.impacts(**selected(run))
     owner = hits["impact_contact"].values
     hit = np.unique(owner)
     for place, stop in enumerate(hit):
         one = hits.isel(impact=owner == stop)
         colour = COLOURS[place % len(COLOURS)] if hit.size > 1 else MARK
         dots = one["impact_time"].values, one["impact_velocity"].values
-        axis.plot(*dots, "o", color=colour, markersize=2, label=f"stop {stop:g}")
+        axis.plot(*dots, "o", color=colour, markersize=2, label=contact_label(dataset, int(stop)))
     if hit.size > 1:
         legend_above(axis, "center")
     axis.set(xlabel=label(hits["impact_time"].rename("time")), ylabel=label(hits["impact_velocity"]))

@@ -11,8 +11,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from vibroimpact.analysis.dataset.schema import OrbitClass, scene_of
+from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.figures.page import canvas, label
+from vibroimpact.analysis.figures.scene_text import contact_label, limiting_tables
 from vibroimpact.analysis.figures.sweep.diagrams import (
     edges,
     in_order_of_the_scene,
@@ -51,16 +52,18 @@ def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
     The impacts of the runs are in the same dataset, or in `impacts_of`.
     """
 
+    source = dataset if impacts_of is None else impacts_of
+
     def named(kind: int, impacts: int, periods: int, stop: int) -> str:
         if kind < 0:
             return ""
         if OrbitClass(kind) in (OrbitClass.periodic, OrbitClass.sticking):
-            where = f" at stop {stop}" if stop > 0 else ""
+            where = f" at {contact_label(source, stop)}" if stop > 0 else ""
             return f"P({impacts if impacts >= 0 else 'inf'},{periods}){where}"
         return str(OrbitClass(kind).name).replace("_", " ")
 
     columns = [dataset[name].values for name in (KIND, "class_impacts", "class_periods")]
-    only = _only_stop(dataset if impacts_of is None else impacts_of)
+    only = _only_stop(source)
     ids, padded = dataset["run_id"].values, np.append(only, 0)
     at = np.where((ids >= 0) & (ids < only.size), ids, only.size)
     return np.vectorize(named, otypes=[object])(*columns, padded[at])
@@ -80,9 +83,8 @@ def _only_stop(dataset: xr.Dataset) -> Any:
 
 def _only_stop_counts(dataset: xr.Dataset) -> bool:
     """Return whether names of classes say the only stop that a run hits: a body with several, and its impacts."""
-    written = scene_of(dataset.attrs).get("stop")
     recorded = {"impact_run", "impact_contact"} <= set(dataset.variables) and dataset.sizes["impact"] > 0
-    return isinstance(written, list) and len(written) > 1 and recorded
+    return len(limiting_tables(dataset)) > 1 and recorded
 
 
 def _palette(names: Any) -> dict[str, str]:

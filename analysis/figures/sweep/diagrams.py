@@ -32,7 +32,7 @@ from vibroimpact.analysis.dataset.schema import (
     swept_names,
 )
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_above, legend_outside
-from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
+from vibroimpact.analysis.figures.scene_text import column_of, contact_label, swept_keys
 from vibroimpact.analysis.figures.sweep.map_overview import block_values, edges_of_blocks
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.messages import Argument, message
@@ -217,9 +217,8 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
         for direction in directions:
             x, y, owner = _points(dataset, runs, name, quantity, direction)
             for stop in hit:
-                _draw_branch(
-                    axis, x, y, direction, stop, np.full(len(x), True) if stop is None else owner == stop
-                )
+                shown = np.full(len(x), True) if stop is None else owner == stop[0]
+                _draw_branch(axis, x, y, direction, stop, shown)
         if len(hit) > 1 and axis is not axes[0]:
             legend_above(axis, "center", ncols=2, markerscale=2.2, fontsize=7, handlelength=1.0)
         axis.set_ylabel(label(dataset[quantity]))
@@ -240,11 +239,12 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
     return figure
 
 
-def _stops_hit(dataset: xr.Dataset) -> list[int | None]:
-    """Return the stops whose impacts have separate marks; a single None if only one stop is hit."""
+def _stops_hit(dataset: xr.Dataset) -> list[tuple[int, str] | None]:
+    """Return the stops with separate marks, by number and name; a single None if only one stop is hit."""
     if "impact_contact" not in dataset.variables:
         return [None]
-    found: list[int | None] = [int(stop) for stop in np.unique(dataset["impact_contact"].values)]
+    numbers = map(int, np.unique(dataset["impact_contact"].values))
+    found: list[tuple[int, str] | None] = [(number, contact_label(dataset, number)) for number in numbers]
     return found if len(found) > 1 else [None]
 
 
@@ -257,12 +257,15 @@ def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
     )
 
 
-def _draw_branch(axis: Axes, x: Any, y: Any, direction: str, stop: int | None, shown: Any) -> None:
+def _draw_branch(
+    axis: Axes, x: Any, y: Any, direction: str, stop: tuple[int, str] | None, shown: Any
+) -> None:
     """Draw the points of one branch, or of one stop; points in a crowded column are small and faint."""
     crowd, style, words = crowded(x, y)[shown], dict(_SWEEPS[direction]), [f"{direction} sweep"]
     if stop is not None:
-        style |= _OF_STOPS[(stop - 1) % len(_OF_STOPS)][direction]
-        words = [*(words if direction != "independent" else []), f"stop {stop}"]
+        number, name = stop
+        style |= _OF_STOPS[(number - 1) % len(_OF_STOPS)][direction]
+        words = [*(words if direction != "independent" else []), name]
     x, y, single = x[shown], y[shown], crowd <= 1.0
     axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=", ".join(words), **style)
     if not single.all():

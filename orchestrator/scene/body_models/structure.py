@@ -139,6 +139,9 @@ class StructureBody(BodyTable):
             found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
             met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
             found |= {f"contact_{motion}[{number}]": f"{motion} of {words}" for number, words in met}
+        for number, stop in enumerate(stops, start=1):
+            where = f"on {stop.at} at its stop" if stop.at else f"between {' and '.join(stop.between)}"
+            found[f"contact_force[{number}]"] = f"force {where}"
         return found
 
     @property

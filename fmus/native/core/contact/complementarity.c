@@ -12,6 +12,10 @@ static const double SOFTENING = 1e-6;
 enum { REFINEMENTS = 4 };
 /* Most turns of the pivoting: those of its proof, 2^contacts, up to eight contacts; more contacts take a few each. */
 enum { MOST_TURNS = VI_PORTS <= 8 ? 1 << VI_PORTS : 32 * VI_PORTS };
+/* Turns for each contact within which each gap is resolved to its own rounding, if it can be. */
+enum { FINE_TURNS = 4 };
+/* Rounding of a gap, relative to its terms or to the largest load. */
+static const double GAP_ROUNDING = 8.0 * DBL_EPSILON;
 
 /* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
 static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
@@ -108,24 +112,24 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
 }
 
 /* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. It is finite for
- * positive definite g, with the proof's bound on the turns. Returns 0 at the bound: redundant contacts may cycle. */
-static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
-                           double p[VI_PORTS])
+ * positive definite g, with the proof's bound on the turns. A gap is 0 within the rounding of its own terms, or
+ * with `load` > 0 of the largest load. Returns 0 at the bound: redundant contacts may cycle. */
+static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double load, int turns,
+                           int active[VI_PORTS], double p[VI_PORTS])
 {
-    double scale = 0.0;
     for (int k = 0; k < n; ++k) {
         active[k] = b[k] > 0.0;
-        scale = fmax(scale, fabs(b[k]));
     }
-    for (int turn = 0; turn < MOST_TURNS; ++turn) {
+    for (int turn = 0; turn < turns; ++turn) {
         vi_solve_active(n, g, b, active, p);
         int wrong = -1;
         for (int k = 0; k < n && wrong < 0; ++k) {
-            double gap = -b[k];
+            double gap = -b[k], size = fabs(b[k]);
             for (int l = 0; l < n; ++l) {
                 gap += g[k][l] * p[l];
+                size += fabs(g[k][l] * p[l]);
             }
-            if (active[k] ? p[k] < 0.0 : gap < -8.0 * DBL_EPSILON * scale) {
+            if (active[k] ? p[k] < 0.0 : gap < -GAP_ROUNDING * (load > 0.0 ? load : size)) {
                 wrong = k;
             }
         }
@@ -140,7 +144,12 @@ static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[V
 void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS])
 {
     int active[VI_PORTS];
-    if (!pivot_to_answer(n, g, b, active, p)) {
+    double load = 0.0;
+    for (int k = 0; k < n; ++k) {
+        load = fmax(load, fabs(b[k]));
+    }
+    if (!pivot_to_answer(n, g, b, 0.0, FINE_TURNS * n, active, p)
+        && !pivot_to_answer(n, g, b, load, MOST_TURNS, active, p)) {
         /* soften all contacts, so that every set of contacts has one answer; then solve again for the residual */
         double soft[VI_PORTS][VI_PORTS], found[VI_PORTS], largest = 0.0, least = 0.0;
         for (int k = 0; k < n; ++k) {
@@ -150,7 +159,7 @@ void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_POR
         for (int k = 0; k < n; ++k) {
             soft[k][k] += SOFTENING * largest;
         }
-        pivot_to_answer(n, soft, b, active, p);
+        pivot_to_answer(n, soft, b, load, MOST_TURNS, active, p);
         vi_solve_active(n, g, b, active, found);
         for (int k = 0; k < n; ++k) {
             least = fmin(least, found[k]);

@@ -87,6 +87,29 @@ def test_impacts_on_two_stops_have_two_colours_in_a_diagram(tmp_path: Path) -> N
     assert {str(line.get_label()) for line in axis.lines} >= {"up sweep, stop 1", "down sweep, stop 2"}
 
 
+STRUCTURE = """[[body]]
+name = "frame"
+[[body]]
+name = "ball"
+[[stop]]
+at = "frame"
+position = 1.0
+[[contact]]
+between = ["frame", "ball"]
+"""
+
+
+def test_contacts_of_several_bodies_are_named_by_their_points(tmp_path: Path) -> None:
+    sweep = hits_of_two_stops()
+    sweep.attrs["scene"] = STRUCTURE
+    axis = figures.draw(opened(sweep, tmp_path), "bifurcation").axes[1]
+    assert {str(line.get_label()) for line in axis.lines} == {"stop 1", "frame - ball"}
+    coupled = sweep.isel(run=slice(None))
+    coupled["impact_contact"].attrs.update(flag_values=np.array([1, 2], dtype=np.int8), flag_meanings="a b")
+    axis = figures.draw(opened(coupled, tmp_path), "bifurcation").axes[1]
+    assert {str(line.get_label()) for line in axis.lines} == {"a", "b"}
+
+
 def classified(kinds: list[tuple[OrbitClass, int, int]], runs: list[RunRecord]) -> xr.Dataset:
     columns = {
         "class_kind": np.array([int(kind) for kind, _, _ in kinds], dtype=np.int8),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 import pytest
+from support.command_line import in_this_process
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.campaign.manifest import flat_scene
@@ -142,6 +144,30 @@ def test_a_mistake_is_one_line_with_its_key(change: Callable[[Tables], None], ex
             Scene.from_dict(tables)
         return
     assert line_of(tables).startswith(expected)
+
+
+REFUSED = {
+    "name of its own": (["a", "a"], ['["a", "b"]'], ""),
+    "letters, digits": (["a", ""], [], ""),
+    "not the same": (["a", "b"], ['["a", "a"]'], ""),
+    "link[1].between[2]": (["a", "b"], [], '[[link]]\nbetween = ["a", "c"]\nstiffness = 1.0\n'),
+    "at most 64": ([f"m{i}" for i in range(65)], [], ""),
+    "at most 32": (["a", "b"], ['["a", "b"]'] * 33, ""),
+}
+
+
+@pytest.mark.parametrize("expected", REFUSED)
+def test_the_command_line_refuses_bad_bodies_and_writes_nothing(expected: str, tmp_path: Path) -> None:
+    names, pairs, more = REFUSED[expected]
+    text = "".join(f'[[body]]\nname = "{name}"\nmass = 1.0\nstiffness = 1.0\n' for name in names)
+    text += "".join(f"[[contact]]\nbetween = {pair}\nrestitution = 0.5\n" for pair in pairs)
+    path = tmp_path / "bodies.toml"
+    path.write_text(text + more + "[record]\nrecorded_time = 1.0\n", encoding="utf-8")
+    done = in_this_process("run", path, "-o", tmp_path / "run.nc")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert expected in done.stderr
+    assert all(line.startswith(f"{path}: ") for line in done.stderr.splitlines())
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_a_list_of_one_body_is_the_scene_with_one_body() -> None:

@@ -46,7 +46,7 @@ static void order_resting(const vi_structure *s, const int candidate[], resting_
 /* Find the forces of the rigid stops, which only push, and the remaining acceleration of each contact. */
 static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], resting_contacts *resting)
 {
-    double acceleration[VI_MODES], force[VI_PORTS], small[VI_PORTS][VI_PORTS], b[VI_PORTS];
+    double acceleration[VI_MODES], force[VI_PORTS], small[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0};
     vi_structure_accelerate_freely(s, acceleration, force);
     for (int i = 0; i < resting->count; ++i) {
         const int k = resting->index[i];
