@@ -24,6 +24,8 @@ class ModalPoints:
 
     Attributes
     ----------
+    coupling : ndarray, shape (mode, mode, point), or None
+        Damping between the modes, 1/s, with 2 decay on the diagonal; None: no point has modes that damp each other.
     to_state : tuple of ndarray, shape (element, mode)
         For a chain or a beam: matrix from modes to the displacements in the state, for each kind of structure.
     kind : ndarray of int, shape (point,)
@@ -39,6 +41,7 @@ class ModalPoints:
     observed: Floats
     start_q: Floats
     start_p: Floats
+    coupling: Floats | None = None
     to_state: tuple[Floats, ...] = ()
     kind: NDArray[np.int64] | None = None
 

@@ -22,6 +22,8 @@ OF_A_STOP = (".position", ".restitution", ".yield_velocity")
 """Suffixes of parameter names that do not change the modes."""
 DIAGONAL = 1e-9
 """Off-diagonal modal damping, relative to the two diagonal terms, up to which the damping leaves modes uncoupled."""
+ROUNDING = 1e-14
+"""The same for two modes of a body with coupled modes, in lanes: rounding of the modal damping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,15 @@ class Structure:
     def is_coupled(self) -> bool:
         """Whether modes damp each other."""
         return self.coupling is not None and couples(self.coupling)
+
+    @property
+    def between(self) -> Floats:
+        """Damping between the modes, 1/s, shape (mode, mode); 0 beside the diagonal where it is rounding."""
+        own = np.diag(2.0 * self.decays)
+        if self.coupling is None or not self.is_coupled:
+            return own
+        size = np.add.outer(self.coupling.diagonal(), self.coupling.diagonal())
+        return np.where(np.abs(self.coupling) > ROUNDING * size, self.coupling, own)
 
 
 def couples(damping: Floats) -> bool:
@@ -108,13 +119,12 @@ class StructurePoints(BodyPoints):
         ), which
 
     def _structure_or_nan(self, numbers: Numbers) -> Structure:
-        """Return the modes of one point; all NaN if it has none, or if damping couples them."""
+        """Return the modes of one point; all NaN if it has none."""
         try:
             with np.errstate(all="ignore"):
-                found = self.structure_of(numbers)
+                return self.structure_of(numbers)
         except (VibroimpactError, ArithmeticError, ValueError):
             return self._no_structure()  # the body itself reports the problem
-        return self._no_structure() if found.is_coupled else found
 
     def _no_structure(self) -> Structure:
         modes, elements, loads = self.sizes
@@ -139,6 +149,7 @@ class StructurePoints(BodyPoints):
         back = each(*(structure.from_state.T for structure in structures))
         contacts = each(*(structure.contacts for structure in structures))
         mass = np.array([structure.mass for structure in structures])[which]
+        coupled = any(structure.is_coupled for structure in structures)
         with np.errstate(all="ignore"):
             return ModalPoints(
                 stiffness=each(*(structure.frequencies**2 for structure in structures)),
@@ -150,6 +161,7 @@ class StructurePoints(BodyPoints):
                 observed=each(*(structure.observed for structure in structures)),
                 start_q=weighted(back, start[0]),
                 start_p=weighted(back, start[1]),
+                coupling=each(*(structure.between for structure in structures)) if coupled else None,
                 to_state=tuple(structure.to_state for structure in structures),
                 kind=which,
             )

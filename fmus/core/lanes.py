@@ -59,7 +59,10 @@ class LanesPlan(Structure):
     _fields_ = [
         *(
             (name, c_int32)
-            for name in ("modes", "contacts", "impacts", "extrema", "periods", "each_period", "instructions")
+            for name in (
+                *("modes", "contacts", "impacts", "extrema", "periods", "each_period", "instructions"),
+                "coupled",
+            )
         ),
         ("impact_limit", c_int64),
         ("yielding", c_int64),
@@ -72,7 +75,7 @@ class LanesPoints(Structure):
     """The points and their results; the fields are explained in `lanes/lanes.h`."""
 
     GIVEN = (
-        "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "observed",
+        "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "coupling", "observed",
         "position", "direction", "restitution", "yield_velocity", "contact_stiffness", "contact_damping",
         "start_q", "start_p", "begin", "end", "first",
     )  # fmt: skip

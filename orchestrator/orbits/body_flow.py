@@ -158,6 +158,7 @@ class BodyFlow:
             {name: table[:, place].copy() for place, name in enumerate(names)},
             one.forced,
             one.periods,
+            one.scene,
         )
 
 

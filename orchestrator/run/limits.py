@@ -31,7 +31,7 @@ class Limit:
     """The users that cannot take one feature of a scene."""
 
     lanes: bool = False
-    """Whether lanes cannot run the scene at all; modes that are coupled are left out point by point instead."""
+    """Whether lanes cannot run the scene at all."""
     orbits: str = ""
     """Feature that a search for orbits expects instead; empty where it takes this one."""
     pushed: str = ""

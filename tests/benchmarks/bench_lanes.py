@@ -30,7 +30,7 @@ from peers.problems import orbit
 from peers.ways import Clock as Allowance
 from peers.ways import Way
 from support import lane_points
-from support.lane_points import IMPACT, TURN, Columns, drawn, run, taken
+from support.lane_points import IMPACT, TURN, Columns, drawn, drawn_coupled, run, taken
 
 from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.core.lanes import Instructions, instructions
@@ -198,6 +198,9 @@ def cases(periods: int) -> dict[str, Case]:
     for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2), (8, 4)):
         bodies = drawn(200, modes, contacts, seed=3, transient=60, recorded=1)
         found[f"random bodies: {modes} modes, {contacts} contacts"] = counted(bodies)
+    for modes in (2, 4, 8):
+        bodies = drawn_coupled(200, modes, 1, seed=3, transient=60, recorded=1)
+        found[f"random bodies: {modes} coupled modes, 1 contacts"] = counted(bodies)
     return found
 
 

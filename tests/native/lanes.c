@@ -274,7 +274,7 @@ static void check_sizes(int modes, int contacts, int64_t yielding, double rate, 
     static sample good, bad;
     static results whole, other;
     const int64_t sampled = ((int64_t)1 << VI_LANES_CONTACTS) | (((int64_t)1 << contacts) - 1);
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 200, yielding, sampled, rate};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 0, 200, yielding, sampled, rate};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;
@@ -353,6 +353,8 @@ int main(void)
                                   {.modes = 2, .sampled = -1, .rate = 1.0},
                                   {.modes = 1, .rate = -1.0},
                                   {.modes = 1, .rate = INFINITY},
+                                  {.modes = 1, .coupled = 1},
+                                  {.modes = 2, .coupled = 2},
                                   {.modes = 1, .instructions = 4}};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);

@@ -15,6 +15,7 @@ from support.lane_points import (
     Columns,
     Results,
     drawn,
+    drawn_coupled,
     drawn_yielding,
     follow_alone,
     oscillators,
@@ -38,6 +39,7 @@ MOST = 300
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
 """Phase and velocity of the impacts of P(1,1) of m = k = 1, zeta .1, F .5, w 1, r .7, stop 1: closed form."""
 
+COUPLED = [(2, 1), (3, 2), (5, 4), (8, 1), (8, 2)]
 YIELDING = [(1, False), (2, False), (2, True)]
 """Numbers of contacts; whether the second stop is rigid, beside a Kelvin-Voigt stop."""
 IN_CONTACT = 1e-7
@@ -100,6 +102,68 @@ def test_modes_without_a_spring_do_in_lanes_what_the_scalar_engine_makes_of_them
     assert max(differences(points, found, int(place)) for place in places) <= FLIGHTS
     for chosen in HERE:
         assert run(points, impact_limit=MOST, instructions=chosen).same_as(found)
+
+
+@pytest.mark.parametrize(("modes", "contacts"), COUPLED)
+def test_modes_that_damp_each_other_do_in_lanes_what_the_scalar_engine_makes_of_them(
+    modes: int, contacts: int
+) -> None:
+    points = drawn_coupled(40, modes, contacts, seed=80 + 10 * modes + contacts)
+    found = run(points, impact_limit=MOST, rate=2.0)
+    places = np.flatnonzero(found.has_run)
+    assert len(places) >= 12
+    assert max(differences(points, found, int(place)) for place in places) <= FLIGHTS
+    for chosen in HERE:
+        assert run(points, impact_limit=MOST, rate=2.0, instructions=chosen).same_as(found)
+    backwards = run(taken(points, np.arange(40)[20::-1]), impact_limit=MOST)
+    assert np.array_equal(backwards.columns["final_q"], found.columns["final_q"][:, 20::-1], equal_nan=True)
+
+
+@given(seed=st.integers(0, 10_000), modes=st.integers(2, 8), contacts=st.integers(0, 4))
+@settings(deadline=None, max_examples=15)
+def test_first_flights_of_coupled_modes_are_those_of_the_scalar_engine(
+    seed: int, modes: int, contacts: int
+) -> None:
+    points = drawn_coupled(8, modes, contacts, seed)
+    points["begin"] = np.zeros(8)
+    found = run(points, impact_limit=FIRST, extrema=False, periods=False)
+    for place in np.flatnonzero(found.has_run):
+        rows = found.rows[place]
+        with follow_alone(points, int(place), impact_limit=FIRST) as body:
+            impacts = body.impacts[: len(rows)]
+            assert rows[:, 1:6] == pytest.approx(impacts[:, 1:6], abs=NEAR)
+            assert found.columns["final_q"][:, place] == pytest.approx(body.displacement, abs=NEAR)
+
+
+def test_damping_of_each_mode_alone_moves_the_same_bits_as_a_matrix_and_as_a_ratio() -> None:
+    points = drawn(24, 3, 2, seed=5)
+    points["stiffness"][0, :6] = points["held"][0, :6] = 0.0
+    matrix = np.stack([np.diag(2.0 * decay) for decay in points["decay"].T], axis=-1)
+    ratio = run(points, impact_limit=MOST, rate=3.0)
+    assert run({**points, "coupling": matrix}, impact_limit=MOST, rate=3.0).same_as(ratio)
+
+
+def test_a_dashpot_moves_a_mode_without_a_spring_only_if_no_other_mode_moves_with_it() -> None:
+    points = drawn_coupled(12, 3, 1, seed=7)
+    points["stiffness"][0] = points["held"][0] = 0.0
+    points["coupling"][0, :, :6] = points["coupling"][:, 0, :6] = points["decay"][0, :6] = 0.0
+    found = run(points, impact_limit=MOST)
+    coupled = points["coupling"][0, 1] != 0.0
+    assert not found.has_run[coupled].any()
+    assert found.has_run[:6].sum() >= 3
+    assert max(differences(points, found, int(place)) for place in np.flatnonzero(found.has_run)) <= FLIGHTS
+
+
+def test_lanes_leave_modes_that_damp_each_other_next_to_critical_damping() -> None:
+    points = taken(drawn_coupled(1, 2, 1, seed=3), np.zeros(3, np.int64))
+    points["stiffness"][:] = [[1.0], [4.0]]
+    # one dashpot of these shapes gives s^2 + c s + k a double root at s = -3/2: 1 = sum of c_i s / (s^2 + k_i)
+    second = 1.0 / (1.5 / 3.25 * (1.75 / 6.25**2) / (1.25 / 3.25**2) + 1.5 / 6.25)
+    shape = np.sqrt([second * (1.75 / 6.25**2) / (1.25 / 3.25**2), second])
+    for place, factor in enumerate((1.0, 1.0 + 1e-9, 0.5)):
+        points["coupling"][..., place] = factor * np.outer(shape, shape)
+    points["decay"] = 0.5 * np.einsum("iip->ip", points["coupling"])
+    assert run(points).has_run.tolist() == [False, False, True]
 
 
 def test_a_constant_force_on_a_mode_without_a_spring_brings_it_back_at_the_times_of_free_fall() -> None:

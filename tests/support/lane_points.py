@@ -107,7 +107,7 @@ def run(
     }
     block: Columns = {"rows": np.zeros((room, IMPACT_WIDTH)), "owner": np.zeros(room, np.int64)}
     yields = sum(2**k for k, stiffness in enumerate(points["contact_stiffness"]) if stiffness.any())
-    sampled = 2**contacts - 1 + 2**MOST_CONTACTS
+    sampled, coupled = 2**contacts - 1 + 2**MOST_CONTACTS, "coupling" in points
     plan = LanesPlan(
         modes,
         contacts,
@@ -116,6 +116,7 @@ def run(
         periods,
         each_period,
         instructions,
+        coupled,
         impact_limit,
         yields,
         sampled,
@@ -132,7 +133,7 @@ def run(
         values = 2 * contacts + 2
         results["samples"] = np.full((values, count, math.floor(longest * rate) + 2), np.nan)
         state.most_samples = results["samples"].shape[2]
-    given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN}
+    given = {name: np.ascontiguousarray(points[name]) for name in LanesPoints.GIVEN if name in points}
     for name, array in (given | results | block | {"periods": table}).items():
         setattr(state, name, address(array))
     memory = lanes_memory(plan)
@@ -232,6 +233,25 @@ def drawn(
     }
 
 
+def drawn_coupled(
+    count: int, modes: int, contacts: int, seed: int, *, transient: int = 3, recorded: int = 4
+) -> Columns:
+    """Draw points of `drawn` with dashpots between random places, in place of most of the modes' own damping.
+
+    Dampings reach from none to far above critical; some points have fewer dashpots than modes.
+    """
+    random = np.random.default_rng(seed)
+    points = drawn(count, modes, contacts, seed, transient=transient, recorded=recorded)
+    coupling = np.zeros((modes, modes, count))
+    for point, natural in enumerate(np.sqrt(points["stiffness"]).T):
+        dashpots = random.normal(size=(random.integers(1, modes + 1), modes)) * np.sqrt(natural)
+        coupling[..., point] = random.choice([0.0, 1e-3, 0.05, 0.3, 1.0, 4.0]) * dashpots.T @ dashpots / modes
+        if random.random() < 0.5:
+            coupling[..., point] += np.diag(2.0 * points["decay"][:, point])
+    decay = 0.5 * np.einsum("iip->ip", coupling)
+    return {**points, "coupling": coupling, "decay": decay}
+
+
 def drawn_yielding(
     count: int, contacts: int, seed: int, *, rigid: bool = False, recorded: int = 4
 ) -> Columns:
@@ -267,7 +287,7 @@ def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Struc
     natural = np.sqrt(p["stiffness"])
     moves = natural > 0.0
     ratio = np.where(moves, p["decay"] / np.where(moves, natural, 1.0), 0.0)
-    coupling = np.diag(2.0 * p["decay"]) if (p["decay"][~moves] > 0.0).any() else None
+    coupling = np.diag(2.0 * p["decay"]) if (p["decay"][~moves] > 0.0).any() else p.get("coupling")
     frequency, phase = float(p["angular_frequency"]), float(p["phase"])
     modes = Modes(natural, ratio, p["force"], frequency, phase, coupling=coupling)
     stops = [

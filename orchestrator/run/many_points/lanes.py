@@ -12,7 +12,6 @@ from vibroimpact.fmus.core import lanes as core
 from vibroimpact.orchestrator.run.many_points.lanes_samples import sampled_bits
 from vibroimpact.orchestrator.run.many_points.loop import PreparedPoints
 from vibroimpact.orchestrator.run.parameters import body_points
-from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.laws import LAWS
 
 Floats = NDArray[np.float64]
@@ -30,9 +29,9 @@ class LanePoints:
     """Arrays of `LanesPoints.GIVEN` by name, without `first`."""
 
 
-def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
-    """Return prepared points in the form for C; points without free modes have numbers that C leaves out."""
-    columns, count = points.columns, len(points.begin)
+def lane_points(points: PreparedPoints) -> LanePoints:
+    """Return prepared points in the form for C; points without modes have numbers that C leaves out."""
+    scene, columns, count = points.scene, points.columns, len(points.begin)
     modal = body_points(scene, columns).in_state_coordinates()
     stops, record = scene.stops, scene.record
     numbers = range(1, len(stops) + 1)
@@ -43,7 +42,11 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         return np.stack(rows) if rows else np.empty((0, count))
 
     given = {
-        **{name: getattr(modal, name) for name in core.LanesPoints.GIVEN if hasattr(modal, name)},
+        **{
+            name: getattr(modal, name)
+            for name in core.LanesPoints.GIVEN
+            if getattr(modal, name, None) is not None
+        },
         "angular_frequency": columns.get("forcing.angular_frequency", none),
         "phase": columns.get("forcing.phase", none),
         "position": each("position", none),
@@ -68,6 +71,7 @@ def lane_points(scene: Scene, points: PreparedPoints) -> LanePoints:
         periods=points.periods,
         each_period=record.each_period,
         instructions=core.instructions(),
+        coupled=modal.coupling is not None,
         impact_limit=scene.execution.impact_limit,
         yielding=sum(2**number for number, stop in enumerate(stops) if not LAWS[stop.law].is_rigid),
         sampled=sampled_bits(scene.sampled),

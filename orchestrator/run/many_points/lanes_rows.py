@@ -120,7 +120,7 @@ class _LaneRun:
     def __init__(self, loop: PointLoop, values: LaneValues, points: PreparedPoints, alone: Alone) -> None:
         self._loop, self._values, self._points, self._alone = loop, values, points, alone
         self._is_structure = loop.scene.body.IS_STRUCTURE
-        count, lanes = len(values), lane_points(loop.scene, points)
+        count, lanes = len(values), lane_points(points)
         self._plan, self._modal = lanes.plan, lanes.modal
         self._first = values.first if loop.chained else np.ones(count, dtype=np.bool_)
         self._given = lanes.given
@@ -271,7 +271,7 @@ class _LaneRun:
         columns = {name: column[places] for name, column in points.columns.items()}
         first = np.ones(len(places), dtype=np.bool_)
         begin, end = points.begin[places], points.end[places]
-        return PreparedPoints(first, table, begin, end, columns, points.forced, points.periods)
+        return PreparedPoints(first, table, begin, end, columns, points.forced, points.periods, points.scene)
 
     def _answer(self, places: Ints, columns: RunColumns) -> None:
         """Give the results of the scalar engine to the lanes."""

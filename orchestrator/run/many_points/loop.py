@@ -62,6 +62,8 @@ class PreparedPoints:
         Whether a periodic force acts.
     periods : bool
         Whether periods are recorded.
+    scene : Scene
+        A scene of the points' kind: its body has the parameters of theirs, see `is_coupled` of bodies.
     """
 
     first: NDArray[np.bool_]
@@ -71,6 +73,7 @@ class PreparedPoints:
     columns: Mapping[str, Floats]
     forced: bool
     periods: bool
+    scene: Scene
 
 
 def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop | None:
@@ -169,10 +172,11 @@ class PointLoop:
     # ---- the points ----
 
     def prepared(self, points: PointValues) -> PreparedPoints | None:
-        """Return points with their parameters; None where a point has invalid ones, or only some points are forced."""
-        names = self.driver.float_names
+        """Return points with their parameters; None where a point has invalid ones, or points are of mixed kinds."""
         try:
-            table = self._parameters(points)
+            scene = self._scene_of(points)
+            names = self._names_of(scene)
+            table = self._parameters(points, scene, names)
         except (ArithmeticError, ValueError):
             return None  # each point runs alone, for its own message
         columns = {name: table[:, place].copy() for place, name in enumerate(names)}
@@ -184,20 +188,32 @@ class PointLoop:
             record = self.scene.record
             begin = np.full(len(points), record.transient_time)
             end = np.full(len(points), record.transient_time + record.recorded_time)
-            return PreparedPoints(points.first, table, begin, end, columns, forced, periods=False)
+            return PreparedPoints(points.first, table, begin, end, columns, forced, False, scene)
         if self.chained:
             columns["forcing.phase"][~points.first] = 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # the body refuses an infinite period
             begin, end = forced_window(self.scene.record, columns["forcing.phase"], angular_frequency)
-        return PreparedPoints(points.first, table, begin, end, columns, forced, self._periods(forced))
+        periods = self._periods(forced)
+        return PreparedPoints(points.first, table, begin, end, columns, forced, periods, scene)
 
-    def _parameters(self, points: PointValues) -> Floats:
-        """Return the parameters of each point, shape (point, parameter), in the order of the driver."""
-        names = self.driver.float_names
+    def _scene_of(self, points: PointValues) -> Scene:
+        """Return a scene of the kind of the first point; points of the loop in C are of the scene's own kind."""
+        if self.is_in_c:
+            return self.scene
+        return self.scene.at({key: each[0].item() for key, each in points.values.items()})
+
+    def _names_of(self, scene: Scene) -> Sequence[str]:
+        """Return the parameters of points of this kind: those of the driver, in its order, for the scene's own kind."""
+        if scene.body.is_coupled == self.scene.body.is_coupled:
+            return self.driver.float_names
+        return tuple(float_parameters(scene, None))
+
+    def _parameters(self, points: PointValues, like: Scene, names: Sequence[str]) -> Floats:
+        """Return these parameters of each point, shape (point, parameter)."""
         table = np.empty((len(points), len(names)))
         for chosen, values in self._alike(points):
             scene = self.scene.at(values)
-            if scene.body.is_coupled != self.scene.body.is_coupled:
+            if scene.body.is_coupled != like.body.is_coupled:
                 raise ValueError("the body has other parameters")
             found = float_parameters(scene, None)
             for column, name in enumerate(names):

@@ -40,21 +40,6 @@ static bool fill_body(int modes, const double natural[], const double coupling[]
     return good;
 }
 
-/* Largest size of (w x, rate x) among the terms, which are normalised by the square without conjugation. */
-static double largest_vector(const vi_orbit_coupling *found)
-{
-    double largest = 0.0;
-    for (int m = 0; m < found->terms.terms; ++m) {
-        double square = 0.0;
-        for (int j = 0; j < found->body.modes; ++j) {
-            const double rates = found->body.square[j] + vi_complex_square(found->terms.rate[m]);
-            square += rates * vi_complex_square(found->terms.vector[m][j]);
-        }
-        largest = fmax(largest, square);
-    }
-    return largest;
-}
-
 static double fastest_rate(const vi_pressed_body *body)
 {
     double natural = 0.0, drag = 0.0;
@@ -77,7 +62,7 @@ VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const doub
         return 1;
     }
     if (!vi_coupled_modes_find(&found->terms, &found->body, work)
-        || (modes <= MANY_MODES && largest_vector(found) > LARGEST_VECTOR)) {
+        || (modes <= MANY_MODES && vi_coupled_modes_size(&found->terms, &found->body) > LARGEST_VECTOR)) {
         found->terms.terms = 0;
     }
     found->fastest = fastest_rate(&found->body);

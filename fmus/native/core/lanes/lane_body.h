@@ -26,7 +26,7 @@ typedef struct {
      * put on it. */
     void (*observe)(vi_lane_group *group, int lane, int modes, int contacts, double *displacement, double *velocity);
     /* Modal displacements and velocities. */
-    void (*state)(const vi_lane_group *group, int lane, int modes, double q[], double p[]);
+    void (*state)(const vi_lane_group *group, int lane, const vi_lanes_plan *plan, double q[], double p[]);
     /* Keep the lane's state: the next samples are taken from here on. */
     void (*sample_from)(vi_lane_group *group, int lane, int modes);
     /* Take the samples up to the lane's instant, in the phase in which the motion since `sample_from` began. */

@@ -75,40 +75,43 @@ enum { VI_LEVELS = 5, VI_LEVEL_RATIO = 4, VI_POINTS = VI_LANES_CONTACTS + 1 };
 
 /* Rows of the tables for one length of cells. */
 typedef struct {
-    vi_lane_array step[VI_LANES_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
+    vi_lane_array step[VI_REAL_MODES][4]; /* (q, p) after a cell: q of q, of p; p of q, of p */
     vi_lane_array turn_cosine, turn_sine;  /* turn of the force over a cell */
     vi_lane_array cells, rate;             /* length of a cell in shortest cells; its reciprocal, 1/s */
     /* largest deviation of a contact's displacement from a cubic over a cell: for unit amplitudes of the modes, then for
      * the force and rounding */
-    vi_lane_array bulge[VI_LANES_CONTACTS][VI_LANES_MODES + 1];
+    vi_lane_array bulge[VI_LANES_CONTACTS][VI_REAL_MODES + 1];
 } vi_level_rows;
 
-/* Tables of a body of several modes. Its motion is the steady response plus the unforced motion of each mode. Rows of
- * points: the contacts, towards their stops, then the observed point. */
+/* Tables of a body of several modes. Its motion is the steady response plus the unforced motion of each real mode.
+ * Real modes are those of the body, or real and imaginary parts of its complex modes (many_coupling.h). Rows of points: the contacts,
+ * towards their stops, then the observed point. */
 typedef struct {
     vi_level_rows rows[VI_LEVELS];                    /* of each level: the longest cells, ..., two shortest cells */
     vi_level_rows present;                            /* of the lane's level */
-    vi_lane_array half[VI_LANES_MODES][4];            /* as `step`, over one shortest cell */
+    vi_lane_array half[VI_REAL_MODES][4];            /* as `step`, over one shortest cell */
     vi_lane_array half_cosine, half_sine;
-    vi_lane_array two[VI_LANES_MODES][4], two_cosine, two_sine; /* the same over two shortest cells */
+    vi_lane_array two[VI_REAL_MODES][4], two_cosine, two_sine; /* the same over two shortest cells */
     /* largest deviations of the observed displacement and velocity from a line over a cell, for unit amplitudes */
-    vi_lane_array sag[VI_LEVELS][VI_LANES_MODES + 1], tilt[VI_LEVELS][VI_LANES_MODES + 1];
+    vi_lane_array sag[VI_LEVELS][VI_REAL_MODES + 1], tilt[VI_LEVELS][VI_REAL_MODES + 1];
     /* Largest deviation of the observed displacement from a cubic over n shortest cells. It is the smaller of n^4 wave
      * and flat + n rise, for unit amplitudes of the modes, then for the force. */
-    vi_lane_array wave[VI_LANES_MODES + 1], flat[VI_LANES_MODES + 1], rise[VI_LANES_MODES + 1];
-    vi_lane_array shape[VI_POINTS][VI_LANES_MODES];
+    vi_lane_array wave[VI_REAL_MODES + 1], flat[VI_REAL_MODES + 1], rise[VI_REAL_MODES + 1];
+    vi_lane_array shape[VI_POINTS][VI_REAL_MODES];
     vi_lane_array cosine[VI_POINTS], sine[VI_POINTS]; /* steady response */
     vi_lane_array rest_place[VI_POINTS], offset[VI_POINTS]; /* displacement under the held loads; the same minus stop */
-    vi_lane_array mix[VI_LANES_MODES], reach[VI_LANES_MODES]; /* amplitude <= |q| + |p + mix q| reach */
+    vi_lane_array mix[VI_REAL_MODES], reach[VI_REAL_MODES]; /* amplitude <= |q| + |p + mix q| reach */
     vi_lane_array level, start_level, last;           /* level: present; in the last round; shortest */
     /* for the search */
-    vi_lane_array drag[VI_LANES_MODES], spring[VI_LANES_MODES]; /* q'' + drag q' + spring q = 0 over a shortest cell */
+    vi_lane_array drag[VI_REAL_MODES], spring[VI_REAL_MODES]; /* q'' + drag q' + spring q = 0 over a shortest cell */
     vi_lane_array turn;                               /* of the force over a shortest cell, rad */
-    vi_lane_array pull[VI_LANES_MODES];               /* bound of the acceleration for unit amplitude, 1/s^2 */
+    vi_lane_array pull[VI_REAL_MODES];               /* bound of the acceleration for unit amplitude, 1/s^2 */
     vi_lane_array steady_pull[VI_LANES_CONTACTS];     /* bound of the acceleration of the steady response, m/s^2 */
-    vi_lane_array stiffness[VI_LANES_MODES], decay[VI_LANES_MODES];
-    vi_lane_array steady_cosine[VI_LANES_MODES], steady_sine[VI_LANES_MODES], rest[VI_LANES_MODES];
-    vi_lane_array kick[VI_LANES_CONTACTS][VI_LANES_MODES]; /* modal velocities that take away a unit of approach */
+    vi_lane_array stiffness[VI_REAL_MODES], decay[VI_REAL_MODES];
+    vi_lane_array steady_cosine[VI_REAL_MODES], steady_sine[VI_REAL_MODES], rest[VI_REAL_MODES];
+    vi_lane_array kick[VI_LANES_CONTACTS][VI_REAL_MODES]; /* modal velocities that take away a unit of approach */
+    vi_lane_array shift[VI_LANES_CONTACTS][VI_REAL_MODES]; /* the same of q, for damping that couples the modes */
+    vi_lane_array to_state[VI_LANES_MODES][VI_REAL_MODES]; /* then: displacement of a mode by each real mode */
     vi_lane_array size[VI_LANES_CONTACTS];            /* of the terms of a clearance that do not move, m */
 } vi_many_modes;
 
@@ -167,13 +170,13 @@ typedef struct {
     vi_lane_array resolution[VI_LANES_CONTACTS]; /* squared approach below which a touch may be no impact */
     vi_lane_array most_impacts;               /* number of impacts that makes an event */
     /* the state: modal displacements and velocities; for several modes, without the steady response and the level */
-    vi_lane_array q[VI_LANES_MODES], p[VI_LANES_MODES];
+    vi_lane_array q[VI_REAL_MODES], p[VI_REAL_MODES];
     vi_lane_array periods, rest, rest_low;
     vi_lane_array goal_periods, goal_rest, goal_rest_low;
     vi_lane_array on;                         /* number of the contact just left, from 1; 0: none */
     vi_lane_array fastest_impact, impacts;
     /* the last round: its start, whole cells passed and the share of one more */
-    vi_lane_array start_q[VI_LANES_MODES], start_p[VI_LANES_MODES], start_cosine, start_sine;
+    vi_lane_array start_q[VI_REAL_MODES], start_p[VI_REAL_MODES], start_cosine, start_sine;
     vi_lane_array jumped, passed, share;      /* jumped: cells before those passed, in jumps over all cells of a round */
     vi_lane_array hit_pairs, hit_share;       /* whole pairs of the last flight to a contact, and share of one more */
     vi_lane_array hit_q, hit_p;               /* at the start of that one */
@@ -184,8 +187,15 @@ typedef struct {
     vi_one_mode one;
     vi_yielding yielding;
     vi_many_modes many;
-    vi_waiting_flights waiting[VI_LANES];     /* last: the other members are arrays over the lanes */
+    vi_waiting_flights waiting[VI_LANES];     /* the members before it are arrays over the lanes */
+    struct vi_lane_coupling *coupling;        /* workspace of bodies whose damping couples their modes; else NULL */
 } vi_lane_group;
+
+/* Number of real modes of a body. */
+static inline int vi_real_modes(const vi_lanes_plan *plan)
+{
+    return plan->coupled ? 2 * plan->modes : plan->modes;
+}
 
 /* Most rounds in a row, each of which writes at most one impact of a lane. */
 enum { VI_MOST_ROUNDS = 256 };

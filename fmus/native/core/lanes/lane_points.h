@@ -4,8 +4,9 @@
 
 #include <stdint.h>
 
-/* Most modes and contacts of a body, and most contacts that a body of one mode can meet: the nearest on each side. */
-enum { VI_LANES_MODES = 8, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
+/* Most modes and contacts of a body, and most contacts that a body of one mode can meet: the nearest on each side.
+ * VI_REAL_MODES: real modes, two for each mode where damping couples the modes. */
+enum { VI_LANES_MODES = 8, VI_REAL_MODES = 2 * VI_LANES_MODES, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
 /* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
  * duration (s), largest force (N).
@@ -36,6 +37,7 @@ typedef struct {
     int32_t impacts, extrema, periods; /* records between begin and end, as in record.h */
     int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;
+    int32_t coupled;      /* 1: `coupling` of the points is read, and damping may couple their modes */
     int64_t impact_limit; /* of a run; 0: no limit */
     int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
     int64_t sampled;      /* sum of 2^c over the sampled contacts c, and 2^VI_LANES_CONTACTS for the observed point */
@@ -53,6 +55,7 @@ typedef struct {
     const double *stiffness, *decay, *force, *held; /* [mode][point] 1/s^2, 1/s; force and held load per unit modal mass */
     const double *angular_frequency, *phase;        /* of the force at time 0, rad/s, rad */
     const double *shape, *impulse;                  /* [contact][mode][point] */
+    const double *coupling;                         /* [mode][mode][point] 1/s, of 2 decay on the diagonal; see `coupled` */
     const double *observed;                         /* [mode][point] shape of the observed point */
     const double *position, *direction;             /* [contact][point] of the stop, m; +1: above the motion, -1: below */
     const double *restitution, *yield_velocity;     /* [contact][point] as in contact_law.h */

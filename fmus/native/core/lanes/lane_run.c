@@ -73,8 +73,8 @@ static void finish(vi_lanes_work *w, int lane, int outcome, double reached)
     const int64_t point = w->run[lane].point;
     double q[VI_LANES_MODES], p[VI_LANES_MODES], displacement, velocity;
     vi_lane_record_waiting(w->group, w->plan, points, lane);
-    w->body->observe(w->group, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
-    w->body->state(w->group, lane, w->plan->modes, q, p);
+    w->body->observe(w->group, lane, vi_real_modes(w->plan), w->plan->contacts, &displacement, &velocity);
+    w->body->state(w->group, lane, w->plan, q, p);
     if (!isfinite(displacement) || !isfinite(velocity)) {
         leave(w, lane);
         return;
@@ -117,7 +117,7 @@ static void arrive(vi_lanes_work *w, int lane)
     vi_lane_group *g = w->group;
     vi_lane_run *run = &w->run[lane];
     double displacement, velocity;
-    w->body->observe(g, lane, w->plan->modes, w->plan->contacts, &displacement, &velocity);
+    w->body->observe(g, lane, vi_real_modes(w->plan), w->plan->contacts, &displacement, &velocity);
     if (run->goal_is_period) {
         turn_period(w, lane, displacement, velocity);
     }
@@ -137,7 +137,7 @@ static void arrive(vi_lanes_work *w, int lane)
                 leave(w, lane);
                 return;
             }
-            w->body->sample_from(g, lane, w->plan->modes);
+            w->body->sample_from(g, lane, vi_real_modes(w->plan));
             w->body->take_samples(g, w->plan, w->points, lane);
         }
     }
@@ -168,7 +168,8 @@ static int bounce(const vi_lanes_work *w, int lane, const vi_lane_meeting *met)
     const vi_contact_law law = {.restitution = g->restitution[c][lane], .yield_velocity = g->yield_velocity[c][lane]};
     const double after = vi_contact_law_restitution(&law, met->approach) * met->approach;
     g->fastest_impact[lane] = vi_max(g->fastest_impact[lane], met->approach);
-    if (!w->body->rebound(g, lane, w->plan->modes, met, after) || !(after > VI_LANE_TAIL * g->fastest_impact[lane])) {
+    if (!w->body->rebound(g, lane, vi_real_modes(w->plan), met, after)
+        || !(after > VI_LANE_TAIL * g->fastest_impact[lane])) {
         return VI_EVENT_LEAVE;
     }
     g->on[lane] = g->hit[lane] = c + 1.0;
@@ -190,7 +191,7 @@ static int search(const vi_lanes_work *w, int lane)
     const double length = vi_clock_elapsed(clock, now, goal) * g->cell_rate[lane];
     double share = vi_max(0.0, vi_min(length, 1.0)), cell = g->cell[lane];
     vi_lane_meeting met;
-    const vi_cell_result result = w->body->search(g, lane, w->plan->modes, w->plan->contacts, &share, &met);
+    const vi_cell_result result = w->body->search(g, lane, vi_real_modes(w->plan), w->plan->contacts, &share, &met);
     if (result == VI_CELL_UNDECIDED) {
         return VI_EVENT_LEAVE;
     }
@@ -214,11 +215,11 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
         return;
     }
     if (g->record.doubtful[lane] > 0.0) {
-        w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
+        w->body->extremes(g, lane, vi_real_modes(w->plan), w->plan->contacts);
     }
     if (event == VI_EVENT_CELL) {
         if (w->plan->rate > 0.0) {
-            w->body->sample_from(g, lane, w->plan->modes);
+            w->body->sample_from(g, lane, vi_real_modes(w->plan));
         }
         const bool waits = g->record.waits[lane] > 0.0;
         if (waits) {
@@ -232,7 +233,7 @@ void vi_lane_attend(vi_lanes_work *w, int lane)
             w->body->take_samples(g, w->plan, w->points, lane);
         }
         if (event != VI_EVENT_LEAVE && !waits && g->record.extremes[lane] > 0.0) {
-            w->body->extremes(g, lane, w->plan->modes, w->plan->contacts);
+            w->body->extremes(g, lane, vi_real_modes(w->plan), w->plan->contacts);
         }
     }
     if (event == VI_EVENT_LEAVE) {

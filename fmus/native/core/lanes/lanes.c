@@ -6,6 +6,7 @@
 #include "door/seconds.h"
 #include "lanes/instructions.h"
 #include "lanes/lane_run.h"
+#include "lanes/many_coupling.h"
 #include "lanes/yielding.h"
 
 /* Rounds of attending the lanes between two readings of the clock. */
@@ -36,6 +37,9 @@ static bool is_plan(const vi_lanes_plan *plan)
         return false;
     }
     const int64_t contacts = ((int64_t)1 << plan->contacts) - 1, observed = (int64_t)1 << VI_LANES_CONTACTS;
+    if (plan->coupled < 0 || plan->coupled > (plan->modes > 1)) {
+        return false;
+    }
     return plan->yielding >= 0 && plan->yielding <= (plan->modes == 1 ? contacts : 0)
            && (plan->rate == 0.0 || (plan->rate > 0.0 && isfinite(plan->rate)))
            && (plan->sampled & ~(contacts | observed)) == 0 && vi_lanes_rounds_of(plan->instructions) != NULL;
@@ -43,7 +47,7 @@ static bool is_plan(const vi_lanes_plan *plan)
 
 VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)
 {
-    return is_plan(plan) ? sizeof(kept_state) + ALIGNMENT : 0;
+    return is_plan(plan) ? sizeof(kept_state) + (plan->coupled ? vi_lane_coupling_size() : 0) + ALIGNMENT : 0;
 }
 
 VI_DOOR int vi_door_lanes_instructions(int set)
@@ -95,6 +99,7 @@ static void begin(vi_lanes_work *work, kept_state *memory)
     }
     memset(memory, 0, sizeof *memory);
     memory->started = 1;
+    memory->group.coupling = work->plan->coupled ? (void *)(memory + 1) : NULL; /* follows the state */
     for (int lane = 0; lane < VI_LANES; ++lane) {
         vi_lane_idle(work, lane);
     }

@@ -3,7 +3,7 @@
 
 /* State of the lanes of a vector: the unforced motion of the modes, and the phase of the force. */
 typedef struct {
-    vector q[VI_LANES_MODES], p[VI_LANES_MODES], cosine, sine;
+    vector q[VI_REAL_MODES], p[VI_REAL_MODES], cosine, sine;
 } modal_state;
 
 /* Motion of a contact at the start of a cell. The displacement from its stop is positive beyond the stop; `bulge` is its
@@ -18,7 +18,7 @@ typedef vector edges[VI_CELLS + 1];
 
 /* The lanes of a vector over the cells of a round. */
 typedef struct {
-    edges q[VI_LANES_MODES], p[VI_LANES_MODES], cosine, sine;
+    edges q[VI_REAL_MODES], p[VI_REAL_MODES], cosine, sine;
     edges y[VI_POINTS], v[VI_POINTS]; /* displacements of the points from their stops, and velocities */
 } cells_ahead;
 

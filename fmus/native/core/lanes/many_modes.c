@@ -13,7 +13,7 @@
 
 /* A state of a lane: the unforced motion of its modes, and the phase of the force. */
 typedef struct {
-    double q[VI_LANES_MODES], p[VI_LANES_MODES], cosine, sine;
+    double q[VI_REAL_MODES], p[VI_REAL_MODES], cosine, sine;
 } place;
 
 static place start_of(const vi_lane_group *g, int lane, int modes)
@@ -75,7 +75,7 @@ static double amplitude_of(const vi_lane_group *g, int lane, int j, double q, do
 
 /* Taylor terms of all modes. */
 typedef struct {
-    vi_lane_cell mode[VI_LANES_MODES];
+    vi_lane_cell mode[VI_REAL_MODES];
 } motion;
 
 static motion motion_from(const vi_lane_group *g, int lane, int modes, const place *s)
@@ -165,6 +165,7 @@ static bool rebound(vi_lane_group *g, int lane, int modes, const vi_lane_meeting
         const double reach = fabs(many->shape[c][j][lane]) * amplitude_of(g, lane, j, g->q[j][lane], g->p[j][lane]);
         size += reach;
         bend += reach * many->pull[j][lane];
+        g->q[j][lane] -= many->shift[c][j][lane] * (met->approach + after);
         g->p[j][lane] -= many->kick[c][j][lane] * (met->approach + after);
     }
     return met->approach * met->approach > 2.0 * bend * DBL_EPSILON * size;
@@ -180,7 +181,7 @@ typedef struct {
 static bulges bulges_of(const vi_lane_group *g, int lane, int modes, int level, const place *s)
 {
     const vi_lane_array *sag = g->many.sag[level], *tilt = g->many.tilt[level];
-    bulges b = {sag[VI_LANES_MODES][lane], tilt[VI_LANES_MODES][lane]};
+    bulges b = {sag[VI_REAL_MODES][lane], tilt[VI_REAL_MODES][lane]};
     for (int j = 0; j < modes; ++j) {
         const double amplitude = amplitude_of(g, lane, j, s->q[j], s->p[j]);
         b.place += sag[j][lane] * amplitude;
@@ -269,14 +270,23 @@ static void observe(vi_lane_group *g, int lane, int modes, int contacts, double 
     *displacement = point_at(g, lane, modes, VI_LANES_CONTACTS, &s, velocity);
 }
 
-static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
+static void state(const vi_lane_group *g, int lane, const vi_lanes_plan *plan, double q[], double p[])
 {
     const vi_many_modes *many = &g->many;
-    const place s = now_of(g, lane, modes);
+    const int modes = vi_real_modes(plan);
+    place s = now_of(g, lane, modes);
     for (int j = 0; j < modes; ++j) {
         const double c = many->steady_cosine[j][lane], n = many->steady_sine[j][lane];
-        q[j] = s.q[j] + ((c * s.cosine + n * s.sine) + many->rest[j][lane]);
-        p[j] = s.p[j] + g->angular_frequency[lane] * (n * s.cosine - c * s.sine);
+        s.q[j] += (c * s.cosine + n * s.sine) + many->rest[j][lane];
+        s.p[j] += g->angular_frequency[lane] * (n * s.cosine - c * s.sine);
+    }
+    for (int i = 0; i < plan->modes; ++i) {
+        q[i] = plan->coupled ? 0.0 : s.q[i];
+        p[i] = plan->coupled ? 0.0 : s.p[i];
+        for (int j = 0; j < modes && plan->coupled; ++j) {
+            q[i] += many->to_state[i][j][lane] * s.q[j];
+            p[i] += many->to_state[i][j][lane] * s.p[j];
+        }
     }
 }
 

@@ -130,7 +130,7 @@ LANES_INLINE void sample_instants_from(vi_lane_group *g, int at)
 /* Take the samples since the start of the round, after the clocks have moved. */
 LANES_INLINE void take_samples_of_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
 {
-    const int modes = plan->modes;
+    const int modes = vi_real_modes(plan);
     const sampled_round round = sampled_round_of(g, at);
     sampled_motion motion;
     sampled_flight f = {.passed = all(0.0)};

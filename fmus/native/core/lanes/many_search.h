@@ -33,7 +33,7 @@ typedef struct {
 
 /* Derivatives of the modes at the start of a cell, over the cell. */
 typedef struct {
-    vector of[VI_LANES_MODES][VI_LANE_ORDER + 1];
+    vector of[VI_REAL_MODES][VI_LANE_ORDER + 1];
 } derivatives;
 
 /* The first meeting so far. */

@@ -6,6 +6,8 @@
 #include "body/landing.h"
 #include "lanes/lane_body.h"
 #include "lanes/lane_turn.h"
+#include "lanes/many_coupling.h"
+#include "motion/complex.h"
 #include "motion/flow.h"
 #include "motion/majorant.h"
 
@@ -67,6 +69,45 @@ static bool take_mode(vi_lane_group *g, int lane, int j, const vi_mode *mode, do
     g->q[j][lane] = q - ((c * cosine + n * sine) + many->rest[j][lane]);
     g->p[j][lane] = p - w * (n * cosine - c * sine);
     return isfinite(g->q[j][lane]) && isfinite(g->p[j][lane]);
+}
+
+/* Set the real modes of a complex mode, and their responses to force and held load; false where lockstep cannot follow
+ * them. `start_q`: displacements at the start; `force`, `held`: loads of z' = rate z + load, as split velocities. */
+static bool take_rate(vi_lane_group *g, int lane, const vi_lane_rate *rate, vi_mode mode[], const double start_q[],
+                      const double force[], const double held[])
+{
+    vi_many_modes *many = &g->many;
+    const double w = g->angular_frequency[lane], square = rate->re * rate->re + rate->im * rate->im;
+    const int j = rate->first, parts = rate->im > 0.0 ? 2 : 1;
+    const vi_complex s = {rate->re, rate->im}, b = {force[j], parts > 1 ? force[j + 1] : 0.0};
+    const vi_complex z = {start_q[j], parts > 1 ? start_q[j + 1] : 0.0}, h = {held[j], parts > 1 ? held[j + 1] : 0.0};
+    const vi_complex below = {s.re * s.re - s.im * s.im + w * w, 2.0 * s.re * s.im}; /* rate^2 + w^2 */
+    vi_complex c = {0.0, 0.0}, n = c, cosine_sine;
+    if (b.re != 0.0 || b.im != 0.0) {
+        const vi_complex unit = vi_complex_divide(b, below);
+        c = vi_complex_scale(-1.0, vi_complex_multiply(s, unit));
+        n = vi_complex_scale(w, unit);
+    }
+    const double size = vi_complex_size(c) + vi_complex_size(n);
+    if (!(size * sqrt(square) <= LARGEST_STEADY * vi_complex_size(b))) {
+        return false;
+    }
+    vi_lane_turn(w * g->rest[lane], &cosine_sine.re, &cosine_sine.im);
+    const vi_complex rest = vi_complex_scale(-1.0, vi_complex_divide(h, s));
+    const vi_complex x = {z.re - ((c.re * cosine_sine.re + n.re * cosine_sine.im) + rest.re),
+                          z.im - ((c.im * cosine_sine.re + n.im * cosine_sine.im) + rest.im)};
+    const vi_complex v = vi_complex_multiply(s, x);
+    for (int part = 0; part < parts; ++part) {
+        vi_mode_start(&mode[j + part], 1.0, -2.0 * s.re, square, 0.0, w);
+        many->stiffness[j + part][lane] = square;
+        many->decay[j + part][lane] = 0.0 - s.re;
+        many->steady_cosine[j + part][lane] = part ? c.im : c.re;
+        many->steady_sine[j + part][lane] = part ? n.im : n.re;
+        many->rest[j + part][lane] = part ? rest.im : rest.re;
+        g->q[j + part][lane] = part ? x.im : x.re;
+        g->p[j + part][lane] = part ? v.im : v.re;
+    }
+    return isfinite(size) && isfinite(x.re) && isfinite(x.im) && isfinite(v.re) && isfinite(v.im);
 }
 
 /* Set the lengths of the cells: the longest is a part of a period, the shortest short against every rate. */
@@ -174,34 +215,65 @@ static void take_tilts(vi_lane_group *g, int lane, int modes, const bounds bound
             sag[j][lane] = shape * vi_min(bound[j].second * eighth, 2.0);
             tilt[j][lane] = shape * vi_min(bound[j].third * eighth, 2.0 * bound[j].first);
         }
-        sag[VI_LANES_MODES][lane] = steady * vi_min(w * w * eighth, 2.0);
-        tilt[VI_LANES_MODES][lane] = w * sag[VI_LANES_MODES][lane];
+        sag[VI_REAL_MODES][lane] = steady * vi_min(w * w * eighth, 2.0);
+        tilt[VI_REAL_MODES][lane] = w * sag[VI_REAL_MODES][lane];
+    }
+}
+
+/* Set the shape of a point in the real modes. */
+static void take_shape(const vi_lane_group *g, int lane, const vi_lanes_plan *plan, const double shape[], double real[])
+{
+    for (int j = 0; j < vi_real_modes(plan); ++j) {
+        real[j] = plan->coupled ? 0.0 : shape[j];
+        for (int i = 0; i < plan->modes && plan->coupled; ++i) {
+            real[j] += shape[i] * g->many.to_state[i][j][lane];
+        }
+    }
+}
+
+/* Set the changes of the real modes that take away a unit of approach. */
+static void take_kick(vi_lane_group *g, int lane, int c, const vi_lanes_plan *plan, const double kick[])
+{
+    const double none[VI_LANES_MODES] = {0.0};
+    double shift[VI_REAL_MODES] = {0.0}, real[VI_REAL_MODES];
+    if (plan->coupled) {
+        vi_lane_split(g->coupling, none, kick, shift, real);
+    }
+    for (int j = 0; j < vi_real_modes(plan); ++j) {
+        g->many.shift[c][j][lane] = shift[j];
+        g->many.kick[c][j][lane] = plan->coupled ? real[j] : kick[j];
     }
 }
 
 /* Set a contact of a point; false where it is invalid, or the start is not clear of it. */
-static bool take_contact(vi_lane_group *g, int lane, int c, int modes, const vi_lanes_points *points, int64_t point,
-                         const double q[])
+static bool take_contact(vi_lane_group *g, int lane, int c, const vi_lanes_plan *plan, const vi_lanes_points *points,
+                         int64_t point, const double q[])
 {
     const int64_t i = c * points->count + point;
-    double shape[VI_LANES_MODES], mobility = 0.0, start = 0.0, size = fabs(points->position[i]);
+    const int modes = plan->modes;
+    double shape[VI_LANES_MODES], kick[VI_LANES_MODES], real[VI_REAL_MODES];
+    double mobility = 0.0, start = 0.0, size = fabs(points->position[i]);
     for (int j = 0; j < modes; ++j) {
         const int64_t at = (c * modes + j) * points->count + point;
         shape[j] = points->shape[at];
         mobility += shape[j] * points->impulse[at];
         start += shape[j] * q[j];
-        size += fabs(shape[j]) * (fabs(q[j]) + fabs(g->many.rest[j][lane]));
+        size += fabs(shape[j]) * fabs(q[j]);
+    }
+    take_shape(g, lane, plan, shape, real);
+    for (int j = 0; j < vi_real_modes(plan); ++j) {
+        size += fabs(real[j]) * fabs(g->many.rest[j][lane]);
     }
     const double clearance = points->direction[i] * (points->position[i] - start);
     if (!vi_lane_is_contact(points, i) || !(mobility > 0.0) || !isfinite(mobility)
         || !(clearance > VI_ROUNDING * size)) {
         return false;
     }
-    take_point(g, lane, c, modes, points->direction[i], points->position[i], shape);
+    take_point(g, lane, c, vi_real_modes(plan), points->direction[i], points->position[i], real);
     for (int j = 0; j < modes; ++j) {
-        const double impulse = points->impulse[(c * modes + j) * points->count + point];
-        g->many.kick[c][j][lane] = points->direction[i] * impulse / mobility;
+        kick[j] = points->direction[i] * points->impulse[(c * modes + j) * points->count + point] / mobility;
     }
+    take_kick(g, lane, c, plan, kick);
     g->many.size[c][lane] = fabs(points->position[i]) + fabs(g->many.offset[c][lane]) + fabs(g->many.cosine[c][lane])
                             + fabs(g->many.sine[c][lane]);
     g->restitution[c][lane] = points->restitution[i];
@@ -272,24 +344,88 @@ void vi_lane_put_level(vi_lane_group *g, int lane, int modes, int contacts)
     copy_rows(lane, 1, &from->rate, &to->rate);
 }
 
+/* Loads and state of the modes of a point. */
+typedef struct {
+    double force[VI_LANES_MODES], held[VI_LANES_MODES];
+    const double *q, *p;
+} modal_loads;
+
+/* Set mode `from` as real mode j. */
+static bool take_own(vi_lane_group *g, int lane, int j, const vi_lanes_points *points, int64_t point,
+                     const modal_loads *of, int from, vi_mode *mode)
+{
+    const int64_t i = from * points->count + point;
+    vi_mode_start(mode, 1.0, 2.0 * points->decay[i], points->stiffness[i], of->force[from], g->angular_frequency[lane]);
+    return take_mode(g, lane, j, mode, of->held[from], of->q[from], of->p[from]);
+}
+
+/* Set the real modes of a body whose damping may couple its modes; unused ones stay at rest. */
+static bool take_coupled(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points,
+                         int64_t point, const modal_loads *of, vi_mode mode[])
+{
+    const double none[VI_LANES_MODES] = {0.0};
+    double unused[VI_REAL_MODES], q[VI_REAL_MODES], force[VI_REAL_MODES], held[VI_REAL_MODES], row[VI_REAL_MODES];
+    vi_lane_rate rate[VI_REAL_MODES];
+    if (!vi_lane_couple(g->coupling, plan->modes, points, point)) {
+        return false;
+    }
+    for (int i = 0; i < plan->modes; ++i) {
+        vi_lane_displacements(g->coupling, i, row);
+        for (int j = 0; j < vi_real_modes(plan); ++j) {
+            g->many.to_state[i][j][lane] = row[j];
+        }
+    }
+    vi_lane_split(g->coupling, of->q, of->p, q, unused);
+    vi_lane_split(g->coupling, none, of->force, force, unused);
+    vi_lane_split(g->coupling, none, of->held, held, unused);
+    bool good = true;
+    for (int j = 0; j < vi_real_modes(plan) && good; ++j) {
+        const int own = vi_lane_own_mode(g->coupling, j);
+        vi_mode_start(&mode[j], 1.0, 0.0, 0.0, 0.0, g->angular_frequency[lane]);
+        good = own < 0 ? take_mode(g, lane, j, &mode[j], 0.0, 0.0, 0.0)
+                       : take_own(g, lane, j, points, point, of, own, &mode[j]);
+    }
+    const int rates = vi_lane_rates(g->coupling, rate);
+    for (int m = 0; m < rates && good; ++m) {
+        good = take_rate(g, lane, &rate[m], mode, q, force, held);
+    }
+    return good;
+}
+
+/* Set the real modes of a point in their start state; false where lockstep cannot follow them. */
+static bool take_modes(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points,
+                       int64_t point, const double q[], const double p[], vi_mode mode[])
+{
+    modal_loads of = {.q = q, .p = p};
+    bool good = true;
+    for (int j = 0; j < plan->modes; ++j) {
+        of.force[j] = points->force[j * points->count + point];
+        of.held[j] = points->held[j * points->count + point];
+        good = good && isfinite(of.force[j]) && isfinite(of.held[j]);
+    }
+    if (plan->coupled) {
+        return good && take_coupled(g, lane, plan, points, point, &of, mode);
+    }
+    for (int j = 0; j < plan->modes && good; ++j) {
+        good = take_own(g, lane, j, points, point, &of, j, &mode[j]);
+    }
+    return good;
+}
+
 bool vi_lane_take_many(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points,
                        int64_t point, const double q[], const double p[])
 {
-    const int modes = plan->modes;
-    vi_mode mode[VI_LANES_MODES];
-    bounds bound[VI_LANES_MODES];
-    double fastest = 0.0, observed[VI_LANES_MODES];
+    const int modes = vi_real_modes(plan);
+    vi_mode mode[VI_REAL_MODES];
+    bounds bound[VI_REAL_MODES];
+    double fastest = 0.0, observed[VI_LANES_MODES], real[VI_REAL_MODES];
+    if (!take_modes(g, lane, plan, points, point, q, p, mode)) {
+        return false;
+    }
     for (int j = 0; j < modes; ++j) {
-        const int64_t i = j * points->count + point;
-        const double held = points->held[i], w = points->angular_frequency[point];
-        vi_mode_start(&mode[j], 1.0, 2.0 * points->decay[i], points->stiffness[i], points->force[i], w);
-        if (!isfinite(points->force[i]) || !isfinite(held) || !take_mode(g, lane, j, &mode[j], held, q[j], p[j])) {
-            return false;
-        }
         bound[j] = take_amplitude(g, lane, j, &mode[j]);
         g->many.pull[j][lane] = bound[j].second;
         fastest = vi_max(fastest, mode[j].fastest);
-        observed[j] = points->observed[i];
     }
     if (!take_levels(g, lane, fastest)) {
         return false;
@@ -300,12 +436,16 @@ bool vi_lane_take_many(vi_lane_group *g, int lane, const vi_lanes_plan *plan, co
     }
     take_steps(g, lane, modes, mode);
     for (int c = 0; c < plan->contacts; ++c) {
-        if (!take_contact(g, lane, c, modes, points, point, q)) {
+        if (!take_contact(g, lane, c, plan, points, point, q)) {
             return false;
         }
         take_bulges(g, lane, c, modes, bound);
     }
-    take_point(g, lane, VI_LANES_CONTACTS, modes, 1.0, 0.0, observed);
+    for (int j = 0; j < plan->modes; ++j) {
+        observed[j] = points->observed[j * points->count + point];
+    }
+    take_shape(g, lane, plan, observed, real);
+    take_point(g, lane, VI_LANES_CONTACTS, modes, 1.0, 0.0, real);
     take_tilts(g, lane, modes, bound);
     take_waves(g, lane, modes, bound);
     vi_lane_put_level(g, lane, modes, plan->contacts);

@@ -102,9 +102,9 @@ static void observe(vi_lane_group *g, int lane, int modes, int contacts, double 
     *velocity = g->p[0][lane];
 }
 
-static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
+static void state(const vi_lane_group *g, int lane, const vi_lanes_plan *plan, double q[], double p[])
 {
-    (void)modes;
+    (void)plan;
     q[0] = g->q[0][lane];
     p[0] = g->p[0][lane];
 }

@@ -19,7 +19,7 @@ LANES_INLINE search_result search_many(const vi_lane_group *g, int at, int modes
     const vector to_goal = seconds_to_goal(g, at) * load(g->cell_rate + at), none = all(0.0);
     searched_cell cell;
     derivatives d;
-    vector q[VI_LANES_MODES], p[VI_LANES_MODES];
+    vector q[VI_REAL_MODES], p[VI_REAL_MODES];
     cell.amplitude = amplitude;
     choose_half(g, at, modes, contacts, s, to_goal - s->passed * load(g->many.present.cells + at), &cell);
     expand_modes(g, at, modes, &cell.start, &d);
@@ -45,7 +45,8 @@ LANES_INLINE search_result search_many(const vi_lane_group *g, int at, int modes
 }
 
 /* Rebound at the hit contacts; returns the lanes that leave lockstep. */
-LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, const search_result *r, vector p[])
+LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts, const search_result *r,
+                                 modal_state *now)
 {
     const vector approach = r->first.approach * load(g->cell_rate + at), number = r->first.number;
     const vector after = restitution_of(g, at, contacts, r->hits, number, approach) * approach;
@@ -54,7 +55,10 @@ LANES_INLINE mask rebound_many(vi_lane_group *g, int at, int modes, int contacts
     for (int c = 0; c < contacts; ++c) {
         const vector change = only(number == (double)(c + 1), approach + after);
         for (int j = 0; j < modes; ++j) {
-            p[j] -= load(g->many.kick[c][j] + at) * change;
+            now->p[j] -= load(g->many.kick[c][j] + at) * change;
+        }
+        for (int j = 0; j < modes && g->coupling != NULL; ++j) {
+            now->q[j] -= load(g->many.shift[c][j] + at) * change;
         }
     }
     store(g->fastest_impact + at, fastest);
@@ -120,7 +124,7 @@ LANES_INLINE mask turn_periods_many(vi_lane_group *g, const vi_lanes_plan *plan,
         vector displacement, velocity;
         s->now.cosine = all(1.0);
         s->now.sine = all(0.0);
-        contact_at(g, at, plan->modes, VI_LANES_CONTACTS, &s->now, &displacement, &velocity);
+        contact_at(g, at, vi_real_modes(plan), VI_LANES_CONTACTS, &s->now, &displacement, &velocity);
         end_periods(g, plan, points, at, turns);
         begin_periods(g, at, turns, displacement, velocity);
         store(g->goal_periods + at, goal + only(turns, all(1.0)));
@@ -149,10 +153,10 @@ LANES_INLINE bool record_round_many(vi_lane_group *g, const vi_lanes_plan *plan,
 
 LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at)
 {
-    const int modes = plan->modes, contacts = plan->contacts;
+    const int modes = vi_real_modes(plan), contacts = plan->contacts;
     cells_ahead ahead;
     certified_flight s;
-    vector amplitude[VI_LANES_MODES];
+    vector amplitude[VI_REAL_MODES];
     begin_round_many(g, at, modes, &ahead, amplitude);
     if (plan->rate > 0.0) {
         sample_instants_from(g, at);
@@ -175,7 +179,7 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
         doubtful = extend_range(g, at, modes, amplitude, &ahead, &s.now, s.passed, r.half + r.first.share);
     }
     store(g->record.doubtful + at, only(doubtful, all(1.0)));
-    const mask leaves = any(r.hits) ? rebound_many(g, at, modes, contacts, &r, s.now.p) : never;
+    const mask leaves = any(r.hits) ? rebound_many(g, at, modes, contacts, &r, &s.now) : never;
     end_round_many(g, at, modes, &s, &r);
     const bool found = record_round_many(g, plan, points, at, leaves, &s, &r);
     change_level(g, at, modes, contacts, whole);

@@ -262,9 +262,9 @@ static void observe(vi_lane_group *g, int lane, int modes, int contacts, double 
     modal(g, lane, displacement, velocity);
 }
 
-static void state(const vi_lane_group *g, int lane, int modes, double q[], double p[])
+static void state(const vi_lane_group *g, int lane, const vi_lanes_plan *plan, double q[], double p[])
 {
-    (void)modes;
+    (void)plan;
     modal(g, lane, &q[0], &p[0]);
 }
 

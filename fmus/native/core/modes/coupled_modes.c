@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "motion/majorant.h"
+
 /* Part of a held contact's shape left by the others, relative to the shape, above which it is independent. */
 static const double INDEPENDENT = 1e-6;
 /* Imaginary part of a rate, relative to the rate, up to which the rate is real. Above REAL and below CRITICAL the rate
@@ -336,4 +338,18 @@ bool vi_coupled_modes_find(vi_pressed_modes *found, const vi_pressed_body *body,
     fill_matrix(work);
     return vi_symmetric_find(2 * work->real.rank, work->matrix, work->vector) && add_terms(found, body, work)
            && vi_pressed_terms_are_complete(found, body);
+}
+
+double vi_coupled_modes_size(const vi_pressed_modes *modes, const vi_pressed_body *body)
+{
+    double largest = 0.0;
+    for (int m = 0; m < modes->terms; ++m) {
+        double square = 0.0;
+        for (int j = 0; j < body->modes; ++j) {
+            const double rates = body->square[j] + vi_complex_square(modes->rate[m]);
+            square += rates * vi_complex_square(modes->vector[m][j]);
+        }
+        largest = vi_max(largest, square);
+    }
+    return largest;
 }

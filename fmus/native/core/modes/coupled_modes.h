@@ -29,4 +29,8 @@ typedef struct {
  * other, or a point that nothing holds back. */
 bool vi_coupled_modes_find(vi_pressed_modes *found, const vi_pressed_body *body, vi_coupled_work *work);
 
+/* Largest |z|^2 of the terms' states z = (w x, rate x), which have z.z = 1 without conjugation; 1 without damping. Terms
+ * of larger ones cancel each other's digits. */
+double vi_coupled_modes_size(const vi_pressed_modes *modes, const vi_pressed_body *body);
+
 #endif

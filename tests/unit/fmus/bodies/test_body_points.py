@@ -96,13 +96,17 @@ def test_points_of_different_bodies_have_the_bits_of_each_alone(fmu: str) -> Non
             assert getattr(together, name)[..., point].tobytes() == getattr(alone, name)[..., 0].tobytes()
 
 
-def test_a_chain_with_coupled_damping_is_left_by_lanes_and_one_with_a_drag_and_no_tie_by_orbits() -> None:
+def test_the_modes_of_a_chain_in_lanes_have_its_coupled_damping_and_no_spring_without_a_tie() -> None:
     none = {"stiffness[1]": 0.0, "far_stiffness": 0.0, "damping[1]": 0.0, "far_damping": 0.0}
     tied = body("Chain")
     assert tied.mass_normalised().coupling is None, "its dampings are in proportion to its stiffnesses"
     coupled, loose = body("Chain", far_damping=0.5), body("Chain", **none)
     at_two = {"forcing.phase": np.zeros(2)}
-    assert np.isnan(at_points(coupled, at_two).in_state_coordinates().stiffness).all()
+    found = at_points(coupled, at_two).in_state_coordinates()
+    assert found.coupling is not None
+    assert found.coupling[..., 1] == pytest.approx(coupled.mass_normalised().coupling, abs=1e-15)
+    assert 2.0 * found.decay[:, 0] == pytest.approx(found.coupling[..., 0].diagonal(), rel=1e-15)
+    assert at_points(tied, at_two).in_state_coordinates().coupling is None
     assert (at_points(loose, at_two).in_state_coordinates().stiffness[0] == 0.0).all()
     dragged = body("Chain", **none | {"damping[1]": 0.1, "far_damping": 0.2, "damping[2]": 0.0})
     assert at_points(dragged, at_two).in_state_coordinates().decay[:, 0] == pytest.approx([0.05, 0.05])
