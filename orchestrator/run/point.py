@@ -57,7 +57,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.run.measuring.run import MeasuredRun
 
-ENGINE = 8
+ENGINE = 9
 """Version of the C engine that follows the package's bodies; other versions give other results in a campaign."""
 
 ENGINE_OF_ONE_MASS = 6

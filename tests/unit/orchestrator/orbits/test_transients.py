@@ -122,7 +122,9 @@ def test_numbers_that_make_no_sense_are_refused(options: dict[str, Any], message
 
 
 def test_components_are_refused() -> None:
-    with pytest.raises(UsageError, match="body: expected an oscillator, a chain, a beam or several bodies whose orbits"):
+    with pytest.raises(
+        UsageError, match="body: expected an oscillator, a chain, a beam or several bodies whose orbits"
+    ):
         vi.transients(EXAMPLES / "newtons_cradle.toml")
 
 
