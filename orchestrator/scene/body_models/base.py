@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
@@ -30,6 +30,13 @@ FREQUENCY_SLOPE = (
 )
 DAMPING_SLOPE = ("damping_slope", "1/m", "change of the damping ratio per metre of amplitude")
 DAMPING_RECIPROCAL = ("damping_reciprocal", "m", "its ratio to the amplitude is added to the damping ratio")
+
+
+class NoPoint(NamedTuple):
+    """The reason why a text names no point, in the words of a message."""
+
+    expected: str
+    hint: str = ""
 
 
 class BodyTable(SceneTable):
@@ -104,6 +111,10 @@ class BodyTable(SceneTable):
     def observed_place(self, stops: Stops, sensor: Sensor | None) -> float:
         """Return the place of the recorded displacement."""
         return 0.0
+
+    def place_named(self, rest: str, name: str) -> float | NoPoint:
+        """Return the mass (1-based), or the fraction of the length, of a point `name.rest` of this body."""
+        return self.size if rest in ("", "mass") else NoPoint(f'"{name}" or "{name}.mass"')
 
     @property
     def fixed_end(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -13,10 +14,11 @@ from vibroimpact.orchestrator.scene.body_models.base import (
     DAMPING_SLOPE,
     FREQUENCY_SLOPE,
     BodyTable,
+    NoPoint,
     Stops,
     of_amplitude,
 )
-from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
@@ -35,7 +37,7 @@ from vibroimpact.orchestrator.scene.models import (
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
 if TYPE_CHECKING:
-    pass
+    from vibroimpact.fmus.bodies.assembly import Part
 
 TIP, MIDDLE = 1.0, 0.5
 """Places on a beam, as fractions of its length."""
@@ -228,6 +230,21 @@ class BeamBody(BodyTable):
         end = "clamped end" if location == 0.0 else "supported far end"
         return f"a point where a {self.boundary} beam moves", end
 
+    def place_named(self, rest: str, name: str) -> float | NoPoint:
+        """Return the fraction of the length, or 1 for the tip: see `BodyTable`."""
+        location = TIP
+        if rest not in ("", "tip"):
+            try:
+                location = float(rest) if re.fullmatch(r"[0-9.]+", rest) else -1.0
+            except ValueError:
+                location = -1.0
+            if not 0.0 <= location <= 1.0:
+                return NoPoint(f'"{name}.tip", or a fraction of the length such as "{name}.0.5"')
+        fixed = self.fixed_point(location)
+        return (
+            location if fixed is None else NoPoint(fixed[0], f'"{name}.{rest or "tip"}" is the {fixed[1]}.')
+        )
+
     @property
     def own_variables(self) -> tuple[str, ...]:
         """The motion and the energy of each mode."""
@@ -235,6 +252,13 @@ class BeamBody(BodyTable):
         return tuple(one for name in names for one in each_of(name, self.size))
 
     # ---- parameters of the FMU ----
+
+    def as_part(self) -> Part:
+        """Return this body as a part of an assembly."""
+        from vibroimpact.fmus.bodies.assembly import BeamPart
+
+        numbers = named_numbers(self, self.size) | self.fmu_floats(None, (), None)
+        return BeamPart(numbers, self.fmu_integers(None, ()))
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return rigidity, Rayleigh damping, places and amplitude as parameters of the FMU, SI."""

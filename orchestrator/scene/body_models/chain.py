@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+import re
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from vibroimpact.orchestrator.scene.body_models.base import BODY_KINDS, BodyTable, Stops
-from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.body_models.base import BODY_KINDS, BodyTable, NoPoint, Stops
+from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
@@ -21,6 +22,10 @@ from vibroimpact.orchestrator.scene.models import (
 )
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
+if TYPE_CHECKING:
+    from vibroimpact.fmus.bodies.assembly import Part
+
+_MASS = re.compile(r"(?:mass\[)?([1-9][0-9]?)(\])?")
 _ARRAY_OR_ONE = "an array of numbers >= 0, or one number for all"
 _SPRING_HINT = "Element i lies between mass i - 1 (the ground for i = 1) and mass i."
 _FREE_END = "Use 0 for a free far end."
@@ -135,6 +140,18 @@ class ChainBody(BodyTable):
         """Return the mass (1-based) of a stop: as given, or the last."""
         return stop.mass or self.size
 
+    def place_named(self, rest: str, name: str) -> float | NoPoint:
+        """Return the mass (1-based), which is the last without a number: see `BodyTable`."""
+        if rest == "":
+            return self.size
+        mass = _MASS.fullmatch(rest)
+        is_whole = mass is not None and rest.startswith("mass[") == (mass[2] is not None)
+        if mass is None or not is_whole or int(mass[1]) > self.size:
+            return NoPoint(
+                f'"{name}" for the last mass, or "{name}.1" to "{name}.{self.size}"', "Masses count from 1."
+            )
+        return int(mass[1])
+
     def observed_place(self, stops: Stops, sensor: Sensor | None) -> int:
         """Return the mass (1-based) of the recorded displacement: as given, the mass of stop[1], or the last."""
         return self.observed_mass or (self.place_of(stops[0]) if stops else self.size)
@@ -144,6 +161,19 @@ class ChainBody(BodyTable):
         """The motion of each mass, and the energy of each mode."""
         names = "displacement", "velocity", "acceleration", "modal_energy"
         return tuple(one for name in names for one in each_of(name, self.size))
+
+    def as_part(self) -> Part:
+        """Return this body as a part of an assembly."""
+        from vibroimpact.fmus.bodies.assembly import MassesPart
+
+        numbers = named_numbers(self, self.size)
+        rows = [
+            [numbers[name] for name in each_of(name, self.size)]
+            for name in ("mass", "stiffness", "damping", "displacement_start", "velocity_start")
+        ]
+        rows[1].append(self.far_stiffness)
+        rows[2].append(self.far_damping)
+        return MassesPart(*rows)
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the amplitude of the force on each mass, N."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -27,6 +27,9 @@ from vibroimpact.orchestrator.scene.models import (
     NotNegative,
     Positive,
 )
+
+if TYPE_CHECKING:
+    from vibroimpact.fmus.bodies.assembly import Part
 
 
 class OscillatorBody(BodyTable):
@@ -82,6 +85,13 @@ class OscillatorBody(BodyTable):
         # the values of a sweep may be arrays
         root = np.sqrt(square) if isinstance(square, np.ndarray) else math.sqrt(square)
         return 2.0 * self.damping_ratio * root
+
+    def as_part(self) -> Part:
+        """Return this body as a part of an assembly."""
+        from vibroimpact.fmus.bodies.assembly import MassesPart
+
+        one = [self.mass], [self.stiffness, 0.0], [self.damping, 0.0]
+        return MassesPart(*one, [self.displacement_start], [self.velocity_start])
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the amplitude of the force, N."""

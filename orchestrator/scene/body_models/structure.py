@@ -11,17 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from vibroimpact.orchestrator.scene.body_models.base import BodyTable, Stops
-from vibroimpact.orchestrator.scene.body_models.beam import BeamBody
-from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, Stops
 from vibroimpact.orchestrator.scene.body_models.points import (
     GROUND,
-    NoPoint,
     OneBody,
     PointOfBody,
     find_point,
 )
-from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
+from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
@@ -35,7 +32,7 @@ from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Po
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
 if TYPE_CHECKING:
-    from vibroimpact.fmus.bodies.assembly import Assembly, Part
+    from vibroimpact.fmus.bodies.assembly import Assembly
 
 MOST_LINKS = 256
 MOTIONS = ("displacement", "velocity")
@@ -167,7 +164,7 @@ class StructureBody(BodyTable):
         for link in self.links:
             first, second = (None if end == GROUND else self.point(end) for end in link.between)
             joints.append(Joint(first, second, link.stiffness, link.damping))
-        return Assembly([_part_of(part) for part in self.parts], joints)
+        return Assembly([part.as_part() for part in self.parts], joints)
 
     @property
     def is_coupled(self) -> bool:
@@ -266,24 +263,3 @@ def observed_variables(observed: Sequence[Observed]) -> tuple[str, ...]:
 
 def _number_of(point: PointOfBody) -> float:
     return 100.0 * point.body + point.place
-
-
-def _part_of(body: OneBody) -> Part:
-    """Return a body as a part of an assembly."""
-    from vibroimpact.fmus.bodies.assembly import BeamPart, MassesPart
-
-    if isinstance(body, BeamBody):
-        return BeamPart(
-            named_numbers(body, body.size) | body.fmu_floats(None, (), None), body.fmu_integers(None, ())
-        )
-    if isinstance(body, ChainBody):
-        numbers = named_numbers(body, body.size)
-        rows = [
-            [numbers[name] for name in each_of(name, body.size)]
-            for name in ("mass", "stiffness", "damping", "displacement_start", "velocity_start")
-        ]
-        rows[1].append(body.far_stiffness)
-        rows[2].append(body.far_damping)
-        return MassesPart(*rows)
-    one = [body.mass], [body.stiffness, 0.0], [body.damping, 0.0]
-    return MassesPart(*one, [body.displacement_start], [body.velocity_start])

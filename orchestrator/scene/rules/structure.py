@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BeamBody, StructureBody
+from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models.base import NoPoint
 from vibroimpact.orchestrator.scene.body_models.points import (
     GROUND,
-    NoPoint,
     OneBody,
     PointOfBody,
     find_point,
@@ -203,7 +203,7 @@ class _Points:
     def start(self, point: PointOfBody) -> Span | None:
         """Return the lowest and highest start of a point; None where only its FMU knows it, and for a beam."""
         part: OneBody = self._body.parts[point.body]
-        if isinstance(part, BeamBody):
+        if part.PLACE == "location":
             return None if part.displacement_start else (0.0, 0.0)
         key = f"body[{point.body + 1}].displacement_start"
         if not part.PLACE:
