@@ -99,7 +99,10 @@ static void begin(vi_lanes_work *work, kept_state *memory)
     }
     memset(memory, 0, sizeof *memory);
     memory->started = 1;
-    memory->group.coupling = work->plan->coupled ? (void *)(memory + 1) : NULL; /* follows the state */
+    if (work->plan->coupled) {
+        memory->group.coupling = (void *)(memory + 1); /* follows the state */
+        memset(memory->group.coupling, 0, vi_lane_coupling_size());
+    }
     for (int lane = 0; lane < VI_LANES; ++lane) {
         vi_lane_idle(work, lane);
     }

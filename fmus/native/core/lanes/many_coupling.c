@@ -11,7 +11,8 @@ static const double LARGEST_SIZE = 10.0;
 struct vi_lane_coupling {
     int own, coupled, mode[VI_LANES_MODES]; /* modes that no damping couples, by number, then the others */
     bool across[VI_TERMS]; /* the term of a real rate has an imaginary vector: its real mode is the part's imaginary part */
-    vi_pressed_body body;  /* of the others */
+    vi_pressed_body body, found; /* of the others; the body whose terms are known */
+    bool is_known, has_terms;    /* whether `found` is set; whether it has terms that lanes take */
     vi_pressed_modes terms;
     vi_coupled_work work;
 };
@@ -61,14 +62,10 @@ static bool fill_body(struct vi_lane_coupling *c, int modes, const vi_lanes_poin
     return good;
 }
 
-bool vi_lane_couple(struct vi_lane_coupling *c, int modes, const vi_lanes_points *points, int64_t point)
+/* Find the terms of the coupled modes; false where lanes cannot take them. */
+static bool find_terms(struct vi_lane_coupling *c)
 {
-    order_modes(c, modes, points, point);
-    c->terms.modes = c->terms.terms = 0;
-    if (c->coupled == 0) {
-        return true;
-    }
-    if (!fill_body(c, modes, points, point) || !vi_coupled_modes_find(&c->terms, &c->body, &c->work)
+    if (!vi_coupled_modes_find(&c->terms, &c->body, &c->work)
         || vi_coupled_modes_size(&c->terms, &c->body) > LARGEST_SIZE) {
         return false;
     }
@@ -81,6 +78,26 @@ bool vi_lane_couple(struct vi_lane_coupling *c, int modes, const vi_lanes_points
         c->across[m] = c->terms.rate[m].im == 0.0 && im > re;
     }
     return true;
+}
+
+bool vi_lane_couple(struct vi_lane_coupling *c, int modes, const vi_lanes_points *points, int64_t point)
+{
+    order_modes(c, modes, points, point);
+    if (c->coupled == 0) {
+        c->terms.modes = c->terms.terms = 0;
+        c->is_known = false;
+        return true;
+    }
+    if (!fill_body(c, modes, points, point)) {
+        return false;
+    }
+    /* a sweep of the force or of a stop has one body at all points */
+    if (!c->is_known || memcmp(&c->body, &c->found, sizeof c->body) != 0) {
+        memcpy(&c->found, &c->body, sizeof c->found);
+        c->is_known = true;
+        c->has_terms = find_terms(c);
+    }
+    return c->has_terms;
 }
 
 int vi_lane_own_mode(const struct vi_lane_coupling *c, int j)
