@@ -9,7 +9,7 @@ from pathlib import Path
 
 from support.places import EXAMPLES
 
-from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.running.opening import DEFAULT_RUNNER
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -51,7 +51,7 @@ def _run(text: str, path: Path) -> str | None:
     try:
         scene = parse_scene(text, str(path))
         _run_first(scene)
-    except (SceneError, ComponentError) as error:
+    except (SceneError, ComponentError, UsageError) as error:  # a replay whose recording is not named, too
         return str(error)
     return None
 
