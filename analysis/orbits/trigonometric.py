@@ -11,16 +11,13 @@ from vibroimpact.fmus.bodies.impacting_body import Floats
 
 TURN = 2.0 * np.pi
 SPLITS = 30
-"""Halvings of a turn over the highest order after which a part with an undecided zero is left as it is."""
+"""Largest number of halvings of a part; rounding is reached before."""
 MOST_PARTS = 1_000_000
-"""Number of parts of a turn above which the sum counts as zero throughout."""
+"""Number of undecided parts above which they are not halved: zeros of so high a multiplicity hardly have a place."""
 BISECTIONS = 54
+EXTREMUM_STEPS = 4
 ROUNDING = 8.0 * np.finfo(float).eps
 """Rounding of a sum, over the sum of its amplitudes times one plus their phase's size."""
-
-
-class ZeroThroughoutError(ArithmeticError):
-    """A sum of sines is zero to rounding over a part of the turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +46,10 @@ class SumOfSines:
         return value, slope
 
     def zeros(self) -> list[float]:
-        """Return all zeros in [0, 2 pi), rad, ascending; two that rounding cannot separate count once.
+        """Return all zeros in [0, 2 pi), rad, ascending; none where the sum is zero throughout.
 
         A part of the turn has no zero if its middle is farther from zero than the derivatives allow. It has at most one
-        if the derivative keeps its sign. Other parts are halved.
-
-        Raises
-        ------
-        ZeroThroughoutError
-            The sum is zero to rounding over a part of the turn.
+        if the derivative keeps its sign. Other parts are halved. Two zeros that rounding cannot separate count once.
 
         Examples
         --------
@@ -73,29 +65,29 @@ class SumOfSines:
         steep = rounding * float(self.order.max())
         first = 4.0 * float(self.order.max())
         parts, place, found = first, np.arange(first), []
-        touching: list[Floats] = []
-        for split in range(SPLITS + 1):
+        for _ in range(SPLITS):
             half = 0.5 * TURN / parts
             value, slope = self.at((place + 0.5) * (TURN / parts))
             maybe = np.abs(value) <= half * np.abs(slope) + 0.5 * half**2 * bend + rounding
             monotonic = np.abs(slope) > half * bend + steep
             found += self._crossings(place[maybe & monotonic], parts)
             place = place[maybe & ~monotonic]
-            if split == SPLITS or 0.5 * half**2 * bend <= rounding:
-                touching.append(place)
+            if 0.5 * half**2 * bend <= rounding:
                 break
             place = np.concatenate([2.0 * place, 2.0 * place + 1.0])
             parts *= 2.0
             if place.size > MOST_PARTS:
-                raise ZeroThroughoutError("orbit: expected isolated zeros of a sum of sines, got a zero sum.")
-        found += self._touching(np.sort(np.concatenate(touching)), parts)
-        return sorted(found)
+                break
+        if place.size == parts:
+            return []
+        return sorted([*found, *self._touching(np.sort(place), parts)])
 
     def _crossings(self, place: Floats, parts: float) -> list[float]:
         """Return the zeros in parts where the sum is monotonic: those whose ends have different signs."""
         low, high = place * (TURN / parts), (place + 1.0) * (TURN / parts)
         rising = self.at(low)[0] < 0.0
-        crosses = rising != (self.at(high)[0] < 0.0)
+        # the end of the turn has the value of its start, so that a zero between two parts counts once
+        crosses = rising != (self.at(np.mod(place + 1.0, parts) * (TURN / parts))[0] < 0.0)
         low, high, rising = low[crosses], high[crosses], rising[crosses]
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
@@ -111,6 +103,17 @@ class SumOfSines:
         zeros = []
         for row in rows:
             if row.size:
-                middle = (row + 0.5) * (TURN / parts)
-                zeros.append(float(np.mod(middle[np.argmin(np.abs(self.at(middle)[0]))], TURN)))
+                low, high = row[0] * (TURN / parts), (row[-1] + 1.0) * (TURN / parts)
+                zeros.append(float(np.mod(self._extremum(0.5 * (low + high), low, high), TURN)))
         return zeros
+
+    def _extremum(self, phase: float, low: float, high: float) -> float:
+        """Return the extremum near a phase, within bounds, by Newton's method for the derivative."""
+        for _ in range(EXTREMUM_STEPS):
+            c, s = np.cos(self.order * phase), np.sin(self.order * phase)
+            slope = float((self.order * (self.sine * c - self.cosine * s)).sum())
+            bend = -float((self.order**2 * (self.cosine * c + self.sine * s)).sum())
+            if bend == 0.0:
+                break
+            phase = min(max(phase - slope / bend, low), high)
+        return phase

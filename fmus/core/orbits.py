@@ -168,7 +168,8 @@ class Evaluation:
     end : OrbitEnd
         The arrays are valid if `end` is `done`.
     velocities, distances : array, shape (impacts,)
-        Speeds towards the stops, relative to them, before the impacts, m/s; distances beyond the stops, m: 0 for an orbit.
+        Speeds towards the stops, relative to them, before the impacts, m/s; distances beyond the stops, m. The
+        distances of an orbit are 0.
     distance_slopes, velocity_slopes : array, shape (impacts, impacts)
         Derivatives over the phase of each impact (columns).
     """

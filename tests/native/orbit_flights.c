@@ -202,7 +202,7 @@ static void fly_coupled(const vi_orbit_body *body, const double state[], double 
     }
 }
 
-/* Fly mode j under sine k of the force from (x, v) at a phase of the clock for u seconds, on the core's exact flow. */
+/* Fly mode j under sine k of the force for u seconds from (x, v), on the core's exact flow. */
 static void fly_mode(const vi_orbit_body *body, int j, int k, double held, double phase, double u, double *x, double *v)
 {
     const double natural = body->natural[j], w = body->order[k] * body->angular_frequency;

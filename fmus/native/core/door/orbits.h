@@ -20,8 +20,8 @@
 VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train, double velocity[], double distance[],
                           double distance_slope[], double velocity_slope[]);
 
-/* Find the distance of one impact beyond its stop as a function of its phase: level + cosine cos(order phase) +
- * sine sin(order phase) over all sines, m. `train` has this impact at any phase. An orbit has distance 0. */
+/* Find the distance of one impact beyond its stop over its phase, m: level, and the sum of cosine cos(order phase) +
+ * sine sin(order phase). `train` has this impact at any phase. An orbit has distance 0. */
 VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, double *level, double cosine[],
                                double sine[]);
 
