@@ -84,7 +84,8 @@ class AssembledPoints(StructurePoints):
             replace(contact, motion=dict(self._sine(f"stop[{k}]")))
             for k, contact in enumerate(body.contacts, start=1)
         )
-        return replace(body, held=held, further=further, contacts=contacts)
+        base = numbers.get("forcing.base_acceleration", 0.0) * row_of(numbers, "mode.base", body.force.size)
+        return replace(body, force=body.force + base, held=held, further=further, contacts=contacts)
 
     @property
     def _count_of_sines(self) -> int:

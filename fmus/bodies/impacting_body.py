@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -47,6 +48,11 @@ class Contact:
     def mass(self) -> float:
         """Effective mass at the contact, kg: 1 / (shape . shape), equations.md 5.3."""
         return 1.0 / float(self.shape @ self.shape)
+
+    def stop_at(self, phase: float) -> float:
+        """Return the position of the stop at a phase of the clock, m."""
+        moved = sum((each * cmath.exp(1j * order * phase)).real for order, each in self.motion.items())
+        return self.position + moved
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,6 +71,14 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
     return found
 
 
+def phases_of_new_start(scene: Scene) -> dict[str, float]:
+    """Return the phases of the sines, by variable name, where time 0 is where the phase of the clock is 0."""
+    if not scene.has_several_forces:
+        return {"forcing.phase": 0.0}
+    floats = force_floats(scene, begins_anew=False)
+    return {name: value for name, value in floats.items() if name.endswith(".phase")}
+
+
 def _amplitude_of_clock(sine: Forcing) -> dict[str, float]:
     """Return the amplitude of the first sine; the FMU adds the motion of a base to its accelerations."""
     name = "forcing.base_acceleration" if sine.kind == "base_acceleration" else "forcing.amplitude"

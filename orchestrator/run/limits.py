@@ -47,7 +47,8 @@ LIMITS = {
         lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
     ),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
-    "forces": Limit(lanes=True, orbits="one sine, which orbits are periodic with"),
+    "forces": Limit(lanes=True),
+    "quasi-periodic": Limit(orbits="sines with a common period, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
     "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
@@ -86,6 +87,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("forcing", "forcing", "none")
     if scene.has_several_forces:
         yield Seen("forces", "forcing", forces_in_words(scene.forces))
+    if scene.clock is not None and not scene.clock.is_common:
+        yield Seen("quasi-periodic", "forcing", "sines without one")
     if not scene.stops:
         yield Seen("stop", "stop", "none")
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):

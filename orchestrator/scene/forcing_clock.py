@@ -54,13 +54,22 @@ def sines_of(forces: Sequence[Force | None]) -> list[Forcing]:
     return [force for force in forces if isinstance(force, Forcing)]
 
 
+def is_frequency(key: str) -> bool:
+    """Return whether a key of a scene is the frequency of a force.
+
+    >>> is_frequency("forcing[2].angular_frequency"), is_frequency("forcing.amplitude")
+    (True, False)
+    """
+    return key.startswith("forcing") and key.endswith("frequency")
+
+
 def sweeps_frequencies(axes: Sequence[SweepAxis]) -> bool:
     """Return whether a sweep varies the frequency of a force.
 
     >>> sweeps_frequencies([SweepAxis("forcing[2].frequency", (1.0, 2.0))])
     True
     """
-    return any(axis.key.startswith("forcing") and axis.key.endswith("frequency") for axis in axes)
+    return any(is_frequency(axis.key) for axis in axes)
 
 
 def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False) -> Clock | None:
