@@ -216,8 +216,9 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     modes = blocks.get("mode", blocks.get("mass"))
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
-    # the constant removes loops over modes from a body with only one
-    return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1}
+    # the constants remove loops over modes from a body with only one, and motions of stops that stand still
+    moves = any(variable.name.startswith("stop[") for variable in component.variables)
+    return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1, "VI_STOPS_MOVE": int(moves)}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
 #include "body_check.h"
@@ -24,7 +25,8 @@ static const vi_body *const_body_of(const void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power};
+    const vi_knots knots = form->knots != NULL ? form->knots((const char *)c - form->place) : (vi_knots){NULL, NULL, NULL};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power, knots};
 }
 
 static void defaults(void *self)
@@ -88,21 +90,34 @@ int vi_body_ports(const vi_body *c)
 
 /* ---- inputs ---- */
 
+/* Take changed motions of stops; false where one would cut into the body. */
+static bool move_stops(const void *self, vi_body *c)
+{
+    vi_stop_motion motion[VI_PORTS];
+    const vi_structure parts = vi_body_parts(c);
+    c->stop_refused = 0;
+    if (form->find_stops == NULL) {
+        return true;
+    }
+    form->find_stops(self, motion);
+    return vi_stop_motions_change(&parts, motion, &c->stop_refused);
+}
+
 static void drive(void *self, vi_body *c)
 {
-    double force[VI_MODES];
+    double force[VI_MODES] = {0.0};
     if (!c->forcing_changed) {
         return;
     }
     form->find_forcing(self, force);
     bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
-    for (int j = 0; j < vi_structure_modes(&c->model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         good = good && isfinite(force[j]);
     }
     if (good) {
         const vi_structure parts = vi_body_parts(c);
         vi_structure_drive(&parts, force, c->forcing_angular_frequency);
-        c->forcing_changed = 0;
+        c->forcing_changed = !move_stops(self, c);
     }
 }
 
@@ -115,7 +130,7 @@ static void take_impulses(vi_body *c)
 
 static void hold_inputs(void *self, vi_body *c)
 {
-    double held[VI_MODES], held_rate[VI_MODES];
+    double held[VI_MODES] = {0.0}, held_rate[VI_MODES] = {0.0};
     const vi_structure parts = vi_body_parts(c);
     form->find_inputs(self, held, held_rate);
     vi_structure_hold(&parts, held, held_rate);
@@ -177,7 +192,7 @@ static double base_acceleration(const vi_body *c, double amplitude)
 static void update_energies(vi_body *c)
 {
     c->energy_kinetic = c->energy_potential = 0.0;
-    for (int j = 0; j < c->model.modes; ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         const double p = c->state.p[j], stretch = c->natural[j] * c->state.q[j];
         c->energy_kinetic += 0.5 * p * p;
         c->energy_potential += 0.5 * stretch * stretch;
@@ -207,7 +222,7 @@ static void update_outputs(void *self)
 
 static double lowest_natural(const vi_body *c)
 {
-    for (int j = 0; j < c->model.modes; ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         if (c->natural[j] > 0.0) {
             return c->natural[j];
         }
@@ -236,8 +251,8 @@ static bool starts_free(vi_body *c, char *message)
     }
     const vi_contact *contact = &c->contacts[beyond - 1];
     vi_complain(message, "%s: expected a start on the free side of contact[%d] (%s %.17g), got %.17g there", form->start,
-                beyond, contact->side == VI_SIDE_UPPER ? "<=" : ">=", contact->position,
-                vi_structure_at(&c->model, c->model.shape[beyond - 1], c->state.q));
+                beyond, contact->side == VI_SIDE_UPPER ? "<=" : ">=", vi_structure_stop_position(&parts, beyond - 1),
+                vi_structure_at_body(&c->model, c->model.shape[beyond - 1], c->state.q));
     return false;
 }
 
@@ -247,15 +262,21 @@ static bool start(vi_body *c, double start_time, char *message)
         vi_contact_clear(&c->contacts[k]);
     }
     memset(c->state.status, 0, sizeof c->state.status); /* clears a start with other start values */
-    c->forcing_changed = 0;
+    c->forcing_changed = c->stop_refused = 0;
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
     vi_body_check_points(c, message);
     vi_instant now;
-    if (!start_clock(c, start_time, &now, message) || !starts_free(c, message) || message[0] != '\0') {
+    if (!start_clock(c, start_time, &now, message)) {
         return false;
     }
     const vi_structure parts = vi_body_parts(c);
+    c->state.held_since = now;
+    vi_stop_motions_count_by(&c->model);
+    vi_stop_motions_at(&parts, now);
+    if (!starts_free(c, message) || message[0] != '\0') {
+        return false;
+    }
     vi_structure_start(&parts, now);
     return true;
 }
@@ -312,6 +333,11 @@ static void check_drive(const void *self, const vi_body *c, char *message)
     if (c->forcing_changed) {
         form->check_forcing(self, message);
         vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
+        if (c->stop_refused > 0) {
+            vi_complain(message, "stop[%d]: expected a motion that leaves the point on the free side of contact[%d] now,"
+                                 " at %.17g s, got another", c->stop_refused, c->stop_refused,
+                        vi_clock_time(&c->model.clock, c->state.now));
+        }
     }
 }
 

@@ -23,7 +23,8 @@ typedef struct {
     double base_acceleration, base_acceleration_rate;
     int32_t record_energies;
     int32_t inputs_changed; /* an input was set since the engine got the inputs */
-    int32_t forcing_changed; /* a tunable parameter was set since; all of them belong to the forcing */
+    int32_t forcing_changed; /* a tunable parameter was set since, of the forcing or of a stop's motion */
+    int32_t stop_refused;    /* 0, or the contact (1-based) whose stop may not take its new place */
     /* outputs */
     double displacement, velocity, acceleration; /* of the observed point; absolute acceleration */
     double energy_kinetic, energy_potential;
@@ -66,6 +67,9 @@ typedef struct {
     void (*check_forcing)(const void *self, char message[VI_MESSAGE_LENGTH]);
     /* Amplitudes of the forcing's modal forces; a force of frequency 0 is constant. */
     void (*find_forcing)(const void *self, double force[VI_MODES]);
+    /* Motions of the stops; knots of their tables. Both are NULL for a body whose stops stand still. */
+    void (*find_stops)(const void *self, vi_stop_motion motion[VI_PORTS]);
+    vi_knots (*knots)(const void *self);
     /* Modal forces of the inputs, and their slopes. */
     void (*find_inputs)(const void *self, double held[VI_MODES], double held_rate[VI_MODES]);
     /* Adapt the modes to the present amplitudes, until the next step; NULL: modes do not depend on amplitudes. */

@@ -8,6 +8,9 @@
 #ifndef VI_PORTS
 #define VI_PORTS 8 /* contacts of a structure */
 #endif
+#ifndef VI_STOPS_MOVE
+#define VI_STOPS_MOVE 0 /* may stops move? Their motions are modes behind those of the bodies */
+#endif
 #ifndef VI_ONLY_MODES
 #define VI_ONLY_MODES 0 /* number of modes that all bodies have, known to the compiler; 0: any up to VI_MODES */
 #endif

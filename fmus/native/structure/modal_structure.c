@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/modal/stop_motion.h"
 #include "structure_file.h"
 #include "structure_variables.h"
 
@@ -180,6 +181,21 @@ static void check_shapes(const modal_structure *s, char *message)
     vi_check_each(message, vi_check_finite, "mode.force", s->force_shape, n);
 }
 
+static void check_stop(const modal_structure *s, int k, char *message)
+{
+    const vi_stop_motion *m = &s->stop[k];
+    const double w = m->angular_frequency;
+    const bool turns = w >= SLOWEST && w <= FASTEST;
+    if (!isfinite(m->velocity) || !isfinite(m->amplitude) || !isfinite(m->phase)) {
+        vi_complain(message, "stop[%d]: expected a finite velocity, amplitude and phase, got %.17g, %.17g and %.17g",
+                    k + 1, m->velocity, m->amplitude, m->phase);
+    }
+    if (!turns && (m->amplitude != 0.0 || w != 0.0)) {
+        vi_complain(message, "stop[%d].angular_frequency: expected %g to %g with an amplitude, got %.17g", k + 1, SLOWEST,
+                    FASTEST, w);
+    }
+}
+
 static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
 {
     const modal_structure *s = self;
@@ -192,6 +208,87 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
     const modal_structure *s = self;
     vi_check_finite(message, "forcing.amplitude", s->forcing_amplitude);
     vi_check_finite(message, "forcing.base_acceleration", s->forcing_base_acceleration);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        check_stop(s, k, message);
+    }
+}
+
+/* ---- moving stops ---- */
+
+static void check_table(const modal_structure *s, int k, char *message)
+{
+    const int64_t first = s->stop[k].first, count = s->stop[k].knots;
+    if (count == 0) {
+        return;
+    }
+    if (count < 2 || count > VI_TABLE_ROOM || first < 1 || first > VI_TABLE_ROOM + 1 - count) {
+        vi_complain(message, "stop[%d].table_count: expected 0, or 2 and more numbers within 1 to %d, got %lld from"
+                             " %lld on", k + 1, VI_TABLE_ROOM, (long long)count, (long long)first);
+        return;
+    }
+    for (int64_t i = first - 1; i < first - 1 + count; ++i) {
+        if (!isfinite(s->table_time[i]) || !isfinite(s->table_value[i])) {
+            vi_complain(message, "table.value[%lld]: expected finite numbers, got %.17g at %.17g s", (long long)i + 1,
+                        s->table_value[i], s->table_time[i]);
+            return;
+        }
+        if (i > first - 1 && !(s->table_time[i] > s->table_time[i - 1])) {
+            vi_complain(message, "table.time[%lld]: expected more than the time before, %.17g, got %.17g",
+                        (long long)i + 1, s->table_time[i - 1], s->table_time[i]);
+            return;
+        }
+    }
+}
+
+static void find_stops(const void *self, vi_stop_motion motion[VI_PORTS])
+{
+    const modal_structure *s = self;
+    memset(motion, 0, VI_PORTS * sizeof motion[0]);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (vi_contact_law_has_stop(s->body.contacts[k].law.law)) {
+            motion[k] = s->stop[k];
+            motion[k].first = motion[k].knots > 0 ? motion[k].first - 1 : 0;
+            motion[k].angular_frequency = motion[k].amplitude != 0.0 ? motion[k].angular_frequency : 0.0;
+            motion[k].phase = motion[k].amplitude != 0.0 ? motion[k].phase : 0.0;
+        }
+    }
+}
+
+static vi_knots knots(const void *self)
+{
+    const modal_structure *s = self;
+    return (vi_knots){s->table_time, s->table_value, s->table_curvature};
+}
+
+static void check_stops(const modal_structure *s, char *message)
+{
+    vi_stop_motion motion[VI_PORTS];
+    for (int k = 0; k < VI_PORTS; ++k) {
+        check_stop(s, k, message);
+        check_table(s, k, message);
+    }
+    find_stops(s, motion);
+    const int count = vi_stop_motions_count(motion, vi_body_ports(&s->body));
+    if (count > VI_MODES - (int)s->modes) {
+        vi_complain(message, "modes: expected at most %d beside %d motions of stops, each a mode, got %lld",
+                    VI_MODES - count, count, (long long)s->modes);
+    }
+}
+
+/* Put the motions of stops behind the modes. */
+static void prepare_stops(modal_structure *s)
+{
+    double room[VI_TABLE_ROOM];
+    vi_stop_motion motion[VI_PORTS];
+    find_stops(s, motion);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (motion[k].knots > 0) {
+            const int64_t first = motion[k].first;
+            vi_spline_prepare(s->table_time + first, s->table_value + first, (int)motion[k].knots,
+                              s->table_curvature + first, room);
+        }
+    }
+    vi_stop_motions_begin(&s->body.model, motion);
 }
 
 static bool parameters_are_good(const modal_structure *s, char *message)
@@ -213,6 +310,7 @@ static bool parameters_are_good(const modal_structure *s, char *message)
         vi_check_each(message, vi_check_not_negative, "mode.damping_ratio", s->damping_ratio, n);
     }
     check_shapes(s, message);
+    check_stops(s, message);
     check_forcing(s, message);
     vi_check_each(message, vi_check_finite, "mode.displacement_start", s->displacement_start, n);
     vi_check_each(message, vi_check_finite, "mode.velocity_start", s->velocity_start, n);
@@ -253,6 +351,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     double force[VI_MODES];
     find_forcing(s, force);
     model->modes = (int32_t)s->modes;
+    model->given_modes = 0;
     model->contacts = vi_body_ports(&s->body);
     s->body.record.further = model->further = (int32_t)s->further_points;
     model->coupled = s->coupled;
@@ -266,6 +365,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     for (int j = 0; j < model->modes; ++j) {
         vi_structure_mode(model, j, s->natural[j], ratio_of(s, j), force[j], s->body.forcing_angular_frequency);
     }
+    prepare_stops(s);
     return true;
 }
 
@@ -313,6 +413,8 @@ const vi_body_form vi_this_body = {
     .check_inputs = check_inputs,
     .check_forcing = check_forcing,
     .find_forcing = find_forcing,
+    .find_stops = find_stops,
+    .knots = knots,
     .find_inputs = find_inputs,
     .base_forcing = base_forcing,
     .update_outputs = update_outputs,

@@ -6,6 +6,9 @@
 
 #include "body.h"
 
+/* Most numbers of the tables, which lie behind each other. */
+enum { VI_TABLE_ROOM = 8192 };
+
 /* All variables and state of a Structure, described in variables.toml; copying the struct copies the Structure. The
  * model in `body` holds the shapes of contacts and observed point, and the damping matrix. */
 typedef struct {
@@ -19,6 +22,9 @@ typedef struct {
     double forcing[VI_MODES], base[VI_MODES], force_shape[VI_MODES];
     double displacement_start[VI_MODES], velocity_start[VI_MODES];
     double forcing_amplitude, forcing_base_acceleration;
+    vi_stop_motion stop[VI_PORTS]; /* `first` counts from 1 */
+    double table_time[VI_TABLE_ROOM], table_value[VI_TABLE_ROOM];
+    double table_curvature[VI_TABLE_ROOM]; /* of the splines of stops; derived at the start */
     /* inputs */
     double force, force_rate;
     vi_body body; /* last member: its record is saved as far as it is used, and nothing after it */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/stop_motion.h"
 
 /* ---- the model ---- */
 
@@ -47,11 +48,11 @@ void vi_structure_prepare(vi_structure_model *model)
     for (int k = 0; k < model->contacts; ++k) {
         for (int l = 0; l < model->contacts; ++l) {
             model->mobility[k][l] = twofold_dot(model, model->shape[k], model->impulse[l], &model->mobility_low[k][l]);
-            model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
+            model->compliance[k][l] = vi_structure_at_body(model, model->shape[k], model->shape[l]);
         }
     }
     for (int k = 0; k < model->contacts; ++k) {
-        model->at_observed[k] = memcmp(model->shape[k], model->observed, (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
+        model->at_observed[k] = memcmp(model->shape[k], model->observed, (size_t)vi_structure_free_modes(model) * sizeof(double)) == 0;
     }
     model->fastest = coupling_rate(model);
     for (int j = 0; j < vi_structure_modes(model); ++j) {
@@ -74,6 +75,7 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
     }
+    vi_stop_motions_count_by(s->model);
     state->rest.known = 0;
     state->budget.unfinished = 0;
     vi_structure_prepare(s->model);
@@ -136,7 +138,8 @@ double vi_structure_within(const vi_structure *s, double displacement)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
         const double sign = vi_structure_direction(s, k), stop = s->contacts[k].position;
-        if (s->model->at_observed[k] && sign * displacement > sign * stop && is_rigid(s, k)) {
+        if (s->model->at_observed[k] && sign * displacement > sign * stop && is_rigid(s, k)
+            && !vi_structure_stop_moves(s->model, k)) {
             displacement = stop;
         }
     }
@@ -148,7 +151,7 @@ double vi_structure_observed(const vi_structure *s)
     for (int k = 0; k < s->model->contacts; ++k) {
         const int32_t status = s->state->status[k];
         if (s->model->at_observed[k] && (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD)) {
-            return s->contacts[k].position;
+            return vi_structure_stop_position(s, k);
         }
     }
     return vi_structure_within(s, vi_structure_at(s->model, s->model->observed, s->state->q));
@@ -198,7 +201,7 @@ double vi_structure_most_acceleration(const vi_structure *s, int k)
 
 double vi_structure_kinetic(const vi_structure *s)
 {
-    return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);
+    return 0.5 * vi_structure_at_body(s->model, s->state->p, s->state->p);
 }
 
 int vi_structure_beyond(const vi_structure *s)
@@ -214,7 +217,12 @@ int vi_structure_beyond(const vi_structure *s)
 
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
 {
-    int on_stop[VI_PORTS];
+    int on_stop[VI_PORTS], pair[2];
+    if (vi_stop_motions_jam(s, pair)) {
+        vi_complain(message, "contact[%d] and contact[%d]: expected room between their moving stops, got none at %.17g s",
+                    pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
+        return;
+    }
     for (int k = 0; k < s->model->contacts; ++k) {
         on_stop[k] = s->state->status[k] != VI_CONTACT_FREE;
     }
@@ -241,8 +249,9 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
             continue;
         }
         const double push = vi_structure_direction(s, k) * contact->applied_force;
-        for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
+        for (int j = 0; j < vi_structure_free_modes(s->model) && push != 0.0; ++j) {
             state->held[j] -= s->model->shape[k][j] * push;
         }
     }
+    vi_stop_motions_at(s, state->now);
 }

@@ -209,7 +209,7 @@ static void add_powers(const vi_structure *s, const double p[], const double hel
     const vi_structure_model *model = s->model;
     const double cosine = cos(angle);
     double work = 0.0, loss = 0.0;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
         loss += p[j] * (model->coupled ? vi_structure_at(model, model->coupling[j], p) : 2.0 * mode->decay * p[j]);
@@ -257,6 +257,11 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
         vi_drift_at(drift, t, s->state->q, p, q);
         add_powers(s, p, held, t, angle + w * t, slope * weight);
         for (int k = 0; k < s->model->contacts; ++k) {
+            if (VI_STOPS_MOVE && s->state->status[k] >= VI_CONTACT_HELD) {
+                vi_polynomial_at(drift->force[k], r, value);
+                const double speed = vi_structure_stop_velocity(s, k, p) * vi_structure_direction(s, k);
+                s->state->energies.forcing_work -= slope * weight * value[0] * speed;
+            }
             if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
                 vi_polynomial_at(drift->force[k], r, value);
                 const double force = value[0];
@@ -273,7 +278,7 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
     const double cosine = cos(s->model->clock.angular_frequency * (s->state->now.rest + u)), zero[VI_MODES] = {0.0};
     double moved[VI_MODES], p[VI_MODES], work = 0.0, way = 0.0, undone = 0.0;
     vi_drift_at(drift, u, zero, p, moved);
-    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(s->model); ++j) {
         const double back = q[j] + moved[j] - s->state->q[j];
         work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
         way += fabs(moved[j]);

@@ -8,6 +8,7 @@
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
 #include "body/modal/modal_flight.h"
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/drift.h"
@@ -29,7 +30,13 @@ static const double SMALLEST = 1e-154;
 /* Length of one segment, s, and the kind of its end. */
 static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
-    return vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
+    const double length = vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
+    const double room = VI_STOPS_MOVE ? vi_stop_motions_room(s) : HUGE_VAL;
+    if (room < length) {
+        *end = VI_ENDS_ANYWHERE;
+        return room;
+    }
+    return length;
 }
 
 static double landing_room(const vi_structure *s)
@@ -86,6 +93,7 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     } else {
         state->now = after;
     }
+    vi_stop_motions_at(s, state->now);
 }
 
 /* ---- flight ---- */
@@ -302,6 +310,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
+    vi_stop_motions_at(s, now);
     s->model->asks = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_law *law = vi_law_of(s->contacts[k].law.law);
@@ -378,8 +387,12 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     } else if (coupled || !fly(s, target, request)) {
         return VI_STEP_NOT_FINITE;
     }
+    int pair[2];
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
+    }
+    if (VI_STOPS_MOVE && vi_stop_motions_jam(s, pair)) {
+        return VI_STEP_STANDSTILL;
     }
     vi_structure_settle(s, stops_here(s, target, request));
     return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
@@ -406,8 +419,10 @@ void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
         const int32_t status = s->state->status[k];
         const bool on_stop = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
         const double *shape = s->model->shape[k];
-        contact->displacement = on_stop ? contact->position : vi_structure_at(s->model, shape, s->state->q);
-        contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, shape, s->state->p);
+        contact->displacement = on_stop ? vi_structure_stop_position(s, k)
+                                        : vi_structure_at_body(s->model, shape, s->state->q);
+        contact->velocity = status == VI_CONTACT_HELD ? vi_structure_stop_velocity(s, k, s->state->p)
+                                                      : vi_structure_at_body(s->model, shape, s->state->p);
         contact->force = vi_max(0.0, force[k]);
         contact->open = vi_structure_is_open(s, k);
     }
