@@ -216,9 +216,10 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     modes = blocks.get("mode", blocks.get("mass"))
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
-    # the constants remove loops over modes from a body with only one, and motions of stops that stand still
+    # the constants remove loops over modes from a body with only one, further loads and moving stops from bodies without
+    constants = {"VI_ONLY_MODES": 0 if modes is not None else 1, "VI_SINES": blocks.get("sine", 0)}
     moves = any(variable.name.startswith("stop[") for variable in component.variables)
-    return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1, "VI_STOPS_MOVE": int(moves)}
+    return {**arrays, **constants, "VI_DEGREE": component.degree, "VI_STOPS_MOVE": int(moves)}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:

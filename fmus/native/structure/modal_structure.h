@@ -6,6 +6,11 @@
 
 #include "body.h"
 
+/* A force besides the forcing: a sine, or constant where the frequency is 0. */
+typedef struct {
+    double angular_frequency, amplitude, phase;
+    int32_t of_base; /* an acceleration of the base */
+} vi_structure_sine;
 /* Most numbers of the tables, which lie behind each other. */
 enum { VI_TABLE_ROOM = 8192 };
 
@@ -22,6 +27,9 @@ typedef struct {
     double forcing[VI_MODES], base[VI_MODES], force_shape[VI_MODES];
     double displacement_start[VI_MODES], velocity_start[VI_MODES];
     double forcing_amplitude, forcing_base_acceleration;
+    vi_structure_sine sine[VI_SINES_ROOM];
+    double sine_shape[VI_SINES_ROOM][VI_MODES];
+    int32_t sines_started, turns[VI_SINES_ROOM]; /* since the start: is a sine not constant? */
     vi_stop_motion stop[VI_PORTS]; /* `first` counts from 1 */
     double table_time[VI_TABLE_ROOM], table_value[VI_TABLE_ROOM];
     double table_curvature[VI_TABLE_ROOM]; /* of the splines of stops; derived at the start */

@@ -8,48 +8,6 @@
 #include "body/modal/structure/contact.h"
 #include "motion/majorant.h"
 
-static const double TWO_PI = 6.283185307179586232, TWO_PI_LOW = 2.449293598294706414e-16;
-
-/* ---- sines ---- */
-
-/* An angle less whole turns, rad. */
-static double reduced(double angle, double low)
-{
-    const double turns = rint(angle / TWO_PI);
-    return fma(-turns, TWO_PI, angle) + (low - turns * TWO_PI_LOW);
-}
-
-/* Angle of w t for a time to twice the digits, less whole turns, rad. */
-static double angle_after(double w, double time, double time_low)
-{
-    const double angle = w * time;
-    return reduced(angle, fma(w, time, -angle) + w * time_low);
-}
-
-/* Turns of a sine in a period of the clock, to twice the digits. */
-static void find_turns(vi_given_mode *given, const vi_clock *clock)
-{
-    const double w = given->motion.angular_frequency, whole = clock->angular_frequency;
-    if (whole > 0.0) {
-        given->turns = w / whole;
-        given->turns_low = fma(-given->turns, whole, w) / whole;
-    } else {
-        const double angle = w * clock->period; /* exact: the period is a power of two */
-        given->turns = angle / TWO_PI;
-        given->turns_low = (fma(-given->turns, TWO_PI, angle) - given->turns * TWO_PI_LOW) / TWO_PI;
-    }
-}
-
-/* Angle of a sine at an instant, rad. */
-static double angle_at(const vi_given_mode *given, const vi_clock *clock, vi_instant now)
-{
-    const double w = given->motion.angular_frequency, count = (double)now.periods, turns = count * given->turns;
-    const double low = fma(count, given->turns, -turns) + count * given->turns_low;
-    const double part = (turns - rint(turns)) + low;
-    const double start = given->motion.phase + given->motion.shift - angle_after(w, clock->origin, clock->origin_low);
-    return reduced(TWO_PI * part + angle_after(w, now.rest, now.rest_low) + start, 0.0);
-}
-
 /* ---- the modes of the motions ---- */
 
 static bool is_sine(const vi_stop_motion *m)
@@ -121,11 +79,21 @@ void vi_stop_motions_begin(vi_structure_model *model, const vi_stop_motion motio
     }
 }
 
+/* Count a sine by the clock. */
+static void count_by(vi_given_mode *given, const vi_clock *clock)
+{
+    const vi_stop_motion *m = &given->motion;
+    if (m->angular_frequency > 0.0) {
+        given->sine = vi_sine_start(clock, m->angular_frequency, m->phase + m->shift);
+    }
+}
+
 void vi_stop_motions_count_by(vi_structure_model *model)
 {
     const int first = vi_structure_free_modes(model);
     for (int j = first; j < vi_structure_modes(model); ++j) {
-        find_turns(&model->given[j - first], &model->clock);
+        vi_given_mode *given = &model->given[j - first];
+        count_by(given, &model->clock);
         vi_mode_drive(&model->mode[j], 0.0, model->clock.angular_frequency);
     }
 }
@@ -137,9 +105,10 @@ static vi_stop_course course_of(const vi_structure *s, const vi_given_mode *give
 {
     const vi_stop_motion *m = &given->motion;
     if (m->angular_frequency > 0.0) {
-        const double w = m->angular_frequency, angle = angle_at(given, &s->model->clock, now);
-        const double c = cos(angle), d = -w * sin(angle), square = w * w;
-        return (vi_stop_course){c, d, -square * c, -square * d};
+        const double w = m->angular_frequency, square = w * w;
+        const vi_phase phase = vi_sine_phase(&given->sine, now);
+        const double velocity = -w * phase.sine;
+        return (vi_stop_course){phase.cosine, velocity, -square * phase.cosine, -square * velocity};
     }
     double low;
     const double time = vi_clock_time_twofold(&s->model->clock, now, &low);
@@ -227,7 +196,7 @@ static bool overlap(const vi_structure *s, int i, int k)
 
 bool vi_stop_motions_jam(const vi_structure *s, int pair[2])
 {
-    for (int i = 0; i < s->model->contacts && s->model->given_modes > 0; ++i) {
+    for (int i = 0; i < s->model->contacts && vi_structure_stops_move(s->model); ++i) {
         for (int k = i + 1; k < s->model->contacts && s->model->stop[i] == VI_RIGID_STOP; ++k) {
             if (s->model->stop[k] == VI_RIGID_STOP && overlap(s, i, k)) {
                 pair[0] = i;
@@ -241,6 +210,14 @@ bool vi_stop_motions_jam(const vi_structure *s, int pair[2])
 
 /* ---- other motions ---- */
 
+/* The instant of time 0, which the phases are for. */
+static vi_instant time_zero(const vi_clock *clock)
+{
+    vi_instant zero = {0, 0.0, 0.0};
+    (void)vi_clock_instant(clock, 0.0, 0.0, &zero);
+    return zero;
+}
+
 /* The motion from now on: it goes on from its phase and its place where a frequency or a velocity changes. */
 static vi_stop_motion continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
 {
@@ -249,9 +226,12 @@ static vi_stop_motion continued(const vi_structure *s, const vi_stop_motion *was
     motion.shift = was->shift;
     motion.place = was->place;
     motion.since = was->since;
-    if (motion.angular_frequency != was->angular_frequency) {
-        motion.shift = reduced(was->shift + angle_after(was->angular_frequency, time, low)
-                                   - angle_after(motion.angular_frequency, time, low), 0.0);
+    if (motion.angular_frequency != was->angular_frequency && is_sine(was) && is_sine(&motion)) {
+        const vi_clock *clock = &s->model->clock;
+        const vi_sine sine = vi_sine_start(clock, was->angular_frequency, was->phase + was->shift);
+        const double angle = vi_sine_phase(&sine, s->state->now).angle + motion.phase - was->phase;
+        const vi_sine from = vi_sine_from(clock, motion.angular_frequency, s->state->now, angle);
+        motion.shift = vi_sine_phase(&from, time_zero(clock)).angle - motion.phase;
     }
     if (motion.velocity != was->velocity) {
         motion.place += was->velocity * ((time - was->since) + low);
@@ -266,7 +246,7 @@ static double displacement_by(const vi_structure *s, const vi_stop_motion *motio
     vi_given_mode sine = {.motion = *motion}, driven = {.motion = *motion};
     double sum = 0.0;
     if (is_sine(motion)) {
-        find_turns(&sine, &s->model->clock);
+        count_by(&sine, &s->model->clock);
         sum += motion->amplitude * course_of(s, &sine, s->state->now).displacement;
     }
     if (is_driven(motion)) {
