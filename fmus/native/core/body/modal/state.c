@@ -6,6 +6,9 @@
 #include "body/landing.h"
 #include "body/modal/stop_motion.h"
 
+/* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
+static const double LITTLE_ROOM = 1e-6;
+
 /* ---- the model ---- */
 
 void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
@@ -274,8 +277,8 @@ int vi_structure_beyond(const vi_structure *s)
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
 {
     int on_stop[VI_PORTS], pair[2];
-    if (vi_stop_motions_jam(s, pair)) {
-        vi_complain(message, "contact[%d] and contact[%d]: expected room between their moving stops, got none at %.17g s",
+    if (vi_stop_motions_jam(s, LITTLE_ROOM, pair)) {
+        vi_complain(message, "contact[%d] and contact[%d]: expected room between their stops, of which one moves, got none at %.17g s",
                     pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
         return;
     }

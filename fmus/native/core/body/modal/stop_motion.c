@@ -180,25 +180,30 @@ double vi_stop_motions_work(const vi_structure *s, const double impulse[])
 
 /* ---- stops that leave no room ---- */
 
-/* Do the stops of contacts i and k, on both sides of one point, touch or overlap? */
-static bool overlap(const vi_structure *s, int i, int k)
+/* Difference of the directions of two rows up to which they count as one line, relative to their sizes. */
+static const double PARALLEL = 16.0 * DBL_EPSILON;
+
+/* Room between the stops of contacts i and k, relative to their displacements, where they hold one line of a body from
+ * both sides; HUGE_VAL where they do not. */
+static double room_between(const vi_structure *s, int i, int k)
 {
     const vi_structure_model *model = s->model;
-    const size_t size = (size_t)vi_structure_free_modes(model) * sizeof(double);
-    if (s->contacts[i].side == s->contacts[k].side || memcmp(model->shape[i], model->shape[k], size) != 0
+    const double one = vi_structure_direction(s, i), other = vi_structure_direction(s, k);
+    const double size = sqrt(model->compliance[i][i] * model->compliance[k][k]);
+    if (!(one * other * model->compliance[i][k] <= -(1.0 - PARALLEL) * size)
         || !(vi_structure_stop_moves(model, i) || vi_structure_stop_moves(model, k))) {
-        return false;
+        return HUGE_VAL;
     }
-    const double one = vi_structure_stop_position(s, i), other = vi_structure_stop_position(s, k);
-    const double sizes = vi_structure_displacement_size(s, i) + vi_structure_displacement_size(s, k);
-    return vi_structure_direction(s, i) * (one - other) <= VI_ROUNDING * sizes;
+    const double first = sqrt(model->compliance[i][i]), second = sqrt(model->compliance[k][k]);
+    const double room = one * vi_structure_stop_position(s, i) / first + other * vi_structure_stop_position(s, k) / second;
+    return room / (vi_structure_displacement_size(s, i) / first + vi_structure_displacement_size(s, k) / second);
 }
 
-bool vi_stop_motions_jam(const vi_structure *s, int pair[2])
+bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2])
 {
     for (int i = 0; i < s->model->contacts && vi_structure_stops_move(s->model); ++i) {
         for (int k = i + 1; k < s->model->contacts && s->model->stop[i] == VI_RIGID_STOP; ++k) {
-            if (s->model->stop[k] == VI_RIGID_STOP && overlap(s, i, k)) {
+            if (s->model->stop[k] == VI_RIGID_STOP && room_between(s, i, k) <= least) {
                 pair[0] = i;
                 pair[1] = k;
                 return true;

@@ -32,8 +32,9 @@ void vi_stop_motions_at(const vi_structure *s, vi_instant now);
 /* Time for which the accelerations of the given motions have no kink, s. */
 double vi_stop_motions_room(const vi_structure *s);
 
-/* Do two rigid stops, of which one moves, leave no room at one point of a body? pair: their contacts. */
-bool vi_stop_motions_jam(const vi_structure *s, int pair[2]);
+/* Do two rigid stops, of which one moves, leave no more room between them than `least`, relative to the displacements?
+ * They are on both sides of one point of a body. pair: their contacts. */
+bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2]);
 
 /* Take changed motions from now on. Frequencies and velocities change the motion from its present phase and place on;
  * other changes move the stop at once. False, with the contact's number, where a rigid stop would cut a body. */

@@ -401,7 +401,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
-    if (VI_STOPS_MOVE && vi_stop_motions_jam(s, pair)) {
+    if (VI_STOPS_MOVE && vi_stop_motions_jam(s, VI_ROUNDING, pair)) {
         return VI_STEP_STANDSTILL;
     }
     vi_structure_settle(s, stops_here(s, target, request));
