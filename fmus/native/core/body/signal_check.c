@@ -107,8 +107,12 @@ static void check_random(char *message, const char *name, const vi_signal *s)
 
 void vi_check_signal(char message[VI_MESSAGE_LENGTH], const char *name, const vi_signal *s)
 {
-    vi_check_finite(message, name_of(name, "start").text, s->start);
+    if (s->kind != VI_NO_SIGNAL) {
+        vi_check_finite(message, name_of(name, "start").text, s->start);
+    }
     switch (s->kind) {
+    case VI_NO_SIGNAL:
+        break;
     case VI_CHIRP_LINEAR:
     case VI_CHIRP_LOGARITHMIC:
         check_chirp(message, name, s);
@@ -128,6 +132,6 @@ void vi_check_signal(char message[VI_MESSAGE_LENGTH], const char *name, const vi
         check_random(message, name, s);
         break;
     default:
-        vi_complain(message, "%s.kind: expected 1 to 8, got %d", name, (int)s->kind);
+        vi_complain(message, "%s.kind: expected 0 to 8, got %d", name, (int)s->kind);
     }
 }

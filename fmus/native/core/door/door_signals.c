@@ -22,7 +22,7 @@ VI_DOOR int vi_door_signal_start(vi_door_signal *memory, const vi_door_signal_se
 {
     const vi_door_signal_settings *from = settings;
     const int count = from->count >= 0 && from->count <= VI_TABLE_ROOM ? (int)from->count : VI_TABLE_ROOM + 1;
-    const vi_signal_kind kind = from->kind > 0 && from->kind <= VI_TABLE_CUBIC ? (vi_signal_kind)from->kind : 0;
+    const vi_signal_kind kind = vi_signal_kind_of(from->kind);
     memory->signal = (vi_signal){
         .kind = kind, .start = from->start, .duration = from->duration, .angular_frequency = from->angular_frequency,
         .end_angular_frequency = from->end_angular_frequency, .phase = from->phase, .rise = from->rise,

@@ -71,6 +71,10 @@ static void find_inside(vi_signal *s, vi_twofold since, double left, double reso
 
 void vi_signal_piece(vi_signal *s, vi_twofold time, vi_piece *piece)
 {
+    if (s->kind == VI_NO_SIGNAL) {
+        vi_piece_zero(piece, HUGE_VAL);
+        return;
+    }
     const double resolution = vi_piece_resolution(time);
     vi_twofold since = vi_twofold_difference(time, (vi_twofold){s->start, 0.0});
     if (s->kind == VI_TABLE_LINEAR || s->kind == VI_TABLE_CUBIC) {

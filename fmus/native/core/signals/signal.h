@@ -15,6 +15,7 @@
 #include "signals/transform.h"
 
 typedef enum {
+    VI_NO_SIGNAL = 0, /* 0 at all times */
     VI_CHIRP_LINEAR = 1,
     VI_CHIRP_LOGARITHMIC = 2,
     VI_HALF_SINE = 3,
@@ -24,6 +25,12 @@ typedef enum {
     VI_RANDOM = 7,
     VI_TABLE_CUBIC = 8
 } vi_signal_kind;
+
+/* The kind of a number from outside; an unknown number is that of no kind. */
+static inline vi_signal_kind vi_signal_kind_of(int64_t number)
+{
+    return (vi_signal_kind)(number >= VI_NO_SIGNAL && number <= VI_TABLE_CUBIC ? number : VI_TABLE_CUBIC + 1);
+}
 
 /* Most instants of a pulse. */
 enum { VI_PULSE_POINTS = 4 };
