@@ -27,6 +27,9 @@ static void defaults(void *self)
             s->body.model.shape[k][j] = 1.0;
         }
     }
+    for (int k = 0; k < VI_SIGNALS; ++k) {
+        s->signals.signal[k].table_start = 1;
+    }
 }
 
 static void sized(void *self, const char *block, int count)
@@ -235,6 +238,7 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
                         s->turns[k] ? "> 0" : "0", w);
         }
     }
+    vi_structure_check_amplitudes(&s->signals, message);
     for (int k = 0; k < VI_PORTS; ++k) {
         check_stop(s, k, message);
     }
@@ -254,14 +258,14 @@ static void check_table(const modal_structure *s, int k, char *message)
         return;
     }
     for (int64_t i = first - 1; i < first - 1 + count; ++i) {
-        if (!isfinite(s->table_time[i]) || !isfinite(s->table_value[i])) {
+        if (!isfinite(s->signals.time[i]) || !isfinite(s->signals.value[i])) {
             vi_complain(message, "table.value[%lld]: expected finite numbers, got %.17g at %.17g s", (long long)i + 1,
-                        s->table_value[i], s->table_time[i]);
+                        s->signals.value[i], s->signals.time[i]);
             return;
         }
-        if (i > first - 1 && !(s->table_time[i] > s->table_time[i - 1])) {
+        if (i > first - 1 && !(s->signals.time[i] > s->signals.time[i - 1])) {
             vi_complain(message, "table.time[%lld]: expected more than the time before, %.17g, got %.17g",
-                        (long long)i + 1, s->table_time[i - 1], s->table_time[i]);
+                        (long long)i + 1, s->signals.time[i - 1], s->signals.time[i]);
             return;
         }
     }
@@ -281,10 +285,10 @@ static void find_stops(const void *self, vi_stop_motion motion[VI_PORTS])
     }
 }
 
-static vi_knots knots(const void *self)
+static vi_table tables(const void *self)
 {
     const modal_structure *s = self;
-    return (vi_knots){s->table_time, s->table_value, s->table_curvature};
+    return (vi_table){VI_TABLE_ROOM, s->signals.time, s->signals.value, s->stop_bend};
 }
 
 static void check_stops(const modal_structure *s, char *message)
@@ -305,14 +309,12 @@ static void check_stops(const modal_structure *s, char *message)
 /* Put the motions of stops behind the modes. */
 static void prepare_stops(modal_structure *s)
 {
-    double room[VI_TABLE_ROOM];
     vi_stop_motion motion[VI_PORTS];
     find_stops(s, motion);
     for (int k = 0; k < VI_PORTS; ++k) {
         if (motion[k].knots > 0) {
             const int64_t first = motion[k].first;
-            vi_spline_prepare(s->table_time + first, s->table_value + first, (int)motion[k].knots,
-                              s->table_curvature + first, room);
+            vi_table_bend((int)motion[k].knots, s->signals.time + first, s->signals.value + first, s->stop_bend + first);
         }
     }
     vi_stop_motions_begin(&s->body.model, motion);
@@ -339,6 +341,7 @@ static bool parameters_are_good(const modal_structure *s, char *message)
     check_shapes(s, message);
     check_stops(s, message);
     check_forcing(s, message);
+    vi_structure_check_signals(&s->signals, n, message);
     vi_check_each(message, vi_check_finite, "mode.displacement_start", s->displacement_start, n);
     vi_check_each(message, vi_check_finite, "mode.velocity_start", s->velocity_start, n);
     vi_body_check(&s->body, message);
@@ -400,6 +403,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     vi_structure_model *model = &s->body.model;
     vi_structure_state *state = &s->body.state;
     double force[VI_MODES];
+    s->body.signals_key = vi_structure_signals_key(&s->signals);
     find_forcing(s, force);
     model->modes = (int32_t)s->modes;
     model->given_modes = 0;
@@ -422,6 +426,11 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
 
 /* ---- loads and outputs ---- */
 
+static void make_signals(void *self, vi_signal_loads *signals)
+{
+    vi_structure_make_signals(&((const modal_structure *)self)->signals, signals);
+}
+
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {
     const modal_structure *s = self;
@@ -438,10 +447,10 @@ static void find_inputs(const void *self, double held[VI_MODES], double held_rat
     }
 }
 
-static double base_further(const void *self, const vi_phase further[])
+static double base_further(const void *self, const vi_phase further[], const double signal_value[])
 {
     const modal_structure *s = self;
-    double sum = 0.0;
+    double sum = vi_structure_base_of_signals(&s->signals, signal_value);
     int count = 0;
     for (int k = 0; k < VI_SINES; ++k) {
         const vi_structure_sine *sine = &s->sine[k];
@@ -485,11 +494,12 @@ const vi_body_form vi_this_body = {
     .check_forcing = check_forcing,
     .find_forcing = find_forcing,
     .find_stops = find_stops,
-    .knots = knots,
+    .tables = tables,
     .find_inputs = find_inputs,
     .base_forcing = base_forcing,
     .drive_further = drive_further,
     .base_further = base_further,
+    .make_signals = make_signals,
     .update_outputs = update_outputs,
     .show_states = show_states,
 };

@@ -110,10 +110,10 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
 
 double vi_clock_time_twofold(const vi_clock *clock, vi_instant instant, double *low)
 {
-    double rest;
-    const double high = seconds_since(clock, instant, clock->origin, clock->origin_low, &rest), sum = high + rest;
-    *low = rest - (sum - high);
-    return sum;
+    double rounding;
+    const double sum = seconds_since(clock, instant, clock->origin, clock->origin_low, &rounding), high = sum + rounding;
+    *low = rounding - (high - sum);
+    return high;
 }
 
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)

@@ -79,7 +79,10 @@ static double start_further(vi_point *point, const vi_flight *flight, const doub
 
 void vi_point_start(vi_point *point, const vi_flight *flight, const double shape[], double sign, double clearance)
 {
-    *point = (vi_point){.shape = shape, .sign = sign, .scale = fabs(clearance)};
+    point->shape = shape;
+    point->sign = sign;
+    point->scale = fabs(clearance);
+    point->cosine = point->sine = point->level = point->level_rate = point->higher_snap = 0.0;
     double start = 0.0;
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
@@ -107,7 +110,9 @@ void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
     instant->u = u;
     instant->cosine = u == 0.0 ? flight->drive.phase.cosine : cos(angle);
     instant->sine = u == 0.0 ? flight->drive.phase.sine : sin(angle);
-    vi_flight_further(flight, u, instant->further);
+    if (flight->sines > 0) {
+        vi_flight_further(flight, u, instant->further);
+    }
     const int modes = vi_structure_modes(flight->model);
     int j = flight->series && u > 0.0 ? vi_series_parts(flight->segment, modes, u, instant->part) : 0;
     for (; j < modes; ++j) {
@@ -224,8 +229,11 @@ void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instan
     const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment * THIRD;
     const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn * SIXTH);
     const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
+    const bool is_more = flight->sines > 0 || vi_flight_degree(flight) > 1;
     vi_phase further[VI_SINES_ROOM];
-    vi_flight_further(flight, instant->u + moment, further);
+    if (is_more) {
+        vi_flight_further(flight, instant->u + moment, further);
+    }
     *phase = (vi_phase){flight->drive.phase.angle + w * (instant->u + moment), c, s};
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
@@ -240,6 +248,8 @@ void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instan
         q[j] += (mode->steady_cos * c + mode->steady_sin * s)
                 + (segment->level + segment->level_rate * (instant->u + moment));
         p[j] += w * (mode->steady_sin * c - mode->steady_cos * s) + segment->level_rate;
-        vi_segment_add_further(segment, instant->u + moment, further, &q[j], &p[j]);
+        if (is_more) {
+            vi_segment_add_further(segment, instant->u + moment, further, &q[j], &p[j]);
+        }
     }
 }

@@ -100,6 +100,27 @@ void vi_stop_motions_count_by(vi_structure_model *model)
 
 /* ---- the motions in time ---- */
 
+/* The spline of a table about an instant. Before the first instant and from the last one on it is a straight line. */
+static void look_up(const vi_structure *s, const vi_stop_motion *m, vi_twofold time, vi_piece *piece)
+{
+    const int first = (int)m->first, count = (int)m->knots, last = first + count - 1;
+    const vi_table *all = &s->tables;
+    const vi_table table = {count, all->time + first, all->value + first, all->bend + first};
+    const double resolution = vi_piece_resolution(time);
+    const double before = (all->time[first] - time.high) - time.low, left = (all->time[last] - time.high) - time.low;
+    if (before <= resolution && left > resolution) {
+        vi_table_piece(&table, time, resolution, piece);
+        return;
+    }
+    const int end = before > resolution ? first : last;
+    vi_table_piece(&table, (vi_twofold){all->time[end == first ? first : last - 1], 0.0}, 0.0, piece);
+    vi_piece_shift(piece, end == first ? 0.0 : all->time[last] - all->time[last - 1]);
+    *piece = (vi_piece){.degree = 1,
+                        .length = end == first ? before : HUGE_VAL,
+                        .coefficient = {all->value[end], piece->coefficient[1]}};
+    vi_piece_shift(piece, (time.high - all->time[end]) + time.low);
+}
+
 /* The course of a mode, for the amplitude 1 of a sine. */
 static vi_stop_course course_of(const vi_structure *s, const vi_given_mode *given, vi_instant now)
 {
@@ -112,12 +133,12 @@ static vi_stop_course course_of(const vi_structure *s, const vi_given_mode *give
     }
     double low;
     const double time = vi_clock_time_twofold(&s->model->clock, now, &low);
-    vi_spline_point p = {0.0, 0.0, 0.0, 0.0, HUGE_VAL};
+    vi_piece piece = {.degree = 0};
     if (m->knots > 0) {
-        p = vi_spline_at(&s->knots, (int)m->first, (int)m->knots, time, low);
+        look_up(s, m, (vi_twofold){time, low}, &piece);
     }
-    const double along = m->place + m->velocity * ((time - m->since) + low);
-    return (vi_stop_course){along + p.value, m->velocity + p.rate, p.curvature, p.jerk};
+    const double along = m->place + m->velocity * ((time - m->since) + low), *c = piece.coefficient;
+    return (vi_stop_course){along + c[0], m->velocity + c[1], 2.0 * c[2], 6.0 * c[3]};
 }
 
 void vi_stop_motions_at(const vi_structure *s, vi_instant now)
@@ -140,11 +161,13 @@ double vi_stop_motions_room(const vi_structure *s)
 {
     const int first = vi_structure_free_modes(s->model);
     double room = HUGE_VAL, low;
+    vi_piece piece;
     for (int j = first; j < vi_structure_modes(s->model); ++j) {
         const vi_stop_motion *m = &s->model->given[j - first].motion;
         if (m->knots > 0) {
             const double time = vi_clock_time_twofold(&s->model->clock, s->state->now, &low);
-            room = vi_min(room, vi_spline_at(&s->knots, (int)m->first, (int)m->knots, time, low).left);
+            look_up(s, m, (vi_twofold){time, low}, &piece);
+            room = vi_min(room, piece.length);
         }
     }
     return room;

@@ -7,6 +7,7 @@
 #include "body/landing.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/loads.h"
 #include "body/modal/modal_flight.h"
 #include "body/modal/stop_motion.h"
 #include "body/modal/structure/arrival.h"
@@ -94,7 +95,7 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     } else {
         state->now = after;
     }
-    vi_stop_motions_at(s, state->now);
+    vi_structure_load(s);
 }
 
 /* ---- flight ---- */
@@ -102,7 +103,9 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 /* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    return !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
+    const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
+    return lasts && !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods
+           && !s->state->follow_energies;
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -316,7 +319,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.further_at.periods = INT64_MAX; /* no phase is known */
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
-    fresh.now = fresh.held_since = now;
+    fresh.now = fresh.held_since = fresh.input_since = now;
     fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
