@@ -27,7 +27,8 @@ def structure_file(arrays: Mapping[str, Any], *, coupled: bool = False) -> bytes
     """Return the content of the file for the arrays of a Structure, by variable name.
 
     `mode.angular_frequency` has one number for each mode, N; `mode.contact_shape` has shape (contacts, N),
-    `mode.sine` (sines, N) and `mode.damping` (N, N). Absent arrays are zeros. Raise UsageError for an array of another shape or an unknown name.
+    `mode.sine` (sines, N) and `mode.damping` (N, N). Absent arrays are zeros. Raise UsageError for an array of another
+    shape or an unknown name.
     """
     natural = np.asarray(arrays["mode.angular_frequency"], dtype=np.float64)
     modes = natural.size

@@ -85,7 +85,7 @@ class Forcing(ForcingTable):
 
     signal: Annotated[
         Literal["sine"],
-        Rule(doc='`"sine"`: amplitude cos(angular_frequency t + phase); `"constant"`: amplitude'),
+        Rule(doc='`"sine"`: amplitude cos(angular_frequency t + phase)'),
     ] = "sine"
     angular_frequency_given: Annotated[
         NotNegative | None,
@@ -123,7 +123,7 @@ class Forcing(ForcingTable):
 class ConstantForcing(ForcingTable):
     """`[[forcing]]` with `signal = "constant"`: a force that does not change, such as a weight."""
 
-    signal: Annotated[Literal["constant"], Rule()]
+    signal: Annotated[Literal["constant"], Rule(doc='`"constant"`: amplitude at all times, such as a weight')]
 
 
 Force = Forcing | ConstantForcing

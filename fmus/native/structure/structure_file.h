@@ -1,7 +1,7 @@
 /* The modes of a structure in the file structure.bin of an FMU's resources, which a tool without arrays cannot set.
  *
- * Little-endian: the eight letters VISTRUC2, then as int64 the number of modes, of contacts, of sines, and 1 or 0: does the
- * damping couple the modes? Then as float64 the arrays of variables.toml in their order, for these modes, contacts and sines only.
+ * Little-endian: the eight letters VISTRUC2, then as int64 the numbers of modes, contacts and sines, and 1 or 0: does the damping
+ * couple the modes? Then as float64 the arrays of variables.toml in their order, for these modes, contacts and sines only.
  */
 #ifndef VIBROIMPACT_STRUCTURE_FILE_H
 #define VIBROIMPACT_STRUCTURE_FILE_H

@@ -466,7 +466,9 @@ void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, const v
          + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
     *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v
          + w * (mode->steady_sin * c - mode->steady_cos * sn) + segment->level_rate;
-    vi_segment_add_further(segment, u, further, x, v);
+    if (vi_mode_sines(mode) > 0 || vi_segment_degree(segment) > 1) {
+        vi_segment_add_further(segment, u, further, x, v);
+    }
 }
 
 void vi_segment_add_further(const vi_segment *segment, double u, const vi_phase further[], double *x, double *v)

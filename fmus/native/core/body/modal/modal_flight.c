@@ -79,7 +79,10 @@ static double start_further(vi_point *point, const vi_flight *flight, const doub
 
 void vi_point_start(vi_point *point, const vi_flight *flight, const double shape[], double sign, double clearance)
 {
-    *point = (vi_point){.shape = shape, .sign = sign, .scale = fabs(clearance)};
+    point->shape = shape;
+    point->sign = sign;
+    point->scale = fabs(clearance);
+    point->cosine = point->sine = point->level = point->level_rate = point->higher_snap = 0.0;
     double start = 0.0;
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
@@ -107,7 +110,9 @@ void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
     instant->u = u;
     instant->cosine = u == 0.0 ? flight->drive.phase.cosine : cos(angle);
     instant->sine = u == 0.0 ? flight->drive.phase.sine : sin(angle);
-    vi_flight_further(flight, u, instant->further);
+    if (flight->sines > 0) {
+        vi_flight_further(flight, u, instant->further);
+    }
     const int modes = vi_structure_modes(flight->model);
     int j = flight->series && u > 0.0 ? vi_series_parts(flight->segment, modes, u, instant->part) : 0;
     for (; j < modes; ++j) {
@@ -179,10 +184,12 @@ double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_fl
     vi_part sum[VI_MODES + 1], so_far = particular(point, flight, instant); /* with the first modes */
     double ripple[VI_MODES];
     vi_part_keep(&sum[0], &so_far);
-    for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+        /* given motions first: modes are left out from the last on */
+        const int j = VI_STOPS_MOVE ? (i + vi_structure_free_modes(flight->model)) % n : i;
         vi_part_add(&so_far, point->shape[j], &instant->part[j]);
-        vi_part_keep(&sum[j + 1], &so_far);
-        ripple[j] = fabs(point->shape[j]) * instant->part[j].reach;
+        vi_part_keep(&sum[i + 1], &so_far);
+        ripple[i] = fabs(point->shape[j]) * instant->part[j].reach;
     }
     return vi_rippling_step(sum, ripple, n, point->offset, point->sign, horizon);
 }
@@ -222,8 +229,11 @@ void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instan
     const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment * THIRD;
     const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn * SIXTH);
     const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
+    const bool is_more = flight->sines > 0 || vi_flight_degree(flight) > 1;
     vi_phase further[VI_SINES_ROOM];
-    vi_flight_further(flight, instant->u + moment, further);
+    if (is_more) {
+        vi_flight_further(flight, instant->u + moment, further);
+    }
     *phase = (vi_phase){flight->drive.phase.angle + w * (instant->u + moment), c, s};
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
@@ -238,6 +248,8 @@ void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instan
         q[j] += (mode->steady_cos * c + mode->steady_sin * s)
                 + (segment->level + segment->level_rate * (instant->u + moment));
         p[j] += w * (mode->steady_sin * c - mode->steady_cos * s) + segment->level_rate;
-        vi_segment_add_further(segment, instant->u + moment, further, &q[j], &p[j]);
+        if (is_more) {
+            vi_segment_add_further(segment, instant->u + moment, further, &q[j], &p[j]);
+        }
     }
 }
