@@ -264,7 +264,7 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     ------
     UsageError
         An impact of the orbit has no speed: at a graze no energy is exchanged. Or a constant force acts on a mode
-        without a spring.
+        without a spring, several sines act, or a stop moves.
 
     Examples
     --------
@@ -278,6 +278,10 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     """
     if not (orbit.velocities > 0.0).all():
         raise UsageError(f"energies: {orbit.name}: expected impacts with a speed, got a graze.")
+    if not orbit.body.has_one_sine:
+        raise UsageError(
+            f"energies: {orbit.name}: expected one sine and stops that do not move, got several sines or a moving stop."
+        )
     if orbit.body.held[: orbit.body.loose].any():
         raise UsageError(
             f"energies: {orbit.name}: expected no constant force on bodies without a spring, got one."

@@ -43,7 +43,7 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
     Raises
     ------
     OrbitError
-        The orbit has several impacts, or the body several modes.
+        The orbit has several impacts, or the body several modes or sines, or a moving stop.
     """
     from scipy.linalg import expm
 
@@ -51,6 +51,10 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
     if orbit.phases.size != 1 or body.frequencies.size != 1:
         raise OrbitError(
             f"control: expected an orbit of one impact and one mode, got {orbit.name} of {body.frequencies.size}."
+        )
+    if not body.has_one_sine:
+        raise OrbitError(
+            "control: expected one sine and stops that do not move, got several sines or a moving stop."
         )
     contact = body.contacts[int(orbit.contacts[0])]
     natural, decay = float(body.frequencies[0]), float(body.damping_ratios[0] * body.frequencies[0])

@@ -75,7 +75,7 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
     Raises
     ------
     OrbitError
-        The body has several modes or stops.
+        The body has several modes, stops or sines, or a moving stop.
     """
     natural, decay, toward = one_mode(body)
     contact, w = body.contacts[0], body.angular_frequency

@@ -117,7 +117,7 @@ def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
     Raises
     ------
     OrbitError
-        The body has several modes or stops, rests on its stop, or its map is void.
+        The body has several modes, stops or sines, rests on its stop, or its map is void.
     """
     from scipy.linalg import expm
 
@@ -144,6 +144,10 @@ def one_mode(body: ImpactingBody) -> tuple[float, float, float]:
     if body.frequencies.size != 1 or len(body.contacts) != 1:
         raise OrbitError(
             f"maps: expected a body of one mode and one stop, got {body.frequencies.size} and {len(body.contacts)}."
+        )
+    if not body.has_one_sine:
+        raise OrbitError(
+            "maps: expected one sine and stops that do not move, got several sines or a moving stop."
         )
     if body.loose:
         raise OrbitError("maps: expected a body on a spring, got one without.")

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.trigonometric import TURN, SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
-TURN = 2.0 * np.pi
 MOST_STEPS = 60
 """Number of Newton steps after which the search for an orbit fails."""
 MOST_HALVINGS = 12
@@ -46,7 +46,7 @@ class PeriodicOrbit:
     contacts : array of int, shape (p,)
         Contact of each impact, from 0.
     velocities : array, shape (p,)
-        Speeds towards the stops before the impacts, m/s.
+        Speeds towards the stops, relative to them, before the impacts, m/s.
     """
 
     body: ImpactingBody
@@ -187,27 +187,32 @@ def least_speed(body: ImpactingBody) -> float:
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
     """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them."""
     found = body.kernel.evaluate(contacts, phases, periods)
-    if found.end is OrbitEnd.resonant:
+    _refuse_end(found.end, phases)
+    return found
+
+
+def _refuse_end(end: OrbitEnd, phases: Floats) -> None:
+    """Raise OrbitError where no motion has impacts at these phases."""
+    if end is OrbitEnd.resonant:
         raise OrbitError(
             "orbit: expected modes that answer force and impacts within bounds, got an undamped one in resonance."
         )
-    if found.end is OrbitEnd.singular:
+    if end is OrbitEnd.singular:
         raise OrbitError("orbit: expected an orbit that is isolated, got a family: the body loses no energy.")
-    if found.end is OrbitEnd.critical:
+    if end is OrbitEnd.critical:
         raise OrbitError(
             "orbit: expected coupled modes away from critical damping, or slower than 1e5 times the force, got others. "
             "Change a dashpot by a thousandth."
         )
-    if found.end is OrbitEnd.adrift:
+    if end is OrbitEnd.adrift:
         raise OrbitError(
             "orbit: expected impacts that place each body without a spring, got a body that could be anywhere. "
             "Tie it to the ground, or let it hit a body or a stop that is tied."
         )
-    if found.end is not OrbitEnd.done:
+    if end is not OrbitEnd.done:
         raise OrbitError(
             f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}."
         )
-    return found
 
 
 def find_orbit(
@@ -296,7 +301,8 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
 def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
     """Return all orbits P(1,q) of a contact, physical or not, the fastest first: equations.md 4.3, any number of modes.
 
-    The distance from the stop at the impact is a + b cos(phase) + c sin(phase), so there are at most two orbits.
+    The distance from the stop at the impact is a sum of sines of the phase. One sine has at most two zeros; all zeros
+    of several sines are found.
 
     Raises
     ------
@@ -304,6 +310,17 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
         An undamped mode gives infinitely many orbits.
     """
     hit = np.array([contact], dtype=np.int32)
+    phases = _phases_of_one_sine if body.has_one_sine else _phases_of_sines
+    orbits = []
+    for phase in phases(body, hit, periods):
+        velocity = evaluated(body, hit, np.array([phase]), periods).velocities
+        if velocity[0] > least_speed(body):
+            orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
+    return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _phases_of_one_sine(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
+    """Return the phases with distance 0, from three distances: a + b cos(phase) + c sin(phase)."""
     at = [
         evaluated(body, hit, np.array([phase]), periods).distances[0] for phase in (0.0, 0.5 * np.pi, np.pi)
     ]
@@ -311,14 +328,16 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
     sine = at[1] - level
     size = float(np.hypot(cosine, sine))
     if not 0.0 < size >= abs(level):
-        return ()
+        return []
     middle, off = np.arctan2(sine, cosine), np.arccos(np.clip(-level / size, -1.0, 1.0))
-    orbits = []
-    for phase in dict.fromkeys(float(np.mod(middle + side * off, TURN)) for side in (1.0, -1.0)):
-        velocity = evaluated(body, hit, np.array([phase]), periods).velocities
-        if velocity[0] > least_speed(body):
-            orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
-    return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
+    return list(dict.fromkeys(float(np.mod(middle + side * off, TURN)) for side in (1.0, -1.0)))
+
+
+def _phases_of_sines(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
+    """Return the phases with distance 0 of a body with several sines or moving stops."""
+    end, level, cosine, sine = body.kernel.wave(int(hit[0]), periods)
+    _refuse_end(end, np.zeros(1))
+    return SumOfSines(level, np.array(list(body.harmonics), dtype=float), cosine, sine).zeros()
 
 
 def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.int32], periods: int) -> None:
@@ -370,6 +389,11 @@ def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats,
 
 
 def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
-    w = body.angular_frequency
-    turned = body.steady(w) * np.exp(1j * phases)[:, None]
-    return turned.real + body.levels, (1j * w * turned).real
+    """Return the steady displacements and velocities of the modes, shape (phase, mode)."""
+    moved, faster = np.broadcast_to(body.levels, (phases.size, body.levels.size)), np.zeros(1)
+    for order, force in body.harmonics.items():
+        if force.any():
+            w = order * body.angular_frequency
+            turned = body.steady(w, force) * np.exp(1j * order * phases)[:, None]
+            moved, faster = moved + turned.real, faster + (1j * w * turned).real
+    return moved, faster

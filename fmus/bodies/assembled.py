@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import cmath
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from vibroimpact.fmus.bodies.body_points import row_of
-from vibroimpact.fmus.bodies.impacting_body import Floats, Numbers
+from vibroimpact.fmus.bodies.impacting_body import Complexes, Floats, ImpactingBody, Numbers
 from vibroimpact.fmus.bodies.structure import Structure, StructurePoints, ratios_of
+from vibroimpact.fmus.errors import UsageError
+
+WHOLE = 1e-12
+"""Distance of a ratio of frequencies from a whole number, over the ratio, up to which it is this number."""
 
 
 class AssembledPoints(StructurePoints):
@@ -52,6 +60,56 @@ class AssembledPoints(StructurePoints):
             return None
         each = range(1, count + 1)
         return np.array([[numbers[f"mode.damping[{i},{j}]"] for j in each] for i in each])
+
+    def mass_normalised(self) -> ImpactingBody:
+        """Return one point with all its sines and constant forces, and the motion of its stops: see `BodyPoints`.
+
+        Raises
+        ------
+        UsageError
+            A sine of the force or of a stop does not turn a whole number of times in a period of the clock.
+        """
+        body, numbers = super().mass_normalised(), self.floats
+        held, further = body.held, dict[int, Complexes]()
+        for k in range(1, self._count_of_sines + 1):
+            row = np.array([numbers.get(f"mode.sine[{k},{j}]", 0.0) for j in range(1, body.force.size + 1)])
+            if numbers.get(f"sine[{k}].angular_frequency", 0.0) == 0.0:  # a constant force
+                held = (
+                    held
+                    + numbers[f"sine[{k}].amplitude"] * np.cos(numbers.get(f"sine[{k}].phase", 0.0)) * row
+                )
+            for order, amplitude in self._sine(f"sine[{k}]"):
+                further[order] = further.get(order, 0.0) + amplitude * row
+        contacts = tuple(
+            replace(contact, motion=dict(self._sine(f"stop[{k}]")))
+            for k, contact in enumerate(body.contacts, start=1)
+        )
+        base = numbers.get("forcing.base_acceleration", 0.0) * row_of(numbers, "mode.base", body.force.size)
+        return replace(body, force=body.force + base, held=held, further=further, contacts=contacts)
+
+    @property
+    def _count_of_sines(self) -> int:
+        """Number of sines besides the clock's among the parameters."""
+        count = 0
+        while f"sine[{count + 1}].amplitude" in self.floats:
+            count += 1
+        return count
+
+    def _sine(self, name: str) -> Iterator[tuple[int, complex]]:
+        """Yield the harmonic of a sine and its complex amplitude over the phase of the clock; nothing without it."""
+        numbers = self.floats
+        amplitude, rate = numbers.get(f"{name}.amplitude", 0.0), numbers.get(f"{name}.angular_frequency", 0.0)
+        if amplitude == 0.0 or rate == 0.0:
+            return
+        clock, phase = numbers["forcing.angular_frequency"], numbers.get(f"{name}.phase", 0.0)
+        ratio = rate / clock
+        order = round(ratio)
+        if order < 1 or abs(ratio - order) > WHOLE * ratio:
+            raise UsageError(
+                f"orbit: {name}.angular_frequency: expected a whole multiple of the clock's {clock:.12g} rad/s, "
+                f"got {rate:.12g}. Orbits need one period of all sines."
+            )
+        yield order, cmath.rect(amplitude, phase - order * numbers.get("forcing.phase", 0.0))
 
     def normalised(self, displacements: Floats) -> Floats:
         """Return displacements of a state, which are mass-normalised: see `BodyPoints`."""

@@ -1,9 +1,10 @@
-"""A body of modes with restitution stops and one harmonic force: the input of the search for orbits."""
+"""A body of modes with restitution stops, forced periodically: the input of the search for orbits."""
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.core.orbits import OrbitBody
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 Integers = Mapping[str, int]
 Numbers = Mapping[str, float]
 DIRECTIONS = {1: 1.0, 2: -1.0}
@@ -29,25 +31,33 @@ class Contact:
     direction : float
         +1: the stop is above, -1: below.
     position : float
-        Position of the stop, m.
+        Mean position of the stop, m.
     restitution : float
         Coefficient of restitution, 0 to 1.
+    motion : mapping of int to complex
+        Complex amplitudes of the stop's motion, m, by their harmonic n: position + Re(amplitude e^(i n phase)).
     """
 
     shape: Floats
     direction: float
     position: float
     restitution: float
+    motion: Mapping[int, complex] = field(default_factory=dict)
 
     @cached_property
     def mass(self) -> float:
         """Effective mass at the contact, kg: 1 / (shape . shape), equations.md 5.3."""
         return 1.0 / float(self.shape @ self.shape)
 
+    def stop_at(self, phase: float) -> float:
+        """Return the position of the stop at a phase of the clock, m."""
+        moved = sum((each * cmath.exp(1j * order * phase)).real for order, each in self.motion.items())
+        return self.position + moved
+
 
 @dataclass(frozen=True, eq=False)
 class ImpactingBody:
-    """A body of mass-normalised modes: q'' + 2 z w q' + w^2 q = force cos(phase) + held.
+    """A body of mass-normalised modes: q'' + 2 z w q' + w^2 q = force cos(phase) + held + further sines.
 
     Damping that couples the modes takes the place of 2 z w: a matrix. Modes without a spring (w = 0) come first. Orbits
     need them without damping: equations.md 4.7.
@@ -59,12 +69,14 @@ class ImpactingBody:
     force, held : array, shape (modes,)
         Modal amplitude of the harmonic force, and modal constant force, N kg^(-1/2).
     angular_frequency, phase : float
-        Angular frequency of the force, rad/s; its phase at time 0, rad.
+        Angular frequency of the clock, rad/s; its phase at time 0, rad.
     contacts : tuple of Contact
     observed : array, shape (modes,)
         Shape of the point that figures show, kg^(-1/2).
     coupling : array, shape (modes, modes), or None
         Damping that couples the modes, 1/s, symmetric; None where each mode has its own.
+    further : mapping of int to array, shape (modes,)
+        Complex modal amplitudes of further sines, N kg^(-1/2), by their harmonic n: Re(amplitude e^(i n phase)).
     """
 
     frequencies: Floats
@@ -76,6 +88,21 @@ class ImpactingBody:
     contacts: tuple[Contact, ...]
     observed: Floats
     coupling: Floats | None = None
+    further: Mapping[int, Complexes] = field(default_factory=dict)
+
+    @cached_property
+    def harmonics(self) -> Mapping[int, Complexes]:
+        """Complex modal amplitudes of all sines, N kg^(-1/2), by harmonic, ascending; 0 where only stops move."""
+        orders = {1, *self.further, *(order for each in self.contacts for order in each.motion)}
+        none = np.zeros(self.force.size, dtype=np.complex128)
+        found = {order: np.asarray(self.further.get(order, none)) for order in sorted(orders)}
+        found[1] = found[1] + self.force
+        return found
+
+    @property
+    def has_one_sine(self) -> bool:
+        """Whether the clock's force is the only motion with its period: no further sines, no moving stops."""
+        return not self.further and not any(each.motion for each in self.contacts)
 
     @cached_property
     def loose(self) -> int:
@@ -97,30 +124,35 @@ class ImpactingBody:
 
     @property
     def period(self) -> float:
-        """Period of the force, s."""
+        """Period of the clock, s."""
         return 2.0 * np.pi / self.angular_frequency
 
     @cached_property
     def kernel(self) -> OrbitBody:
         """The body in the form that the C functions take."""
         shapes = np.array([contact.shape for contact in self.contacts])
+        forces = np.array(list(self.harmonics.values()))
+        stops = np.array([[each.motion.get(order, 0j) for each in self.contacts] for order in self.harmonics])
         return OrbitBody(
             self.angular_frequency,
             natural=self.frequencies,
             damping_ratio=self.damping_ratios,
-            cosine=self.force,
-            sine=np.zeros_like(self.force),
+            order=np.array(list(self.harmonics)),
+            cosine=forces.real,
+            sine=0.0 - forces.imag,
             held=self.held,
             shape=shapes,
             impulse=shapes * np.array([[contact.mass] for contact in self.contacts]),
             direction=np.array([contact.direction for contact in self.contacts]),
             position=np.array([contact.position for contact in self.contacts]),
+            stop_cosine=stops.real,
+            stop_sine=0.0 - stops.imag,
             restitution=np.array([contact.restitution for contact in self.contacts]),
             coupling=self.coupling,
         )
 
     @cached_property
-    def rates(self) -> NDArray[np.complex128]:
+    def rates(self) -> Complexes:
         """Rates of the free motions e^(rate t) of the modes with springs, 1/s: equations.md 1.2, 4.7."""
         if self.coupling is None:
             natural, ratios = self.frequencies[self.loose :], self.damping_ratios[self.loose :]
@@ -132,7 +164,7 @@ class ImpactingBody:
         return self.complex_modes[0]
 
     @cached_property
-    def complex_modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    def complex_modes(self) -> tuple[Complexes, Complexes]:
         """Rates, 1/s, and vectors (w q, q') in columns, of modes with springs that the damping couples."""
         spring = np.diag(self.frequencies[self.loose :])
         damping = np.asarray(self.coupling)[self.loose :, self.loose :]
@@ -148,13 +180,15 @@ class ImpactingBody:
         """
         return -float(self.rates.real.max(initial=-np.inf))
 
-    def steady(self, angular_frequency: float | Floats) -> NDArray[np.complex128]:
+    def steady(self, angular_frequency: float | Floats, force: Complexes | None = None) -> Complexes:
         """Return the steady displacements Re(q e^(i phase)) of the modes, kg^(1/2) m: equations.md 1.3, 4.7.
 
         Parameters
         ----------
         angular_frequency : float or array
             Angular frequency of the force, rad/s.
+        force : array, shape (modes,), optional
+            Complex modal amplitudes, N kg^(-1/2); by default those of the clock's force.
 
         Returns
         -------
@@ -162,23 +196,28 @@ class ImpactingBody:
             Infinite or NaN where an undamped mode is in resonance.
         """
         w = np.asarray(angular_frequency, dtype=np.float64)[..., None]
+        force = np.asarray(self.force if force is None else force)
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.coupling is None:
                 drag = 2j * self.damping_ratios * self.frequencies * w
-                return np.asarray(self.force / (self.frequencies**2 - w**2 + drag))
+                return np.asarray(force / (self.frequencies**2 - w**2 + drag))
         stiffness = (self.frequencies**2 - w**2)[..., None] * np.eye(self.frequencies.size)
         try:
-            answer = np.linalg.solve(stiffness + 1j * w[..., None] * self.coupling, self.force[:, None])
+            answer = np.linalg.solve(stiffness + 1j * w[..., None] * self.coupling, force[:, None])
         except np.linalg.LinAlgError:
-            return np.full((*w.shape[:-1], self.force.size), np.nan + 0j)
+            return np.full((*w.shape[:-1], force.size), np.nan + 0j)
         return np.asarray(answer[..., 0])
 
     @cached_property
     def scale(self) -> float:
         """Size of the displacements at the contacts, m; rounding errors are relative to it."""
-        steady = np.abs(self.steady(self.angular_frequency))
+        w = self.angular_frequency
+        size = sum(np.abs(self.steady(n * w, force)) for n, force in self.harmonics.items() if force.any())
+        # a constant force moves a mode without a spring by about this much within a period
+        size = size + np.where(self.frequencies == 0.0, np.abs(self.held), 0.0) / w**2
         of_contacts = [
-            abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts
+            abs(each.position) + sum(map(abs, each.motion.values())) + float(np.abs(each.shape * size).sum())
+            for each in self.contacts
         ]
         return max(of_contacts)
 

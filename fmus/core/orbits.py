@@ -33,12 +33,11 @@ class BODY(Structure):
     """A body as C stores it; the fields are explained in `door/orbit_response.h`."""
 
     ARRAYS = (
-        *("natural", "damping_ratio", "cosine", "sine", "held"),
-        *("shape", "impulse", "direction", "position", "restitution"),
+        *("natural", "damping_ratio", "order", "cosine", "sine", "held", "shape", "impulse", "direction"),
+        *("position", "stop_cosine", "stop_sine", "restitution"),
     )
     _fields_ = [
-        ("modes", c_int32),
-        ("contacts", c_int32),
+        *((name, c_int32) for name in ("modes", "contacts", "harmonics")),
         ("angular_frequency", c_double),
         *((name, c_void_p) for name in ARRAYS),
         ("coupling", c_void_p),
@@ -55,14 +54,19 @@ class OrbitBody:
     Parameters
     ----------
     angular_frequency : float
-        Angular frequency of the force, rad/s.
-    natural, damping_ratio, cosine, sine, held : array, shape (modes,)
-        Natural angular frequencies (rad/s; modes of 0 first) and damping ratios. The modal force is
-        cosine cos(phase) + sine sin(phase) + held.
+        Angular frequency of the clock, rad/s. Force and stops move with its period.
+    natural, damping_ratio, held : array, shape (modes,)
+        Natural angular frequencies (rad/s; modes of 0 first), damping ratios, constant modal forces.
+    order : array, shape (harmonics,)
+        Whole numbers of turns of the sines in a period of the clock.
+    cosine, sine : array, shape (harmonics, modes)
+        Modal forces cosine cos(order phase) + sine sin(order phase).
+    stop_cosine, stop_sine : array, shape (harmonics, contacts)
+        Motion of the stops about their positions, m.
     shape, impulse : array, shape (contacts, modes)
         Displacement of each contact for unit modal displacements; modal velocities that give the contact 1 m/s.
     direction, position, restitution : array, shape (contacts,)
-        +1 for a stop above, -1 below; position, m; coefficient of restitution.
+        +1 for a stop above, -1 below; mean position, m; coefficient of restitution.
     coupling : array, shape (modes, modes), optional
         Damping that couples the modes, 1/s; it replaces the damping ratios. No damping of modes without a spring.
     """
@@ -76,7 +80,8 @@ class OrbitBody:
         if coupling is not None and tied.any():
             self._terms = self._coupled(angular_frequency, coupling, tied)
         terms = None if self._terms is None else self._terms.ctypes.data
-        self.address = BODY(self.modes, contacts, angular_frequency, *addresses, terms)
+        self.harmonics = self._arrays["order"].size
+        self.address = BODY(self.modes, contacts, self.harmonics, angular_frequency, *addresses, terms)
 
     def _coupled(self, angular_frequency: float, coupling: Array, tied: NDArray[np.bool_]) -> Array:
         """Return the complex modes of the modes with springs in the form of C, as bytes in an array of numbers."""
@@ -84,10 +89,11 @@ class OrbitBody:
         found = np.empty(library.vi_door_orbit_coupling_size() // 8 + 1)
         work = np.empty(library.vi_door_orbit_coupling_work_size() // 8 + 1)
         damping = np.ascontiguousarray(_numbers(coupling, (self.modes, self.modes))[np.ix_(tied, tied)])
-        rows = [np.ascontiguousarray(self._arrays[name][tied]) for name in ("natural", "cosine", "sine")]
-        given = (rows[0], damping, rows[1], rows[2], found, work)
+        rows = [np.ascontiguousarray(self._arrays[name][..., tied]) for name in ("natural", "cosine", "sine")]
+        rates = angular_frequency * self._arrays["order"]
+        given = (rates, rows[0], damping, rows[1], rows[2], found, work)
         modes = int(np.count_nonzero(tied))
-        end = library.vi_door_orbit_couple(modes, angular_frequency, *(each.ctypes.data for each in given))
+        end = library.vi_door_orbit_couple(modes, rates.size, *(each.ctypes.data for each in given))
         _check(OrbitEnd.refused if end else OrbitEnd.done)
         return found
 
@@ -110,6 +116,27 @@ class OrbitBody:
         filled = (velocities, distances, slopes, faster)
         end = _library().vi_door_orbit(self.address, train, *(each.ctypes.data for each in filled))
         return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
+
+    def wave(self, contact: int, periods: int) -> tuple[OrbitEnd, float, Array, Array]:
+        """Return the distance of P(1,q) beyond its stop over the phase of its impact: equations.md 4.3.
+
+        Parameters
+        ----------
+        contact : int
+            From 0.
+        periods : int
+            q.
+
+        Returns
+        -------
+        tuple of OrbitEnd, float, array, array
+            level + cosine cos(order phase) + sine sin(order phase), m, valid if the end is `done`; the arrays have
+            shape (harmonics,).
+        """
+        train = _train(np.array([contact], dtype=np.int32), np.zeros(1), periods)
+        found = np.empty(1), np.empty(self.harmonics), np.empty(self.harmonics)
+        end = _library().vi_door_orbit_wave(self.address, train, *(each.ctypes.data for each in found))
+        return OrbitEnd(end), float(found[0][0]), found[1], found[2]
 
     def motion(
         self, contacts: NDArray[np.int32], phases: Array, periods: int, velocities: Array
@@ -141,7 +168,8 @@ class Evaluation:
     end : OrbitEnd
         The arrays are valid if `end` is `done`.
     velocities, distances : array, shape (impacts,)
-        Speeds towards the stops before the impacts, m/s; distances beyond the stops, m: 0 for an orbit.
+        Speeds towards the stops, relative to them, before the impacts, m/s; distances beyond the stops, m. The
+        distances of an orbit are 0.
     distance_slopes, velocity_slopes : array, shape (impacts, impacts)
         Derivatives over the phase of each impact (columns).
     """
@@ -184,9 +212,10 @@ def _library() -> ctypes.CDLL:
     body, train = POINTER(BODY), POINTER(_Train)
     library.vi_door_orbit_coupling_size.restype = c_size_t
     library.vi_door_orbit_coupling_work_size.restype = c_size_t
-    library.vi_door_orbit_couple.argtypes = [c_int32, c_double, *[c_void_p] * 6]
+    library.vi_door_orbit_couple.argtypes = [c_int32, c_int32, *[c_void_p] * 7]
     # plain addresses: converting arrays runs Python code, where Ctrl-C would turn into an error of an argument
     library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
+    library.vi_door_orbit_wave.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_maximum.argtypes = [body, train, *[c_void_p] * 2]
     return library

@@ -138,12 +138,12 @@ def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[
 
 
 def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return a mask of the start states beyond a stop, shape (state,)."""
+    """Return a mask of the states at time 0 beyond a stop, shape (state,)."""
     modal = modal_displacements(scene, states[:, : states.shape[1] // 2])
     beyond = np.zeros(len(states), np.bool_)
     for contact in body.contacts:
         at = modal @ contact.shape
-        beyond |= contact.direction * (at - contact.position) > 0.0
+        beyond |= contact.direction * (at - contact.stop_at(body.phase)) > 0.0
     return beyond
 
 
@@ -167,11 +167,8 @@ def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span,
     if plane.x is None and not scene.body.IS_STRUCTURE:
         # a plane beyond the stops has no starts
         for contact in body.contacts:
-            x = (
-                (x[0], min(x[1], contact.position))
-                if contact.direction > 0
-                else (max(x[0], contact.position), x[1])
-            )
+            stop = contact.stop_at(body.phase)
+            x = (x[0], min(x[1], stop)) if contact.direction > 0 else (max(x[0], stop), x[1])
     return (x, y), (size, speed)
 
 

@@ -18,6 +18,7 @@ from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.forces import phases_of_new_start
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
 from vibroimpact.orchestrator.run.many_points.lanes_rows import run_prepared_in_lanes
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints
@@ -147,8 +148,9 @@ class BodyFlow:
         table[:, [names.index(name) for name in self.names]] = states
         period = 2.0 * math.pi / one.columns["forcing.angular_frequency"][0]
         start = float(one.begin[0]) if first else 0.0
-        if not first and "forcing.phase" in names:
-            table[:, names.index("forcing.phase")] = 0.0
+        for name, phase in ({} if first else phases_of_new_start(self.scene)).items():
+            if name in names:
+                table[:, names.index(name)] = phase
         begin = np.full(count, start + periods[0] * period)
         return PreparedPoints(
             np.ones(count, np.bool_),

@@ -9,14 +9,16 @@
 #include "check.h"
 #include "door/orbit_maximum.h"
 
-enum { MODES = 6, CONTACTS = 3, IMPACTS = 4, SAMPLES = 300 };
+enum { MODES = 6, CONTACTS = 3, IMPACTS = 4, SAMPLES = 300, HARMONICS = 3 };
 
 static const double TURN = 6.283185307179586;
 
 typedef struct {
     vi_orbit_body body;
     vi_orbit_train train;
-    double natural[MODES], damping_ratio[MODES], cosine[MODES], sine[MODES], held[MODES];
+    double natural[MODES], damping_ratio[MODES], held[MODES];
+    double order[HARMONICS], cosine[HARMONICS * MODES], sine[HARMONICS * MODES];
+    double stop_cosine[HARMONICS * CONTACTS], stop_sine[HARMONICS * CONTACTS];
     double shape[CONTACTS * MODES], impulse[CONTACTS * MODES];
     double direction[CONTACTS], position[CONTACTS], restitution[CONTACTS];
     int32_t contact[IMPACTS];
@@ -34,14 +36,34 @@ static double random_ratio(uint64_t *seed)
     return ratios[choice(seed, 6)];
 }
 
+/* Draw the sines of the force and of the stops; some stops do not move. */
+static void draw_sines(uint64_t *seed, orbit_case *drawn)
+{
+    const vi_orbit_body *body = &drawn->body;
+    for (int k = 0; k < body->harmonics; ++k) {
+        drawn->order[k] = (k > 0 ? drawn->order[k - 1] : 0.0) + 1.0 + choice(seed, 3);
+        for (int j = 0; j < body->modes; ++j) {
+            drawn->cosine[k * body->modes + j] = uniform(seed, -1.0, 1.0);
+            drawn->sine[k * body->modes + j] = uniform(seed, -1.0, 1.0);
+        }
+        for (int contact = 0; contact < body->contacts; ++contact) {
+            const double amplitude = choice(seed, 2) ? uniform(seed, 0.0, 0.5) : 0.0;
+            drawn->stop_cosine[k * body->contacts + contact] = amplitude * uniform(seed, -1.0, 1.0);
+            drawn->stop_sine[k * body->contacts + contact] = amplitude * uniform(seed, -1.0, 1.0);
+        }
+    }
+}
+
 static void draw(uint64_t *seed, orbit_case *drawn)
 {
     vi_orbit_body *body = &drawn->body;
     *body = (vi_orbit_body){.modes = 1 + (int)choice(seed, MODES),
                             .contacts = 1 + (int)choice(seed, CONTACTS),
+                            .harmonics = 1 + (int)choice(seed, HARMONICS),
                             .angular_frequency = uniform(seed, 0.4, 3.0),
                             .natural = drawn->natural,
                             .damping_ratio = drawn->damping_ratio,
+                            .order = drawn->order,
                             .cosine = drawn->cosine,
                             .sine = drawn->sine,
                             .held = drawn->held,
@@ -49,12 +71,12 @@ static void draw(uint64_t *seed, orbit_case *drawn)
                             .impulse = drawn->impulse,
                             .direction = drawn->direction,
                             .position = drawn->position,
+                            .stop_cosine = drawn->stop_cosine,
+                            .stop_sine = drawn->stop_sine,
                             .restitution = drawn->restitution};
     for (int j = 0; j < body->modes; ++j) {
         drawn->natural[j] = uniform(seed, 0.3, 6.0);
         drawn->damping_ratio[j] = random_ratio(seed);
-        drawn->cosine[j] = uniform(seed, -1.0, 1.0);
-        drawn->sine[j] = uniform(seed, -1.0, 1.0);
         drawn->held[j] = uniform(seed, -0.2, 0.2);
     }
     for (int k = 0; k < body->contacts; ++k) {
@@ -70,6 +92,7 @@ static void draw(uint64_t *seed, orbit_case *drawn)
         drawn->position[k] = uniform(seed, -0.5, 1.0);
         drawn->restitution[k] = uniform(seed, 0.0, 1.0);
     }
+    draw_sines(seed, drawn);
     drawn->train = (vi_orbit_train){.impacts = 1 + (int)choice(seed, IMPACTS),
                                     .periods = 1 + (int)choice(seed, 3),
                                     .contact = drawn->contact,
@@ -109,8 +132,12 @@ static void couple(uint64_t *seed, orbit_case *drawn)
         damping[0] = 2.0 * drawn->natural[0] * (1.0 + off[choice(seed, 5)]);
         drawn->damping_ratio[0] = damping[0] / (2.0 * drawn->natural[0]);
     }
-    CHECK(vi_door_orbit_couple(modes, body->angular_frequency, body->natural, damping, body->cosine, body->sine,
-                               &coupling, &work) == 0,
+    double rate[HARMONICS];
+    for (int k = 0; k < body->harmonics; ++k) {
+        rate[k] = body->order[k] * body->angular_frequency;
+    }
+    CHECK(vi_door_orbit_couple(modes, body->harmonics, rate, body->natural, damping, body->cosine, body->sine, &coupling,
+                               &work) == 0,
           "%d modes", modes);
     body->coupling = &coupling;
 }
@@ -132,60 +159,85 @@ static void next_coefficient(const vi_orbit_body *body, double n, double x[], do
     }
 }
 
-/* The same for modes that are coupled, by power series over short steps. */
+/* Derivative n of sine k of the modal force over n factorial, at a phase of the clock. */
+static void add_force(const vi_orbit_body *body, int k, int n, double phase, double force[])
+{
+    const double w = body->order[k] * body->angular_frequency;
+    double turned = 1.0; /* w^n / n! */
+    for (int i = 1; i <= n; ++i) {
+        turned *= w / i;
+    }
+    const double angle = body->order[k] * phase + 0.25 * TURN * n; /* each derivative turns by a quarter */
+    for (int j = 0; j < body->modes; ++j) {
+        force[j] += turned
+                    * (body->cosine[k * body->modes + j] * cos(angle) + body->sine[k * body->modes + j] * sin(angle));
+    }
+}
+
+/* Fly modes that are coupled, by power series over short steps. */
 static void fly_coupled(const vi_orbit_body *body, const double state[], double phase, double u, double end[])
 {
-    const int modes = body->modes, steps = 1 + (int)(u * 24.0);
-    const double w = body->angular_frequency, h = u / steps;
+    const int modes = body->modes, steps = 1 + (int)(u * 40.0);
+    const double h = u / steps;
     memcpy(end, state, (size_t)(2 * modes) * sizeof *end);
     for (int step = 0; step < steps; ++step) {
-        double x[MODES], v[MODES], power = h, turned = 1.0; /* h^(n + 1), w^n / n! */
+        double x[MODES], v[MODES], power = h; /* h^(n + 1) */
         memcpy(x, end, (size_t)modes * sizeof *x);
         memcpy(v, end + modes, (size_t)modes * sizeof *v);
         for (int n = 0; n < 30; ++n) {
             double force[MODES];
-            const double angle = phase + w * h * step + 0.25 * TURN * n; /* each derivative turns by a quarter */
             for (int j = 0; j < modes; ++j) {
-                force[j] = turned * (body->cosine[j] * cos(angle) + body->sine[j] * sin(angle))
-                           + (n == 0 ? body->held[j] : 0.0);
+                force[j] = n == 0 ? body->held[j] : 0.0;
+            }
+            for (int k = 0; k < body->harmonics; ++k) {
+                add_force(body, k, n, phase + body->angular_frequency * h * step, force);
             }
             next_coefficient(body, n, x, v, force);
             for (int j = 0; j < modes; ++j) {
                 end[j] += x[j] * power;
                 end[modes + j] += v[j] * power;
             }
-            turned *= w / (n + 1.0);
             power *= h;
         }
     }
 }
 
-/* Fly all modes from `state` at `phase` for u seconds, on the core's exact flow. */
+/* Fly mode j under sine k of the force for u seconds from (x, v), on the core's exact flow. */
+static void fly_mode(const vi_orbit_body *body, int j, int k, double held, double phase, double u, double *x, double *v)
+{
+    const double natural = body->natural[j], w = body->order[k] * body->angular_frequency;
+    const double c = body->cosine[k * body->modes + j], s = body->sine[k * body->modes + j];
+    const double angle = body->order[k] * phase - atan2(s, c);
+    vi_mode mode;
+    vi_mode_start(&mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, hypot(c, s), w);
+    for (double done = 0.0; done < u;) { /* segments are short near a resonance */
+        vi_segment segment;
+        vi_motion motion;
+        vi_segment_start(&segment, &mode, *x, *v, vi_phase_of(angle + w * done), held, 0.0, u - done, false);
+        vi_segment_at(&segment, segment.length, &motion);
+        *x = segment.origin + motion.x;
+        *v = motion.v;
+        done = segment.length < u - done ? done + segment.length : u;
+    }
+}
+
+/* Fly all modes from `state` at `phase` for u seconds. The responses to the sines after the first add up. */
 static void fly(const vi_orbit_body *body, const double state[], double phase, double u, double end[])
 {
+    const int modes = body->modes;
     if (body->coupling) {
         fly_coupled(body, state, phase, u, end);
         return;
     }
-    for (int j = 0; j < body->modes; ++j) {
-        const double natural = body->natural[j], c = body->cosine[j], s = body->sine[j];
-        const double angle = phase - atan2(s, c);
-        vi_mode mode;
-        vi_mode_start(&mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, hypot(c, s),
-                      body->angular_frequency);
-        double x = state[j], v = state[body->modes + j];
-        for (double done = 0.0; done < u;) { /* segments are short near a resonance */
-            vi_segment segment;
-            vi_motion motion;
-            vi_segment_start(&segment, &mode, x, v, vi_phase_of(angle + body->angular_frequency * done), body->held[j],
-                             0.0, u - done, false);
-            vi_segment_at(&segment, segment.length, &motion);
-            x = segment.origin + motion.x;
-            v = motion.v;
-            done = segment.length < u - done ? done + segment.length : u;
+    memcpy(end, state, (size_t)(2 * modes) * sizeof *end);
+    for (int j = 0; j < modes; ++j) {
+        fly_mode(body, j, 0, body->held[j], phase, u, &end[j], &end[modes + j]);
+        for (int k = 1; k < body->harmonics; ++k) {
+            double x = 0.0, v = 0.0;
+            fly_mode(body, j, k, 0.0, phase, u, &x, &v);
+            end[j] += x;
+            end[modes + j] += v;
         }
-        end[j] = x;
-        end[body->modes + j] = v;
     }
 }
 
@@ -196,6 +248,20 @@ static double at_contact(const vi_orbit_body *body, int contact, const double ro
         sum += body->shape[contact * body->modes + j] * row[j];
     }
     return body->direction[contact] * sum;
+}
+
+/* Displacement of a contact towards its stop, less that of the stop, at a phase of the clock; order 1: its velocity. */
+static double beyond_stop(const vi_orbit_body *body, int contact, const double row[], double phase, int order)
+{
+    double moved = order == 0 ? body->position[contact] : 0.0;
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double w = order == 0 ? 1.0 : body->order[k] * body->angular_frequency;
+        const double angle = body->order[k] * phase + 0.25 * TURN * order;
+        moved += w
+                 * (body->stop_cosine[k * body->contacts + contact] * cos(angle)
+                    + body->stop_sine[k * body->contacts + contact] * sin(angle));
+    }
+    return at_contact(body, contact, row) - body->direction[contact] * moved;
 }
 
 static double largest(const double row[], int count)
@@ -228,8 +294,8 @@ static void check_flights(const orbit_case *drawn, const double velocity[], cons
         double end[2 * MODES];
         fly(body, start, drawn->phase[i], flight(drawn, i), end);
         const double size = 1.0 + largest(start, 2 * modes) + largest(end, 2 * modes), close = 1e-10 * size;
-        const double beyond = at_contact(body, contact, end) - body->direction[contact] * body->position[contact];
-        const double speed = at_contact(body, contact, end + modes);
+        const double beyond = beyond_stop(body, contact, end, drawn->phase[next], 0);
+        const double speed = beyond_stop(body, contact, end + modes, drawn->phase[next], 1);
         CHECK(fabs(beyond - distance[next]) <= close, "impact %d: %.17g, %.17g", next, beyond, distance[next]);
         CHECK(fabs(speed - velocity[next]) <= close, "impact %d: %.17g, %.17g", next, speed, velocity[next]);
         for (int j = 0; j < modes; ++j) {
@@ -253,7 +319,7 @@ static void check_attained(const orbit_case *drawn, const double state[], const 
     }
     const double u = fmax(0.0, (what[1] - drawn->phase[i]) / body->angular_frequency);
     fly(body, state + (ptrdiff_t)i * 2 * body->modes, drawn->phase[i], u, end);
-    const double beyond = at_contact(body, contact, end) - body->direction[contact] * body->position[contact];
+    const double beyond = beyond_stop(body, contact, end, what[1], 0);
     CHECK(fabs(beyond - what[0]) <= 1e-9 * (1.0 + fabs(what[0])), "%.17g at %g, not %.17g", beyond, what[1], what[0]);
 }
 
@@ -268,10 +334,10 @@ static void check_kinks(const orbit_case *drawn, const double state[], double hi
         double end[2 * MODES];
         fly(body, state + (ptrdiff_t)i * states, drawn->phase[i], flight(drawn, i), end);
         for (int contact = 0; contact < body->contacts; ++contact) {
-            if (contact != drawn->contact[next] && at_contact(body, contact, end + body->modes) > 1e-9
-                && at_contact(body, contact, after + body->modes) < -1e-9) {
-                const double beyond = at_contact(body, contact, after)
-                                      - body->direction[contact] * body->position[contact];
+            const double phase = drawn->phase[next];
+            if (contact != drawn->contact[next] && beyond_stop(body, contact, end + body->modes, phase, 1) > 1e-9
+                && beyond_stop(body, contact, after + body->modes, phase, 1) < -1e-9) {
+                const double beyond = beyond_stop(body, contact, after, phase, 0);
                 CHECK(beyond <= highest + 1e-9 * (1.0 + fabs(beyond)), "kink of contact %d: %.17g, %.17g", contact,
                       beyond, highest);
             }
@@ -294,18 +360,37 @@ static void check_maximum(const orbit_case *drawn, const double state[])
     for (int i = 0; i < drawn->train.impacts; ++i) {
         const double *start = state + (ptrdiff_t)i * 2 * body->modes, length = flight(drawn, i);
         for (int contact = 0; contact < body->contacts; ++contact) {
-            double before[2 * MODES], now[2 * MODES], later[2 * MODES];
+            double beyond[SAMPLES + 1];
+            for (int k = 0; k <= SAMPLES; ++k) {
+                double now[2 * MODES];
+                const double u = length * k / SAMPLES;
+                fly(body, start, drawn->phase[i], u, now);
+                beyond[k] = beyond_stop(body, contact, now, drawn->phase[i] + body->angular_frequency * u, 0);
+            }
             for (int k = 1; k < SAMPLES; ++k) {
-                fly(body, start, drawn->phase[i], length * (k - 1) / SAMPLES, before);
-                fly(body, start, drawn->phase[i], length * k / SAMPLES, now);
-                fly(body, start, drawn->phase[i], length * (k + 1) / SAMPLES, later);
-                const double y = at_contact(body, contact, now);
-                if (y >= at_contact(body, contact, before) && y >= at_contact(body, contact, later)) {
-                    const double beyond = y - body->direction[contact] * body->position[contact];
-                    CHECK(beyond <= what[0] + close, "contact %d: %.17g, %.17g", contact, beyond, what[0]);
+                if (beyond[k] >= beyond[k - 1] && beyond[k] >= beyond[k + 1]) {
+                    CHECK(beyond[k] <= what[0] + close, "contact %d: %.17g, %.17g", contact, beyond[k], what[0]);
                 }
             }
         }
+    }
+}
+
+/* The distance of one impact is the given sum of sines of its phase. */
+static void check_wave(const orbit_case *drawn)
+{
+    double phase = 0.0, level, cosine[HARMONICS], sine[HARMONICS];
+    vi_orbit_train one = {.impacts = 1, .periods = drawn->train.periods, .contact = drawn->contact, .phase = &phase};
+    CHECK(vi_door_orbit_wave(&drawn->body, &one, &level, cosine, sine) == VI_ORBIT_DONE, "wave");
+    for (phase = 0.0; phase < TURN; phase += 0.7) {
+        double velocity, distance, slopes[2], sum = level, size = fabs(level);
+        CHECK(vi_door_orbit(&drawn->body, &one, &velocity, &distance, &slopes[0], &slopes[1]) == VI_ORBIT_DONE, "impact");
+        for (int k = 0; k < drawn->body.harmonics; ++k) {
+            const double angle = drawn->order[k] * phase;
+            sum += cosine[k] * cos(angle) + sine[k] * sin(angle);
+            size += fabs(cosine[k]) + fabs(sine[k]);
+        }
+        CHECK(fabs(distance - sum) <= 1e-12 * size, "at %g: %.17g, not %.17g", phase, sum, distance);
     }
 }
 
@@ -322,6 +407,7 @@ static int check_random_orbits(uint64_t *seed, int count, bool coupled)
         }
         const int end = vi_door_orbit(&drawn.body, &drawn.train, velocity, distance, slopes, faster);
         CHECK(end == VI_ORBIT_DONE, "case %d: %d", each, end);
+        check_wave(&drawn);
         if (largest(velocity, drawn.train.impacts) > 1e3) {
             continue; /* near a resonance of an undamped mode */
         }
@@ -344,6 +430,8 @@ static int end_of(const orbit_case *drawn)
 /* An undamped mode that returns after the whole train adds up its impacts without bound, for any force. */
 static void check_resonances(orbit_case *drawn)
 {
+    drawn->body.harmonics = 1;
+    drawn->order[0] = 1.0;
     for (int turns = 1; turns < 40; ++turns) {
         for (int periods = 1; periods <= 3; ++periods) {
             drawn->train.periods = periods;
@@ -373,6 +461,9 @@ static void check_refusals(uint64_t *seed)
         bad.body.damping_ratio = bad.damping_ratio;                                                                    \
         bad.body.direction = bad.direction;                                                                            \
         bad.body.restitution = bad.restitution;                                                                        \
+        bad.body.order = bad.order;                                                                                    \
+        bad.body.sine = bad.sine;                                                                                      \
+        bad.body.stop_cosine = bad.stop_cosine;                                                                        \
         bad.train.phase = bad.phase;                                                                                   \
         bad.train.contact = bad.contact;                                                                               \
         change;                                                                                                        \
@@ -380,11 +471,17 @@ static void check_refusals(uint64_t *seed)
     } while (0)
     REFUSED(bad.body.modes = 0);
     REFUSED(bad.body.modes = VI_MODES + 1);
+    REFUSED(bad.body.harmonics = 0);
+    REFUSED(bad.body.harmonics = VI_ORBIT_HARMONICS + 1);
+    REFUSED(bad.order[0] = 0.0);
+    REFUSED(bad.order[0] = 1.5);
+    REFUSED(bad.sine[0] = (double)NAN);
+    REFUSED(bad.stop_cosine[0] = (double)INFINITY);
     REFUSED(bad.body.contacts = 0);
     REFUSED(bad.body.contacts = VI_PORTS + 1);
     REFUSED(bad.body.angular_frequency = 0.0);
     REFUSED(bad.body.angular_frequency = (double)NAN);
-    REFUSED(bad.natural[0] = 0.0);
+    REFUSED(bad.natural[0] = 0.0; bad.damping_ratio[0] = 0.1);
     REFUSED(bad.natural[0] = (double)INFINITY);
     REFUSED(bad.damping_ratio[0] = -0.1);
     REFUSED(bad.direction[0] = 0.5);

@@ -10,8 +10,12 @@
 
 static const double TURN = 6.283185307179586;
 
+enum { HARMONICS = 3 };
+
 typedef struct {
-    double natural[VI_MODES], damping_ratio[VI_MODES], cosine[VI_MODES], sine[VI_MODES], held[VI_MODES];
+    double natural[VI_MODES], damping_ratio[VI_MODES], held[VI_MODES];
+    double order[HARMONICS], cosine[HARMONICS * VI_MODES], sine[HARMONICS * VI_MODES];
+    double stop_cosine[HARMONICS * VI_PORTS], stop_sine[HARMONICS * VI_PORTS];
     double shape[VI_PORTS * VI_MODES], impulse[VI_PORTS * VI_MODES];
     double direction[VI_PORTS], position[VI_PORTS], restitution[VI_PORTS];
     double phase[VI_ORBIT_IMPACTS];
@@ -29,9 +33,19 @@ static void draw(sample *s, uint64_t *seed, int most_modes)
     for (int j = 0; j < modes; ++j) {
         s->natural[j] = pow(10.0, uniform(seed, -1.0, 1.5));
         s->damping_ratio[j] = choice(seed, 4) ? uniform(seed, 0.0, 0.2) : uniform(seed, 0.9, 3.0);
-        s->cosine[j] = uniform(seed, -1.0, 1.0);
-        s->sine[j] = uniform(seed, -1.0, 1.0);
         s->held[j] = uniform(seed, -0.1, 0.1);
+    }
+    const int harmonics = 1 + (int)choice(seed, HARMONICS);
+    for (int k = 0; k < harmonics; ++k) {
+        s->order[k] = (k > 0 ? s->order[k - 1] : 0.0) + 1.0 + choice(seed, 3);
+        for (int j = 0; j < modes; ++j) {
+            s->cosine[k * modes + j] = uniform(seed, -1.0, 1.0);
+            s->sine[k * modes + j] = uniform(seed, -1.0, 1.0);
+        }
+        for (int contact = 0; contact < contacts; ++contact) {
+            s->stop_cosine[k * contacts + contact] = uniform(seed, -0.2, 0.2);
+            s->stop_sine[k * contacts + contact] = uniform(seed, -0.2, 0.2);
+        }
     }
     for (int k = 0; k < contacts; ++k) {
         double square = 0.0;
@@ -57,7 +71,9 @@ static void draw(sample *s, uint64_t *seed, int most_modes)
     s->train.contact = s->contact;
     s->body = (vi_orbit_body){.modes = modes,
                               .contacts = contacts,
+                              .harmonics = harmonics,
                               .angular_frequency = uniform(seed, 0.3, 3.0),
+                              .order = s->order,
                               .natural = s->natural,
                               .damping_ratio = s->damping_ratio,
                               .cosine = s->cosine,
@@ -67,7 +83,20 @@ static void draw(sample *s, uint64_t *seed, int most_modes)
                               .impulse = s->impulse,
                               .direction = s->direction,
                               .position = s->position,
+                              .stop_cosine = s->stop_cosine,
+                              .stop_sine = s->stop_sine,
                               .restitution = s->restitution};
+}
+
+/* Find the complex modes; returns the result of the call. */
+static int find_coupling(sample *s)
+{
+    double rate[HARMONICS];
+    for (int k = 0; k < s->body.harmonics; ++k) {
+        rate[k] = s->order[k] * s->body.angular_frequency;
+    }
+    return vi_door_orbit_couple(s->body.modes, s->body.harmonics, rate, s->natural, s->damping, s->cosine, s->sine,
+                                &s->coupling, &s->work);
 }
 
 /* Let dashpots between random points couple the modes. */
@@ -87,9 +116,7 @@ static void couple(sample *s, uint64_t *seed)
     for (int j = 0; j < modes; ++j) {
         s->damping_ratio[j] = s->damping[j * modes + j] / (2.0 * s->natural[j]);
     }
-    CHECK(vi_door_orbit_couple(modes, s->body.angular_frequency, s->natural, s->damping, s->cosine, s->sine,
-                               &s->coupling, &s->work) == 0,
-          "%d modes", modes);
+    CHECK(find_coupling(s) == 0, "%d modes", modes);
     s->body.coupling = &s->coupling;
 }
 
@@ -162,6 +189,11 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
         for (int j = 0; j < modes; ++j) {
             speed += s.shape[s.contact[i] * modes + j] * state[i * 2 * modes + modes + j];
         }
+        for (int k = 0; k < s.body.harmonics; ++k) {
+            const double w = s.order[k] * s.body.angular_frequency, angle = s.order[k] * s.phase[i];
+            const int of = k * s.body.contacts + s.contact[i];
+            speed -= w * (s.stop_sine[of] * cos(angle) - s.stop_cosine[of] * sin(angle));
+        }
         const double left = -s.direction[s.contact[i]] * speed, came = s.restitution[s.contact[i]] * velocity[i];
         CHECK(fabs(left - came) <= 1e-9 * (1.0 + fabs(velocity[i])), "impact %d: %.17g, not %.17g", i, left, came);
     }
@@ -204,6 +236,7 @@ static void check_refusals(uint64_t *seed)
     draw(&s, seed, 1);
     s.damping_ratio[0] = 0.0;
     s.natural[0] = s.body.angular_frequency = 1.0;
+    s.order[0] = 1.0;
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_RESONANT, "resonance");
 }
 
@@ -216,21 +249,19 @@ static void check_coupled_refusals(uint64_t *seed)
     } while (s.body.modes < 2);
     couple(&s, seed);
     s.damping[1] = NAN;
-    CHECK(vi_door_orbit_couple(s.body.modes, 1.0, s.natural, s.damping, s.cosine, s.sine, &s.coupling, &s.work) == 1,
-          "no damping");
+    CHECK(find_coupling(&s) == 1, "no damping");
     memset(s.damping, 0, sizeof s.damping);
-    s.natural[0] = s.body.angular_frequency = 1.0;
+    s.natural[0] = s.body.angular_frequency = s.order[0] = 1.0;
+    s.body.harmonics = 1;
     for (int j = 0; j < s.body.modes; ++j) {
         s.damping[j * s.body.modes + j] = j == 0 ? 2.0 : 0.1;
     }
-    CHECK(vi_door_orbit_couple(s.body.modes, 1.0, s.natural, s.damping, s.cosine, s.sine, &s.coupling, &s.work) == 0,
-          "critical damping");
+    CHECK(find_coupling(&s) == 0, "critical damping");
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_DONE, "critical damping");
     s.coupling.fastest = 1e6;
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_CRITICAL, "too many steps");
     s.damping[0] = 0.0;
-    CHECK(vi_door_orbit_couple(s.body.modes, 1.0, s.natural, s.damping, s.cosine, s.sine, &s.coupling, &s.work) == 0,
-          "no damping");
+    CHECK(find_coupling(&s) == 0, "no damping");
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_RESONANT, "resonance");
 }
 

@@ -30,7 +30,7 @@ static vi_record record;
 static vi_pressed_cache pressed;
 static vi_scan scan;
 static vi_power_tables power;
-static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power};
+static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power, {0, NULL, NULL, NULL}};
 
 static void make_modes(uint64_t *seed, double root)
 {

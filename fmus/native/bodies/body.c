@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
 #include "body_check.h"
@@ -24,7 +25,14 @@ static const vi_body *const_body_of(const void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power};
+    const bool any_signals = VI_SIGNALS > 0 && c->signals_key != 0;
+    if (any_signals && c->signals.key != c->signals_key) { /* at the start, or after a state of another set-up */
+        form->make_signals((char *)c - form->place, &c->signals);
+        c->signals.key = c->signals_key;
+    }
+    const vi_table tables = form->tables != NULL ? form->tables((const char *)c - form->place) : (vi_table){0, NULL, NULL, NULL};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power,
+                          any_signals ? &c->signals : NULL, tables};
 }
 
 static void defaults(void *self)
@@ -88,9 +96,22 @@ int vi_body_ports(const vi_body *c)
 
 /* ---- inputs ---- */
 
+/* Take changed motions of stops; false where one would cut into the body. */
+static bool move_stops(const void *self, vi_body *c)
+{
+    vi_stop_motion motion[VI_PORTS];
+    const vi_structure parts = vi_body_parts(c);
+    c->stop_refused = 0;
+    if (form->find_stops == NULL) {
+        return true;
+    }
+    form->find_stops(self, motion);
+    return vi_stop_motions_change(&parts, motion, &c->stop_refused);
+}
+
 static void drive(void *self, vi_body *c)
 {
-    double force[VI_MODES];
+    double force[VI_MODES] = {0.0};
     char message[VI_MESSAGE_LENGTH] = "";
     if (!c->forcing_changed) {
         return;
@@ -99,7 +120,7 @@ static void drive(void *self, vi_body *c)
     form->find_forcing(self, force);
     bool good = message[0] == '\0'
                 && vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
-    for (int j = 0; j < vi_structure_modes(&c->model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         good = good && isfinite(force[j]);
     }
     if (good) {
@@ -108,7 +129,8 @@ static void drive(void *self, vi_body *c)
         if (form->drive_further != NULL) {
             form->drive_further(self, false);
         }
-        c->forcing_changed = 0;
+        vi_structure_load(&parts);
+        c->forcing_changed = !move_stops(self, c);
     }
 }
 
@@ -121,10 +143,11 @@ static void take_impulses(vi_body *c)
 
 static void hold_inputs(void *self, vi_body *c)
 {
-    double held[VI_MODES], held_rate[VI_MODES];
+    double held[VI_MODES] = {0.0}, held_rate[VI_MODES] = {0.0};
     const vi_structure parts = vi_body_parts(c);
     form->find_inputs(self, held, held_rate);
     vi_structure_hold(&parts, held, held_rate);
+    vi_structure_load(&parts);
     vi_structure_meet_forces(&parts);
     c->inputs_changed = 0;
 }
@@ -175,7 +198,7 @@ static double cosine_of_forcing(const vi_body *c)
 /* Present acceleration of the base, m/s^2: the input, plus the forcing of this amplitude (m/s^2). */
 static double base_acceleration(const vi_body *c, double amplitude)
 {
-    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
+    const double since = vi_clock_elapsed(&c->model.clock, c->state.input_since, c->state.now);
     const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
     return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
 }
@@ -183,7 +206,7 @@ static double base_acceleration(const vi_body *c, double amplitude)
 static void update_energies(vi_body *c)
 {
     c->energy_kinetic = c->energy_potential = 0.0;
-    for (int j = 0; j < c->model.modes; ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         const double p = c->state.p[j], stretch = c->natural[j] * c->state.q[j];
         c->energy_kinetic += 0.5 * p * p;
         c->energy_potential += 0.5 * stretch * stretch;
@@ -198,7 +221,9 @@ static void update_outputs(void *self)
     *(double *)(void *)((char *)self + vi_this_description.time) = present_time(self);
     const vi_structure parts = vi_body_parts(c);
     double base = base_acceleration(c, form->base_forcing(self));
-    base += form->base_further != NULL ? form->base_further(self, vi_structure_further(&parts)) : 0.0;
+    if (form->base_further != NULL) {
+        base += form->base_further(self, vi_structure_further(&parts), c->state.signal_value);
+    }
     vi_structure_outputs(&parts, c->modal_acceleration);
     c->displacement = vi_structure_observed(&parts);
     c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
@@ -214,7 +239,7 @@ static void update_outputs(void *self)
 
 static double lowest_natural(const vi_body *c)
 {
-    for (int j = 0; j < c->model.modes; ++j) {
+    for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         if (c->natural[j] > 0.0) {
             return c->natural[j];
         }
@@ -243,8 +268,8 @@ static bool starts_free(vi_body *c, char *message)
     }
     const vi_contact *contact = &c->contacts[beyond - 1];
     vi_complain(message, "%s: expected a start on the free side of contact[%d] (%s %.17g), got %.17g there", form->start,
-                beyond, contact->side == VI_SIDE_UPPER ? "<=" : ">=", contact->position,
-                vi_structure_at(&c->model, c->model.shape[beyond - 1], c->state.q));
+                beyond, contact->side == VI_SIDE_UPPER ? "<=" : ">=", vi_structure_stop_position(&parts, beyond - 1),
+                vi_structure_at_body(&c->model, c->model.shape[beyond - 1], c->state.q));
     return false;
 }
 
@@ -254,15 +279,21 @@ static bool start(void *self, vi_body *c, double start_time, char *message)
         vi_contact_clear(&c->contacts[k]);
     }
     memset(c->state.status, 0, sizeof c->state.status); /* clears a start with other start values */
-    c->forcing_changed = 0;
+    c->forcing_changed = c->stop_refused = 0;
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
     vi_body_check_points(c, message);
     vi_instant now;
-    if (!start_clock(c, start_time, &now, message) || !starts_free(c, message) || message[0] != '\0') {
+    if (!start_clock(c, start_time, &now, message)) {
         return false;
     }
     const vi_structure parts = vi_body_parts(c);
+    c->state.held_since = now;
+    vi_stop_motions_count_by(&c->model);
+    vi_stop_motions_at(&parts, now);
+    if (!starts_free(c, message) || message[0] != '\0') {
+        return false;
+    }
     if (form->drive_further != NULL) {
         form->drive_further(self, true);
     }
@@ -322,6 +353,11 @@ static void check_drive(const void *self, const vi_body *c, char *message)
     if (c->forcing_changed) {
         form->check_forcing(self, message);
         vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency, c->state.now);
+        if (c->stop_refused > 0) {
+            vi_complain(message, "stop[%d]: expected a motion that leaves the point on the free side of contact[%d] now,"
+                                 " at %.17g s, got another", c->stop_refused, c->stop_refused,
+                        vi_clock_time(&c->model.clock, c->state.now));
+        }
     }
 }
 
@@ -374,8 +410,8 @@ static bool needs_events(const void *self)
     return false;
 }
 
-/* Bytes of `pressed`, `scan` and `power`, the last members. */
-enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) };
+/* Bytes of `pressed`, `scan`, `power` and `signals`, the last members. */
+enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) + sizeof(vi_signal_loads) };
 
 /* Caches and unused rows of the record are not saved. */
 static size_t used_size(const void *self)

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/modal/stop_motion.h"
 #include "structure_file.h"
 #include "structure_variables.h"
 
@@ -25,6 +26,9 @@ static void defaults(void *self)
         for (int k = 0; k < VI_PORTS; ++k) {
             s->body.model.shape[k][j] = 1.0;
         }
+    }
+    for (int k = 0; k < VI_SIGNALS; ++k) {
+        s->signals.signal[k].table_start = 1;
     }
 }
 
@@ -192,6 +196,21 @@ static void check_shapes(const modal_structure *s, char *message)
     }
 }
 
+static void check_stop(const modal_structure *s, int k, char *message)
+{
+    const vi_stop_motion *m = &s->stop[k];
+    const double w = m->angular_frequency;
+    const bool turns = w >= SLOWEST && w <= FASTEST;
+    if (!isfinite(m->velocity) || !isfinite(m->amplitude) || !isfinite(m->phase)) {
+        vi_complain(message, "stop[%d]: expected a finite velocity, amplitude and phase, got %.17g, %.17g and %.17g",
+                    k + 1, m->velocity, m->amplitude, m->phase);
+    }
+    if (!turns && (m->amplitude != 0.0 || w != 0.0)) {
+        vi_complain(message, "stop[%d].angular_frequency: expected %g to %g with an amplitude, got %.17g", k + 1, SLOWEST,
+                    FASTEST, w);
+    }
+}
+
 static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
 {
     const modal_structure *s = self;
@@ -219,6 +238,86 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
                         s->turns[k] ? "> 0" : "0", w);
         }
     }
+    vi_structure_check_amplitudes(&s->signals, message);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        check_stop(s, k, message);
+    }
+}
+
+/* ---- moving stops ---- */
+
+static void check_table(const modal_structure *s, int k, char *message)
+{
+    const int64_t first = s->stop[k].first, count = s->stop[k].knots;
+    if (count == 0) {
+        return;
+    }
+    if (count < 2 || count > VI_TABLE_ROOM || first < 1 || first > VI_TABLE_ROOM + 1 - count) {
+        vi_complain(message, "stop[%d].table_count: expected 0, or 2 and more numbers within 1 to %d, got %lld from"
+                             " %lld on", k + 1, VI_TABLE_ROOM, (long long)count, (long long)first);
+        return;
+    }
+    for (int64_t i = first - 1; i < first - 1 + count; ++i) {
+        if (!isfinite(s->signals.time[i]) || !isfinite(s->signals.value[i])) {
+            vi_complain(message, "table.value[%lld]: expected finite numbers, got %.17g at %.17g s", (long long)i + 1,
+                        s->signals.value[i], s->signals.time[i]);
+            return;
+        }
+        if (i > first - 1 && !(s->signals.time[i] > s->signals.time[i - 1])) {
+            vi_complain(message, "table.time[%lld]: expected more than the time before, %.17g, got %.17g",
+                        (long long)i + 1, s->signals.time[i - 1], s->signals.time[i]);
+            return;
+        }
+    }
+}
+
+static void find_stops(const void *self, vi_stop_motion motion[VI_PORTS])
+{
+    const modal_structure *s = self;
+    memset(motion, 0, VI_PORTS * sizeof motion[0]);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (vi_contact_law_has_stop(s->body.contacts[k].law.law)) {
+            motion[k] = s->stop[k];
+            motion[k].first = motion[k].knots > 0 ? motion[k].first - 1 : 0;
+            motion[k].angular_frequency = motion[k].amplitude != 0.0 ? motion[k].angular_frequency : 0.0;
+            motion[k].phase = motion[k].amplitude != 0.0 ? motion[k].phase : 0.0;
+        }
+    }
+}
+
+static vi_table tables(const void *self)
+{
+    const modal_structure *s = self;
+    return (vi_table){VI_TABLE_ROOM, s->signals.time, s->signals.value, s->stop_bend};
+}
+
+static void check_stops(const modal_structure *s, char *message)
+{
+    vi_stop_motion motion[VI_PORTS];
+    for (int k = 0; k < VI_PORTS; ++k) {
+        check_stop(s, k, message);
+        check_table(s, k, message);
+    }
+    find_stops(s, motion);
+    const int count = vi_stop_motions_count(motion, vi_body_ports(&s->body));
+    if (count > VI_MODES - (int)s->modes) {
+        vi_complain(message, "modes: expected at most %d beside %d motions of stops, each a mode, got %lld",
+                    VI_MODES - count, count, (long long)s->modes);
+    }
+}
+
+/* Put the motions of stops behind the modes. */
+static void prepare_stops(modal_structure *s)
+{
+    vi_stop_motion motion[VI_PORTS];
+    find_stops(s, motion);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (motion[k].knots > 0) {
+            const int64_t first = motion[k].first;
+            vi_table_bend((int)motion[k].knots, s->signals.time + first, s->signals.value + first, s->stop_bend + first);
+        }
+    }
+    vi_stop_motions_begin(&s->body.model, motion);
 }
 
 static bool parameters_are_good(const modal_structure *s, char *message)
@@ -240,7 +339,9 @@ static bool parameters_are_good(const modal_structure *s, char *message)
         vi_check_each(message, vi_check_not_negative, "mode.damping_ratio", s->damping_ratio, n);
     }
     check_shapes(s, message);
+    check_stops(s, message);
     check_forcing(s, message);
+    vi_structure_check_signals(&s->signals, n, message);
     vi_check_each(message, vi_check_finite, "mode.displacement_start", s->displacement_start, n);
     vi_check_each(message, vi_check_finite, "mode.velocity_start", s->velocity_start, n);
     vi_body_check(&s->body, message);
@@ -302,8 +403,10 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     vi_structure_model *model = &s->body.model;
     vi_structure_state *state = &s->body.state;
     double force[VI_MODES];
+    s->body.signals_key = vi_structure_signals_key(&s->signals);
     find_forcing(s, force);
     model->modes = (int32_t)s->modes;
+    model->given_modes = 0;
     model->contacts = vi_body_ports(&s->body);
     s->body.record.further = model->further = (int32_t)s->further_points;
     model->coupled = s->coupled;
@@ -317,10 +420,16 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     for (int j = 0; j < model->modes; ++j) {
         vi_structure_mode(model, j, s->natural[j], ratio_of(s, j), force[j], s->body.forcing_angular_frequency);
     }
+    prepare_stops(s);
     return true;
 }
 
 /* ---- loads and outputs ---- */
+
+static void make_signals(void *self, vi_signal_loads *signals)
+{
+    vi_structure_make_signals(&((const modal_structure *)self)->signals, signals);
+}
 
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {
@@ -338,10 +447,10 @@ static void find_inputs(const void *self, double held[VI_MODES], double held_rat
     }
 }
 
-static double base_further(const void *self, const vi_phase further[])
+static double base_further(const void *self, const vi_phase further[], const double signal_value[])
 {
     const modal_structure *s = self;
-    double sum = 0.0;
+    double sum = vi_structure_base_of_signals(&s->signals, signal_value);
     int count = 0;
     for (int k = 0; k < VI_SINES; ++k) {
         const vi_structure_sine *sine = &s->sine[k];
@@ -384,10 +493,13 @@ const vi_body_form vi_this_body = {
     .check_inputs = check_inputs,
     .check_forcing = check_forcing,
     .find_forcing = find_forcing,
+    .find_stops = find_stops,
+    .tables = tables,
     .find_inputs = find_inputs,
     .base_forcing = base_forcing,
     .drive_further = drive_further,
     .base_further = base_further,
+    .make_signals = make_signals,
     .update_outputs = update_outputs,
     .show_states = show_states,
 };

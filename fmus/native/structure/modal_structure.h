@@ -5,13 +5,13 @@
 #include <stdint.h>
 
 #include "body.h"
+#include "structure_signals.h"
 
 /* A force besides the forcing: a sine, or constant where the frequency is 0. */
 typedef struct {
     double angular_frequency, amplitude, phase;
     int32_t of_base; /* an acceleration of the base */
 } vi_structure_sine;
-
 /* All variables and state of a Structure, described in variables.toml; copying the struct copies the Structure. The
  * model in `body` holds the shapes of contacts and observed point, and the damping matrix. */
 typedef struct {
@@ -27,7 +27,10 @@ typedef struct {
     double forcing_amplitude, forcing_base_acceleration;
     vi_structure_sine sine[VI_SINES_ROOM];
     double sine_shape[VI_SINES_ROOM][VI_MODES];
+    vi_structure_signals signals;
     int32_t sines_started, turns[VI_SINES_ROOM]; /* since the start: is a sine not constant? */
+    vi_stop_motion stop[VI_PORTS]; /* `first` counts from 1 */
+    double stop_bend[VI_TABLE_ROOM]; /* second derivatives of the splines of stops; derived at the start */
     /* inputs */
     double force, force_rate;
     vi_body body; /* last member: its record is saved as far as it is used, and nothing after it */

@@ -35,17 +35,17 @@ static void orthonormalize(int n, double column[][VI_ORBIT_STATES], double stret
 static void fly(const vi_orbit_response *response, double from, double to, double u, double state[])
 {
     const int modes = response->body->modes;
-    double x, v;
+    double x[VI_MODES], v[VI_MODES];
+    vi_orbit_steady(response, from, x, v);
     for (int j = 0; j < modes; ++j) {
-        vi_orbit_steady(response, j, from, &x, &v);
-        state[j] -= x;
-        state[modes + j] -= v;
+        state[j] -= x[j];
+        state[modes + j] -= v[j];
     }
     vi_orbit_free(response, u, state, state + modes);
+    vi_orbit_steady(response, to, x, v);
     for (int j = 0; j < modes; ++j) {
-        vi_orbit_steady(response, j, to, &x, &v);
-        state[j] += x;
-        state[modes + j] += v;
+        state[j] += x[j];
+        state[modes + j] += v[j];
     }
 }
 

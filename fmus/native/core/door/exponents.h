@@ -12,7 +12,7 @@ typedef struct {
     const int32_t *contact;
     const double *phase;    /* of the force, rad, in [0, 2 pi) */
     const double *elapsed;  /* since the impact before, s; unused for the first impact */
-    const double *velocity; /* towards the stop, m/s, > 0 */
+    const double *velocity; /* relative to the stop, towards it, m/s, > 0 */
 } vi_orbit_run;
 
 /* Continue along impacts first to last - 1 (first >= 1). `state`: after impact first - 1 on entry, after the last

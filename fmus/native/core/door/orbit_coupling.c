@@ -54,11 +54,12 @@ static double fastest_rate(const vi_pressed_body *body)
     return natural + drag;
 }
 
-VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const double natural[], const double coupling[],
-                                 const double cosine[], const double sine[], vi_orbit_coupling *found,
-                                 vi_coupled_work *work)
+VI_DOOR int vi_door_orbit_couple(int modes, int harmonics, const double angular_frequency[], const double natural[],
+                                 const double coupling[], const double cosine[], const double sine[],
+                                 vi_orbit_coupling *found, vi_coupled_work *work)
 {
-    if (modes < 1 || modes > VI_MODES || !fill_body(modes, natural, coupling, &found->body)) {
+    if (modes < 1 || modes > VI_MODES || harmonics < 1 || harmonics > VI_ORBIT_HARMONICS
+        || !fill_body(modes, natural, coupling, &found->body)) {
         return 1;
     }
     if (!vi_coupled_modes_find(&found->terms, &found->body, work)
@@ -66,13 +67,15 @@ VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const doub
         found->terms.terms = 0;
     }
     found->fastest = fastest_rate(&found->body);
-    vi_coupled_equations equations;
-    vi_complex load[VI_MODES], none[VI_PORTS] = {{0.0, 0.0}}, force[VI_PORTS];
-    vi_coupled_equations_find(&equations, &found->body, (vi_complex){0.0, angular_frequency});
-    for (int j = 0; j < modes; ++j) {
-        load[j] = (vi_complex){cosine[j], -sine[j]};
+    for (int k = 0; k < harmonics; ++k) {
+        vi_coupled_equations equations;
+        vi_complex load[VI_MODES], none[VI_PORTS] = {{0.0, 0.0}}, force[VI_PORTS];
+        vi_coupled_equations_find(&equations, &found->body, (vi_complex){0.0, angular_frequency[k]});
+        for (int j = 0; j < modes; ++j) {
+            load[j] = (vi_complex){cosine[k * modes + j], -sine[k * modes + j]};
+        }
+        vi_coupled_response(&equations, &found->body, load, none, found->steady[k], force);
     }
-    vi_coupled_response(&equations, &found->body, load, none, found->steady, force);
     return 0;
 }
 

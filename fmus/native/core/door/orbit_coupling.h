@@ -9,22 +9,26 @@
 #include "modes/coupled_modes.h"
 #include "modes/pressed_terms.h"
 
+enum { VI_ORBIT_HARMONICS = 48 }; /* most sines of different frequencies, of the force and of the stops */
+
 typedef struct {
     vi_pressed_body body;        /* without contacts; its coupling[][] is the damping */
     vi_pressed_modes terms;      /* terms of its free motion; none next to critical damping, where they would cancel */
     double fastest;              /* bound of all rates, 1/s */
-    vi_complex steady[VI_MODES]; /* response to the force: displacement Re(steady e^(i phase)) */
+    /* response to each sine of the force: displacement Re(steady e^(i order phase)) */
+    vi_complex steady[VI_ORBIT_HARMONICS][VI_MODES];
 } vi_orbit_coupling;
 
 /* Size of vi_orbit_coupling, and of the workspace that finds it, in bytes. */
 VI_DOOR size_t vi_door_orbit_coupling_size(void);
 VI_DOOR size_t vi_door_orbit_coupling_work_size(void);
 
-/* Find the complex modes and the steady response. coupling[modes][modes]: the damping of mass-normalised modes, 1/s,
- * symmetric but for rounding. The force is cosine cos(phase) + sine sin(phase). Returns 0, or 1 for numbers outside their range. */
-VI_DOOR int vi_door_orbit_couple(int modes, double angular_frequency, const double natural[], const double coupling[],
-                                 const double cosine[], const double sine[], vi_orbit_coupling *found,
-                                 vi_coupled_work *work);
+/* Find the complex modes and the steady responses. coupling[modes][modes]: the damping of mass-normalised modes, 1/s,
+ * symmetric but for rounding. Each sine of the force has angular_frequency[harmonics], rad/s, and cosine and
+ * sine[harmonics][modes]. Returns 0, or 1 for numbers outside their range. */
+VI_DOOR int vi_door_orbit_couple(int modes, int harmonics, const double angular_frequency[], const double natural[],
+                                 const double coupling[], const double cosine[], const double sine[],
+                                 vi_orbit_coupling *found, vi_coupled_work *work);
 
 /* Free motion for `u` seconds by power series over short steps: it needs no terms. */
 void vi_orbit_series(const vi_orbit_coupling *coupling, double u, double x[], double v[]);

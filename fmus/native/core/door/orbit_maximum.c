@@ -18,6 +18,7 @@ typedef struct {
     const vi_orbit_response *response;
     int contact;
     double phase;
+    vi_orbit_gap steady;
     double x[VI_MODES], v[VI_MODES];
     vi_complex weight[VI_TERMS]; /* coupled: displacement of the contact by each term */
 } flight;
@@ -30,8 +31,9 @@ static void begin(flight *own, const vi_orbit_response *response, int contact, c
     own->response = response;
     own->contact = contact;
     own->phase = phase;
+    vi_orbit_steady_gap(response, contact, &own->steady);
+    vi_orbit_steady(response, phase, own->x, own->v);
     for (int j = 0; j < body->modes; ++j) {
-        vi_orbit_steady(response, j, phase, &own->x[j], &own->v[j]);
         own->x[j] = state[j] - own->x[j];
         own->v[j] = state[body->modes + j] - own->v[j];
     }
@@ -124,30 +126,32 @@ static seen free_motion(const flight *own, int modes, double u)
     return sum;
 }
 
-/* Find the motion of the contact against its stop `u` seconds after the start. */
+/* Find the motion of the contact relative to its stop `u` seconds after the start. */
 static seen look(const flight *own, double u)
 {
     const vi_orbit_response *response = own->response;
     const vi_orbit_body *body = response->body;
-    const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
-    const double w = body->angular_frequency, angle = own->phase + w * u, c = cos(angle), s = sin(angle);
+    const double angle = own->phase + body->angular_frequency * u;
     seen sum = free_motion(own, body->coupling ? response->loose : body->modes, u);
     if (body->coupling) {
         const seen more = body->coupling->terms.terms == 0 ? series_motion(own, u) : coupled_motion(own, u);
         sum = (seen){sum.beyond + more.beyond, sum.velocity + more.velocity, sum.acceleration + more.acceleration,
                      sum.bound + more.bound};
     }
-    double cosine = 0.0, sine = 0.0;
-    for (int j = 0; j < body->modes; ++j) {
-        sum.beyond += shape[j] * response->level[j];
-        cosine += shape[j] * response->steady_cos[j];
-        sine += shape[j] * response->steady_sin[j];
+    sum.beyond += own->steady.level;
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double w = body->order[k] * body->angular_frequency;
+        const double c = cos(body->order[k] * angle), s = sin(body->order[k] * angle);
+        const double cosine = own->steady.cosine[k], sine = own->steady.sine[k];
+        sum.beyond = sum.beyond + cosine * c + sine * s;
+        sum.velocity += w * (sine * c - cosine * s);
+        sum.acceleration -= w * w * (cosine * c + sine * s);
+        sum.bound += w * w * w * sqrt(cosine * cosine + sine * sine);
     }
     const double direction = body->direction[own->contact];
-    sum.beyond = direction * (sum.beyond + cosine * c + sine * s - body->position[own->contact]);
-    sum.velocity = direction * (sum.velocity + w * (sine * c - cosine * s));
-    sum.acceleration = direction * (sum.acceleration - w * w * (cosine * c + sine * s));
-    sum.bound += w * w * w * sqrt(cosine * cosine + sine * sine);
+    sum.beyond = direction * (sum.beyond - body->position[own->contact]);
+    sum.velocity *= direction;
+    sum.acceleration *= direction;
     return sum;
 }
 

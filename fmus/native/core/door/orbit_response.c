@@ -12,13 +12,30 @@ static const double TURN = 6.283185307179586;
  * take more than 1e6 steps. */
 static const double MOST_OF_SERIES = 1e5;
 
+static bool is_finite(int count, const double values[])
+{
+    double sum = 0.0; /* 0, or NaN */
+    for (int j = 0; j < count; ++j) {
+        sum += 0.0 * values[j];
+    }
+    return sum == 0.0;
+}
+
 static bool is_body(const vi_orbit_body *body)
 {
     bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS
-                && body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
+                && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS && body->angular_frequency > 0.0
+                && isfinite(body->angular_frequency);
+    for (int k = 0; good && k < body->harmonics; ++k) {
+        good = body->order[k] >= 1.0 && body->order[k] == floor(body->order[k])
+               && is_finite(body->modes, body->cosine + (ptrdiff_t)k * body->modes)
+               && is_finite(body->modes, body->sine + (ptrdiff_t)k * body->modes)
+               && is_finite(body->contacts, body->stop_cosine + (ptrdiff_t)k * body->contacts)
+               && is_finite(body->contacts, body->stop_sine + (ptrdiff_t)k * body->contacts);
+    }
     for (int j = 0; good && j < body->modes; ++j) {
         good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
-               && isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j])
+               && isfinite(body->damping_ratio[j] + body->held[j])
                && (body->natural[j] > 0.0 || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
@@ -81,6 +98,31 @@ static int of_one_mode(const vi_orbit_response *response)
     return response->body->coupling ? response->loose : response->body->modes;
 }
 
+/* Find the steady response of mode j to each sine of the force; false where one is unbounded. */
+static bool find_steady(vi_orbit_response *response, int j)
+{
+    const vi_orbit_body *body = response->body;
+    const double natural = body->natural[j], decay = response->mode[j].decay;
+    double sum = 0.0;
+    for (int k = 0; k < body->harmonics; ++k) {
+        double *along = &response->steady_cos[k][j], *across = &response->steady_sin[k][j];
+        if (body->coupling && j >= response->loose) {
+            *along = body->coupling->steady[k][j - response->loose].re;
+            *across = -body->coupling->steady[k][j - response->loose].im;
+        } else {
+            const double w = body->order[k] * body->angular_frequency;
+            const double c = body->cosine[k * body->modes + j], s = body->sine[k * body->modes + j];
+            const double detuning = (natural - w) * (natural + w), drag = 2.0 * decay * w;
+            const double size = vi_magnitude(detuning, drag);
+            const double in_phase = detuning / size / size, lagging = drag / size / size;
+            *along = c == 0.0 && s == 0.0 ? 0.0 : c * in_phase - s * lagging;
+            *across = c == 0.0 && s == 0.0 ? 0.0 : c * lagging + s * in_phase;
+        }
+        sum += *along + *across;
+    }
+    return isfinite(sum);
+}
+
 int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
 {
     if (!is_body(body)) {
@@ -95,21 +137,11 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
     for (int j = 0; j < body->modes; ++j) {
         response->loose += body->natural[j] == 0.0;
         vi_mode *mode = &response->mode[j];
-        const double natural = body->natural[j], w = body->angular_frequency;
-        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0, w);
-        const double detuning = (natural - w) * (natural + w), drag = 2.0 * mode->decay * w;
-        const double size = vi_magnitude(detuning, drag);
-        const double along = detuning / size / size, across = drag / size / size;
-        const double c = body->cosine[j], s = body->sine[j];
+        const double natural = body->natural[j];
+        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0,
+                      body->angular_frequency);
         response->level[j] = j < response->loose ? 0.0 : body->held[j] / mode->stiffness;
-        if (body->coupling && j >= response->loose) {
-            response->steady_cos[j] = body->coupling->steady[j - response->loose].re;
-            response->steady_sin[j] = -body->coupling->steady[j - response->loose].im;
-        } else {
-            response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
-            response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
-        }
-        if (!isfinite(response->steady_cos[j] + response->steady_sin[j])) {
+        if (!find_steady(response, j)) {
             return VI_ORBIT_RESONANT;
         }
     }
@@ -267,30 +299,87 @@ void vi_orbit_free(const vi_orbit_response *response, double u, double x[], doub
     }
 }
 
-void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v)
+void vi_orbit_steady(const vi_orbit_response *response, double phase, double x[], double v[])
 {
-    const double c = response->steady_cos[j], s = response->steady_sin[j], w = response->body->angular_frequency;
-    *x = response->level[j] + c * cos(phase) + s * sin(phase);
-    *v = w * (s * cos(phase) - c * sin(phase));
+    const vi_orbit_body *body = response->body;
+    for (int j = 0; j < body->modes; ++j) {
+        x[j] = response->level[j];
+        v[j] = 0.0;
+    }
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double *along = response->steady_cos[k], *across = response->steady_sin[k];
+        const double w = body->order[k] * body->angular_frequency, angle = body->order[k] * phase;
+        const double c = cos(angle), s = sin(angle);
+        for (int j = 0; j < body->modes; ++j) {
+            x[j] = x[j] + along[j] * c + across[j] * s;
+            v[j] += w * (across[j] * c - along[j] * s);
+        }
+    }
+}
+
+void vi_orbit_steady_gap(const vi_orbit_response *response, int contact, vi_orbit_gap *gap)
+{
+    const vi_orbit_body *body = response->body;
+    const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
+    gap->level = 0.0;
+    for (int j = 0; j < body->modes; ++j) {
+        gap->level += shape[j] * response->level[j];
+    }
+    for (int k = 0; k < body->harmonics; ++k) {
+        double cosine = 0.0, sine = 0.0;
+        for (int j = 0; j < body->modes; ++j) {
+            cosine += shape[j] * response->steady_cos[k][j];
+            sine += shape[j] * response->steady_sin[k][j];
+        }
+        gap->cosine[k] = cosine - body->stop_cosine[k * body->contacts + contact];
+        gap->sine[k] = sine - body->stop_sine[k * body->contacts + contact];
+    }
+}
+
+void vi_orbit_stop(const vi_orbit_body *body, int contact, double phase, double at[3])
+{
+    at[0] = at[1] = at[2] = 0.0;
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double w = body->order[k] * body->angular_frequency, angle = body->order[k] * phase;
+        const double along = body->stop_cosine[k * body->contacts + contact];
+        const double across = body->stop_sine[k * body->contacts + contact];
+        const double moved = along * cos(angle) + across * sin(angle);
+        at[0] += moved;
+        at[1] += w * (across * cos(angle) - along * sin(angle));
+        at[2] -= w * w * moved;
+    }
 }
 
 void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3])
 {
     const vi_orbit_body *body = response->body;
     const int32_t contact = response->train->contact[i];
-    const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
-    const double w = body->angular_frequency;
-    double level = 0.0, x = 0.0, v = 0.0;
-    for (int j = 0; j < body->modes; ++j) {
-        double displacement, speed;
-        vi_orbit_steady(response, j, response->train->phase[i], &displacement, &speed);
-        level += shape[j] * response->level[j];
-        x += shape[j] * (displacement - response->level[j]);
-        v += shape[j] * speed;
+    const double phase = response->train->phase[i], direction = body->direction[contact];
+    vi_orbit_gap gap;
+    vi_orbit_steady_gap(response, contact, &gap);
+    at[0] = at[1] = at[2] = 0.0;
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double w = body->order[k] * body->angular_frequency, angle = body->order[k] * phase;
+        const double x = gap.cosine[k] * cos(angle) + gap.sine[k] * sin(angle);
+        at[0] += x;
+        at[1] += direction * w * (gap.sine[k] * cos(angle) - gap.cosine[k] * sin(angle));
+        at[2] -= direction * w * w * x;
     }
-    at[0] = body->direction[contact] * (x + level - body->position[contact]);
-    at[1] = body->direction[contact] * v;
-    at[2] = -body->direction[contact] * w * w * x;
+    at[0] = direction * (at[0] + gap.level - body->position[contact]);
+}
+
+/* Modal force of all sines at a phase of the clock. */
+static void force_at(const vi_orbit_body *body, double phase, double force[])
+{
+    for (int j = 0; j < body->modes; ++j) {
+        force[j] = 0.0;
+    }
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double c = cos(body->order[k] * phase), s = sin(body->order[k] * phase);
+        for (int j = 0; j < body->modes; ++j) {
+            force[j] = force[j] + body->cosine[k * body->modes + j] * c + body->sine[k * body->modes + j] * s;
+        }
+    }
 }
 
 void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase, double velocity, const double state[],
@@ -301,17 +390,17 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
     const double *shape = body->shape + (ptrdiff_t)contact * modes;
     const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
     const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
-    double acceleration = 0.0; /* of the contact, before the impact */
-    double before[VI_MODES] = {0.0}, drag[VI_MODES], lost_drag[VI_MODES];
+    double before[VI_MODES] = {0.0}, force[VI_MODES], drag[VI_MODES], lost_drag[VI_MODES], stop[3];
+    vi_orbit_stop(body, contact, phase, stop);
+    double acceleration = -stop[2]; /* of the contact relative to its stop, before the impact */
     for (int j = 0; j < modes; ++j) {
         before[j] = state[modes + j] + lost * speed * impulse[j];
     }
     vi_orbit_drag(response, before, drag);
     vi_orbit_drag(response, impulse, lost_drag);
+    force_at(body, phase, force);
     for (int j = 0; j < modes; ++j) {
-        acceleration += shape[j]
-                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j] - drag[j]
-                           - response->mode[j].stiffness * state[j]);
+        acceleration += shape[j] * (force[j] + body->held[j] - drag[j] - response->mode[j].stiffness * state[j]);
     }
     for (int c = 0; c < columns; ++c) {
         double displaced = 0.0, faster = 0.0;

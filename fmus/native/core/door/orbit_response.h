@@ -9,7 +9,8 @@
 #include "motion/flow.h"
 #include "sizes.h"
 
-enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_STATES = 2 * VI_MODES }; /* most impacts of an orbit; states of a body */
+/* Most impacts of an orbit; states of a body. */
+enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_STATES = 2 * VI_MODES };
 
 /* Results of a call. */
 enum {
@@ -21,18 +22,21 @@ enum {
     VI_ORBIT_ADRIFT = 5    /* no impact of the train tells the position of a mode without a spring */
 };
 
-/* A body of mass-normalised modes; shapes are [contact][mode]. */
+/* A body of mass-normalised modes; shapes are [contact][mode]. Force and stops move periodically, as sums of sines. Each
+ * sine turns `order` times in a period of the clock: cosine cos(order phase) + sine sin(order phase). */
 typedef struct {
-    int32_t modes, contacts;
-    double angular_frequency;     /* of the force, rad/s */
+    int32_t modes, contacts, harmonics;
+    double angular_frequency;     /* of the clock, rad/s */
     const double *natural;        /* [modes] rad/s, >= 0; modes of 0 (no spring) come first */
     const double *damping_ratio;  /* [modes]; from the diagonal of a damping that couples the modes; 0: no spring */
-    const double *cosine, *sine;  /* [modes] modal force = cosine cos(phase) + sine sin(phase) */
+    const double *order;          /* [harmonics] whole numbers >= 1 */
+    const double *cosine, *sine;  /* [harmonics][modes] modal force */
     const double *held;           /* [modes] constant modal force */
     const double *shape;          /* displacement of each contact */
     const double *impulse; /* modal velocities that take a unit of velocity from the contact: shape . impulse = 1 */
     const double *direction; /* [contacts] +1: the stop is above, -1: below */
-    const double *position; /* [contacts] m */
+    const double *position; /* [contacts] m, mean position of each stop */
+    const double *stop_cosine, *stop_sine; /* [harmonics][contacts] m, motion of each stop about its position */
     const double *restitution; /* [contacts] */
     const vi_orbit_coupling *coupling; /* complex modes where damping couples the modes that have springs, else NULL */
 } vi_orbit_body;
@@ -50,7 +54,7 @@ typedef struct {
     double length; /* of the train, s */
     int32_t loose; /* modes without a spring */
     vi_mode mode[VI_MODES];
-    double steady_cos[VI_MODES], steady_sin[VI_MODES], level[VI_MODES];
+    double steady_cos[VI_ORBIT_HARMONICS][VI_MODES], steady_sin[VI_ORBIT_HARMONICS][VI_MODES], level[VI_MODES];
     double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
     vi_complex part[VI_PORTS][VI_TERMS]; /* coupled: terms just after such an impulse at each contact */
     double state[VI_PORTS][VI_ORBIT_STATES]; /* the same without terms: displacements and velocities */
@@ -78,18 +82,29 @@ void vi_orbit_drag(const vi_orbit_response *response, const double v[], double d
 /* Free motion of all modes for `u` seconds, without constant forces. */
 void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[]);
 
-/* Steady response of mode j to the force; the constant force counts only for a mode with a spring. */
-void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v);
+/* Steady response of all modes to the force; the constant force counts only for a mode with a spring. */
+void vi_orbit_steady(const vi_orbit_response *response, double phase, double x[], double v[]);
 
-/* Apply an impact to a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: towards
- * the stop before the impact, m/s; `state`: of all modes after the impact. */
+/* Steady motion of a contact relative to its stop: level + cosine cos(order phase) + sine sin(order phase), m. */
+typedef struct {
+    double level; /* about the mean position of the stop, which is not subtracted */
+    double cosine[VI_ORBIT_HARMONICS], sine[VI_ORBIT_HARMONICS];
+} vi_orbit_gap;
+
+void vi_orbit_steady_gap(const vi_orbit_response *response, int contact, vi_orbit_gap *gap);
+
+/* Motion of a stop about its mean position at a phase of the clock, with its first two derivatives. */
+void vi_orbit_stop(const vi_orbit_body *body, int contact, double phase, double at[3]);
+
+/* Apply an impact to a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: relative
+ * to the stop and towards it, before the impact, m/s; `state`: of all modes after the impact. */
 void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase, double velocity, const double state[],
                    int columns, double change[][VI_ORBIT_STATES]);
 
 /* Apply a flight of `u` seconds to a change of the state. */
 void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES]);
 
-/* Steady response at the contact of impact i: distance beyond its stop, and the first two derivatives. */
+/* Steady response at the contact of impact i: distance beyond its moving stop, and the first two derivatives. */
 void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3]);
 
 #endif

@@ -224,6 +224,44 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
     return VI_ORBIT_DONE;
 }
 
+VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, double *level, double cosine[],
+                               double sine[])
+{
+    vi_orbit_response response;
+    const int refused = train->impacts == 1 ? vi_orbit_respond(&response, body, train) : VI_ORBIT_REFUSED;
+    if (refused != VI_ORBIT_DONE) {
+        return refused;
+    }
+    placing placed;
+    if (!find_placing(&response, &placed)) {
+        return VI_ORBIT_ADRIFT;
+    }
+    double g[3], place[VI_MODES];
+    answer(&response, 0, 0, g);
+    if (!(fabs(1.0 - g[1]) > 0.0)) {
+        return VI_ORBIT_SINGULAR;
+    }
+    const int32_t contact = train->contact[0];
+    const double direction = body->direction[contact], none = 0.0;
+    vi_orbit_gap gap;
+    vi_orbit_steady_gap(&response, contact, &gap);
+    *level = direction * (gap.level - body->position[contact]);
+    put_in_place(&response, &placed, level, 1, place);
+    drift(&response, &none, 1.0, level, 1);
+    for (int k = 0; k < body->harmonics; ++k) {
+        const double w = body->order[k] * body->angular_frequency;
+        const double x[2] = {direction * gap.cosine[k], direction * gap.sine[k]};
+        const double speed[2] = {w * x[1] / (1.0 - g[1]), -w * x[0] / (1.0 - g[1])};
+        double *const part[2] = {&cosine[k], &sine[k]};
+        for (int side = 0; side < 2; ++side) {
+            *part[side] = x[side] + g[0] * speed[side];
+            put_in_place(&response, &placed, part[side], 1, place);
+            drift(&response, &speed[side], 0.0, part[side], 1);
+        }
+    }
+    return VI_ORBIT_DONE;
+}
+
 /* ---- the motion ---- */
 
 /* Modal displacements and velocities just after impact i. */
@@ -231,9 +269,7 @@ static void after_impact(const vi_orbit_response *response, const double velocit
 {
     const vi_orbit_body *body = response->body;
     const vi_orbit_train *train = response->train;
-    for (int j = 0; j < body->modes; ++j) {
-        vi_orbit_steady(response, j, train->phase[i], &state[j], &state[body->modes + j]);
-    }
+    vi_orbit_steady(response, train->phase[i], state, state + body->modes);
     for (int k = 0; k < train->impacts; ++k) {
         const int32_t contact = train->contact[k];
         const double taken = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact];
@@ -254,7 +290,9 @@ static void place_states(const vi_orbit_response *response, const placing *place
     double distance[VI_ORBIT_IMPACTS], place[VI_MODES];
     for (int i = 0; i < n; ++i) {
         const int32_t contact = response->train->contact[i];
-        double at = -body->position[contact];
+        double stop[3];
+        vi_orbit_stop(body, contact, response->train->phase[i], stop);
+        double at = -body->position[contact] - stop[0];
         for (int j = 0; j < body->modes; ++j) {
             at += body->shape[(ptrdiff_t)contact * body->modes + j] * state[(ptrdiff_t)i * 2 * body->modes + j];
         }

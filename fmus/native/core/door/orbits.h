@@ -1,4 +1,5 @@
-/* Periodic orbits of a body of N modes that hits restitution stops p times in q forcing periods.
+/* Periodic orbits of a body of N modes that hits restitution stops p times in q periods of the clock. Force and stops
+ * are sums of sines of this period.
  *
  * The only unknowns are the phases of the impacts. Each impact is an impulse, and the response of a mode to a periodic
  * train of impulses has a closed form (equations.md 4.7). So p linear equations give the velocities from the phases.
@@ -14,10 +15,15 @@
 #include "door/door.h"
 #include "door/orbit_response.h"
 
-/* Find the approach speeds before the impacts, m/s, and the distances beyond the stops at the impacts, m, for given
+/* Find the approach speeds, relative to the stops, before the impacts, m/s, and the distances beyond the stops at the impacts, m, for given
  * phases. Distances are 0 for an orbit. *_slope: derivatives [impacts][impacts] over the phases. */
 VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train, double velocity[], double distance[],
                           double distance_slope[], double velocity_slope[]);
+
+/* Find the distance of one impact beyond its stop over its phase, m: level, and the sum of cosine cos(order phase) +
+ * sine sin(order phase). `train` has this impact at any phase. An orbit has distance 0. */
+VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, double *level, double cosine[],
+                               double sine[]);
 
 /* Find the motion of an orbit: modal displacements and velocities after each impact, state[impact][2 modes].
  * monodromy[2 modes][2 modes]: derivative of the first state over that a train earlier; NaN where a speed is 0. */

@@ -55,11 +55,18 @@ typedef struct {
     int any_more;                                          /* are there other loads than these and the clock's force? */
     double more[VI_ORDER - 1][VI_ROW];                     /* the Taylor coefficients of those */
     double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
+    double pushed[VI_STOPS_MOVE ? VI_PORTS : 1][VI_ROW];   /* of the modes of bodies only, where stops may move */
     int yields[VI_PORTS], yielding;                        /* the contacts that yield, and their number */
     double compliance[VI_PORTS][VI_PORTS];                 /* of each contact to yielding contacts' forces */
     int is_held[VI_PORTS], any_held, any_power;
     double holding[VI_PORTS][VI_PORTS];                    /* of each contact to held contacts' forces */
 } equation;
+
+/* The row of modes that a force of contact k moves. */
+INLINE const double *pushed(const equation *e, int k)
+{
+    return VI_STOPS_MOVE ? e->pushed[k] : e->toward[k];
+}
 
 static void set_up_contacts(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
@@ -74,6 +81,9 @@ static void set_up_contacts(equation *e, const vi_structure_model *model, const 
         }
         for (int j = 0; j < e->width; ++j) {
             e->toward[k][j] = j < vi_structure_modes(model) ? start->sign[k] * model->shape[k][j] : 0.0;
+        }
+        for (int j = 0; j < e->width && VI_STOPS_MOVE; ++j) {
+            e->pushed[k][j] = j < vi_structure_free_modes(model) ? e->toward[k][j] : 0.0;
         }
     }
 }
@@ -197,7 +207,7 @@ INLINE void extend(vi_drift *drift, const equation *e, double drive, int n, doub
         drift->penetration[k][n + 2] = share * all;
     }
     for (int y = 0; y < yielding; ++y) {
-        vi_row_add(load, -drift->force[e->yields[y]][n], e->toward[e->yields[y]], e->width);
+        vi_row_add(load, -drift->force[e->yields[y]][n], pushed(e, e->yields[y]), e->width);
     }
     for (int j = 0; j < e->width; j += VI_LANES) {
         for (int i = 0; i < VI_LANES; ++i) {
@@ -228,7 +238,7 @@ static void hold(vi_drift *drift, equation *e, int n, double share)
     for (int k = 0; k < contacts; ++k) {
         if (e->is_held[k]) {
             drift->force[k][n] = f[k] / share;
-            vi_row_add(next, -f[k], e->toward[k], e->width);
+            vi_row_add(next, -f[k], pushed(e, k), e->width);
         }
     }
 }

@@ -45,7 +45,7 @@ static void extend(vi_drift *drift, const entry *at, double drive, int n)
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         double load = drive * mode->force - mode->stiffness * x[j] - rate * (2.0 * mode->decay * v[j])
-                      - shape[j] * push;
+                      - (j < vi_structure_free_modes(model) ? shape[j] * push : 0.0);
         load += n == 0 ? at->start->drive.held[j] - mode->stiffness * at->start->q[j] : 0.0;
         load += n == 2 ? at->start->drive.held_rate[j] : 0.0;
         drift->modal[n + 4][j] = share * load;

@@ -47,7 +47,7 @@ vi_contact_force vi_structure_yield(const vi_structure *s, int k)
 void vi_structure_push(const vi_structure *s, int k, double force, double acceleration[])
 {
     const double push = vi_structure_direction(s, k) * force;
-    for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
+    for (int j = 0; j < vi_structure_free_modes(s->model) && push != 0.0; ++j) {
         acceleration[j] -= s->model->shape[k][j] * push;
     }
 }

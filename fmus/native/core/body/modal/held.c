@@ -35,6 +35,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     x[k] = vi_structure_approach(s, k);
     vi_solve_active(model->contacts, g, x, active, unit);
     memcpy(view->p, state->p, sizeof view->p);
+    memcpy(view->impulse, unit, (size_t)model->contacts * sizeof unit[0]);
     for (int l = 0; l < model->contacts; ++l) {
         vi_structure_push(s, l, unit[l], view->p);
     }

@@ -10,6 +10,7 @@
 /* A contact that would be held at rest from now on: the state after a plastic impact, and the force to hold it. */
 typedef struct {
     double p[VI_MODES];
+    double impulse[VI_PORTS]; /* of that impact, N s */
     double mobility;         /* of the contact, with the other held contacts held, 1/kg */
     double pressure, slope, bend; /* acceleration towards the stop if released, m/s^2, and its first two rates */
     double noise;            /* of the pressure, and of the acceleration without other held contacts, m/s^2 */

@@ -184,10 +184,12 @@ double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_fl
     vi_part sum[VI_MODES + 1], so_far = particular(point, flight, instant); /* with the first modes */
     double ripple[VI_MODES];
     vi_part_keep(&sum[0], &so_far);
-    for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+        /* given motions first: modes are left out from the last on */
+        const int j = VI_STOPS_MOVE ? (i + vi_structure_free_modes(flight->model)) % n : i;
         vi_part_add(&so_far, point->shape[j], &instant->part[j]);
-        vi_part_keep(&sum[j + 1], &so_far);
-        ripple[j] = fabs(point->shape[j]) * instant->part[j].reach;
+        vi_part_keep(&sum[i + 1], &so_far);
+        ripple[i] = fabs(point->shape[j]) * instant->part[j].reach;
     }
     return vi_rippling_step(sum, ripple, n, point->offset, point->sign, horizon);
 }

@@ -4,6 +4,10 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/stop_motion.h"
+
+/* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
+static const double LITTLE_ROOM = 1e-6;
 
 /* ---- the model ---- */
 
@@ -47,11 +51,11 @@ void vi_structure_prepare(vi_structure_model *model)
     for (int k = 0; k < model->contacts; ++k) {
         for (int l = 0; l < model->contacts; ++l) {
             model->mobility[k][l] = twofold_dot(model, model->shape[k], model->impulse[l], &model->mobility_low[k][l]);
-            model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
+            model->compliance[k][l] = vi_structure_at_body(model, model->shape[k], model->shape[l]);
         }
     }
     for (int k = 0; k < model->contacts; ++k) {
-        model->at_observed[k] = memcmp(model->shape[k], model->observed, (size_t)vi_structure_modes(model) * sizeof(double)) == 0;
+        model->at_observed[k] = memcmp(model->shape[k], model->observed, (size_t)vi_structure_free_modes(model) * sizeof(double)) == 0;
     }
     model->fastest = coupling_rate(model);
     for (int j = 0; j < vi_structure_modes(model); ++j) {
@@ -69,11 +73,12 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
 {
     vi_structure_state *state = s->state;
     const vi_phase *further = vi_structure_further(s);
-    vi_instant *past[VI_PORTS + 3] = {&state->held_since, &state->standstill.instant, &state->budget.mark};
+    vi_instant *past[VI_PORTS + 4] = {&state->held_since, &state->input_since, &state->standstill.instant,
+                                      &state->budget.mark};
     for (int k = 0; k < VI_PORTS; ++k) {
-        past[3 + k] = &state->separated[k];
+        past[4 + k] = &state->separated[k];
     }
-    vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 3);
+    vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 4);
     for (int k = 0; k < vi_structure_sines(s->model); ++k) {
         vi_sine *sine = &s->model->sine[k];
         *sine = vi_sine_from(&s->model->clock, sine->angular_frequency, state->now, further[k].angle);
@@ -82,6 +87,7 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
     }
+    vi_stop_motions_count_by(s->model);
     state->rest.known = 0;
     state->budget.unfinished = 0;
     vi_structure_prepare(s->model);
@@ -102,7 +108,7 @@ void vi_structure_drive_further(const vi_structure *s, int sines, double (*force
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         double of_mode[VI_SINES_ROOM];
         for (int k = 0; k < sines && VI_SINES > 0; ++k) {
-            of_mode[k] = force[k][j];
+            of_mode[k] = j < vi_structure_free_modes(model) ? force[k][j] : 0.0;
         }
         vi_mode_drive_further(&model->mode[j], sines, of_mode, angular_frequency);
         state->origin[j].known = 0;
@@ -195,7 +201,8 @@ double vi_structure_within(const vi_structure *s, double displacement)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
         const double sign = vi_structure_direction(s, k), stop = s->contacts[k].position;
-        if (s->model->at_observed[k] && sign * displacement > sign * stop && is_rigid(s, k)) {
+        if (s->model->at_observed[k] && sign * displacement > sign * stop && is_rigid(s, k)
+            && !vi_structure_stop_moves(s->model, k)) {
             displacement = stop;
         }
     }
@@ -207,7 +214,7 @@ double vi_structure_observed(const vi_structure *s)
     for (int k = 0; k < s->model->contacts; ++k) {
         const int32_t status = s->state->status[k];
         if (s->model->at_observed[k] && (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD)) {
-            return s->contacts[k].position;
+            return vi_structure_stop_position(s, k);
         }
     }
     return vi_structure_within(s, vi_structure_at(s->model, s->model->observed, s->state->q));
@@ -257,7 +264,7 @@ double vi_structure_most_acceleration(const vi_structure *s, int k)
 
 double vi_structure_kinetic(const vi_structure *s)
 {
-    return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);
+    return 0.5 * vi_structure_at_body(s->model, s->state->p, s->state->p);
 }
 
 int vi_structure_beyond(const vi_structure *s)
@@ -273,7 +280,12 @@ int vi_structure_beyond(const vi_structure *s)
 
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
 {
-    int on_stop[VI_PORTS];
+    int on_stop[VI_PORTS], pair[2];
+    if (vi_stop_motions_jam(s, LITTLE_ROOM, pair)) {
+        vi_complain(message, "contact[%d] and contact[%d]: expected room between their stops, of which one moves, got none at %.17g s",
+                    pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
+        return;
+    }
     for (int k = 0; k < s->model->contacts; ++k) {
         on_stop[k] = s->state->status[k] != VI_CONTACT_FREE;
     }
@@ -290,7 +302,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     if (state->exchange.on) { /* the importer gives inputs at each instant: there is no step with slopes */
         memset(state->held_rate, 0, sizeof state->held_rate);
     }
-    state->held_since = state->now;
+    state->held_since = state->input_since = state->now;
     state->budget.unfinished = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_contact *contact = &s->contacts[k];
@@ -300,8 +312,12 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
             continue;
         }
         const double push = vi_structure_direction(s, k) * contact->applied_force;
-        for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
+        for (int j = 0; j < vi_structure_free_modes(s->model) && push != 0.0; ++j) {
             state->held[j] -= s->model->shape[k][j] * push;
         }
+    }
+    if (VI_SIGNALS > 0) {
+        memcpy(state->input, state->held, sizeof state->input);
+        memcpy(state->input_rate, state->held_rate, sizeof state->input_rate);
     }
 }

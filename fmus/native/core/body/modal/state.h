@@ -21,7 +21,23 @@
 #include "motion/flow.h"
 #include "motion/origin.h"
 #include "motion/sines.h"
+#include "signals/table.h"
 #include "sizes.h"
+
+/* The given motion of a stop, from its position: place + velocity (t - since) + amplitude cos(angular_frequency t + phase
+ * + shift) + its table. All 0: the stop stands still. */
+typedef struct {
+    double velocity;                            /* m/s */
+    double amplitude, angular_frequency, phase; /* m, rad/s, rad */
+    double place, since, shift;                 /* m, s, rad; 0 until a parameter changes in the motion */
+    int64_t first, knots;                       /* of its table; knots: 0 without a table */
+} vi_stop_motion;
+
+/* A mode whose motion is given: stop_motion.h. */
+typedef struct {
+    vi_stop_motion motion; /* a sine, whose amplitude is in the shapes, or the rest */
+    vi_sine sine;
+} vi_given_mode;
 
 /* Constants after the start. */
 typedef struct {
@@ -30,6 +46,7 @@ typedef struct {
     int32_t contacts;      /* number of ports in use, 0 to VI_PORTS */
     int32_t further;       /* further observed points; their shapes are behind those of the contacts */
     int32_t rows;          /* rows of shape in use: contacts + further; derived by vi_structure_prepare */
+    int64_t given_modes;   /* the last modes have a given motion, that of stops; 0 where stops stand still */
     int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
     double tolerance;      /* relative error of a contact whose force is a power of the penetration */
     vi_clock clock;
@@ -43,6 +60,8 @@ typedef struct {
     int32_t varies;            /* modes follow the amplitude: they change at each step */
     int32_t coupled;           /* damping couples the modes: coupling[][] holds all damping */
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
+    vi_stop_motion stop_motion[VI_STOPS_MOVE ? VI_PORTS : 1];
+    vi_given_mode given[VI_STOPS_MOVE ? VI_MODES : 1];
     int64_t asks;              /* set at the start: does another component answer? 64 bits, to avoid padding */
     /* derived by vi_structure_prepare */
     int32_t at_observed[VI_PORTS];         /* is the contact at the observed point? */
@@ -118,6 +137,10 @@ typedef struct {
     int64_t degree;                             /* of the loads; above 1 held_since is the present instant */
     double higher[VI_HIGHER_ROOM][VI_MODES];    /* coefficients 2 to degree */
     double loads_last;                          /* time from now for which they are valid, s; HUGE_VAL for any time */
+    /* with signals `held` has them; then these are the inputs alone, and the instant of the inputs */
+    vi_instant input_since;
+    double input[VI_LOADS_ROOM], input_rate[VI_LOADS_ROOM];
+    double signal_value[VI_SIGNALS_ROOM];       /* of each signal at held_since */
     int32_t status[VI_PORTS];   /* vi_contact_status */
     int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
@@ -149,6 +172,9 @@ typedef struct vi_scan vi_scan;
 /* Responses over steps in a contact with a power law: power_tables.h. */
 typedef struct vi_power_tables vi_power_tables;
 
+/* Loads that are signals of time: loads.h. */
+typedef struct vi_signal_loads vi_signal_loads;
+
 /* Pointers to the parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
@@ -159,6 +185,8 @@ typedef struct {
     vi_pressed_cache *pressed; /* NULL: long rests are followed by series, like short ones */
     vi_scan *scan;       /* NULL: flights are followed by certified steps only */
     vi_power_tables *power; /* NULL: contacts with a power law are followed by series only */
+    vi_signal_loads *loads; /* NULL: there are none */
+    vi_table tables;        /* of the motions of stops, behind each other */
 } vi_structure;
 
 /* Set mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.
@@ -211,6 +239,12 @@ static inline int vi_structure_modes(const vi_structure_model *model)
     return VI_ONLY_MODES > 0 ? VI_ONLY_MODES : model->modes;
 }
 
+/* Number of modes that forces move, those of the bodies. */
+static inline int vi_structure_free_modes(const vi_structure_model *model)
+{
+    return vi_structure_modes(model) - (VI_STOPS_MOVE ? (int)model->given_modes : 0);
+}
+
 /* shape . vector */
 static inline double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[])
 {
@@ -219,6 +253,32 @@ static inline double vi_structure_at(const vi_structure_model *model, const doub
         sum += shape[j] * vector[j];
     }
     return sum;
+}
+
+/* The part of shape . vector that is of the bodies. */
+static inline double vi_structure_at_body(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < vi_structure_free_modes(model); ++j) {
+        sum += shape[j] * vector[j];
+    }
+    return sum;
+}
+
+/* Do stops move? Some ways of following a motion need stops that stand still. */
+static inline bool vi_structure_stops_move(const vi_structure_model *model)
+{
+    return VI_STOPS_MOVE && model->given_modes > 0;
+}
+
+/* Does the stop of contact k move? */
+static inline bool vi_structure_stop_moves(const vi_structure_model *model, int k)
+{
+    bool moves = false;
+    for (int j = vi_structure_free_modes(model); j < vi_structure_modes(model); ++j) {
+        moves = moves || model->shape[k][j] != 0.0;
+    }
+    return moves;
 }
 
 /* Entry of the modal damping matrix, 1/s. */
@@ -249,6 +309,26 @@ static inline double vi_structure_direction(const vi_structure *s, int k)
     return vi_contact_direction(s->contacts[k].side);
 }
 
+/* Velocity of the stop of contact k at these modal velocities, m/s. */
+static inline double vi_structure_stop_velocity(const vi_structure *s, int k, const double p[])
+{
+    double sum = 0.0;
+    for (int j = vi_structure_free_modes(s->model); j < vi_structure_modes(s->model); ++j) {
+        sum -= s->model->shape[k][j] * p[j];
+    }
+    return sum;
+}
+
+/* Present position of the stop of contact k, m. */
+static inline double vi_structure_stop_position(const vi_structure *s, int k)
+{
+    double sum = s->contacts[k].position;
+    for (int j = vi_structure_free_modes(s->model); j < vi_structure_modes(s->model); ++j) {
+        sum -= s->model->shape[k][j] * s->state->q[j];
+    }
+    return sum;
+}
+
 vi_phase vi_structure_phase(const vi_structure *s);
 
 /* Phases of the further sines. */
@@ -272,7 +352,7 @@ void vi_structure_phase_is(const vi_structure *s, vi_phase phase);
 
 void vi_structure_held_now(const vi_structure *s, double held[]);
 
-/* sign * shape . p: speed towards the stop, m/s */
+/* sign * shape . p: speed towards the stop, relative to a stop that moves, m/s */
 static inline double vi_structure_approach(const vi_structure *s, int k)
 {
     return vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], s->state->p);

@@ -251,7 +251,7 @@ void vi_structure_put_on_stop(const vi_structure *s, int k)
     const vi_structure_model *model = s->model;
     const double displacement = vi_structure_at(model, model->shape[k], s->state->q);
     const double beyond = (displacement - s->contacts[k].position) / model->compliance[k][k];
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(model); ++j) {
         s->state->q[j] -= model->shape[k][j] * beyond;
     }
     s->state->status[k] = VI_CONTACT_TOUCHING;

@@ -8,6 +8,7 @@
 #include "body/modal/entry_flow.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/extremes.h"
 #include "body/modal/structure/power_contact.h"
@@ -163,7 +164,7 @@ static void add_impulses(const vi_structure *s, const vi_drift *drift, const vi_
 static double energy_now(const vi_structure *s)
 {
     double elastic = 0.0;
-    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(s->model); ++j) {
         elastic += 0.5 * s->model->mode[j].stiffness * s->state->q[j] * s->state->q[j];
     }
     return vi_structure_kinetic(s) + elastic;
@@ -174,9 +175,20 @@ static void finish(const vi_structure *s, const vi_drift *drift, const vi_situat
 {
     const bool follow = now->any_thin && s->state->follow_energies;
     const double before = follow ? energy_now(s) : 0.0;
+    double impulse[VI_PORTS] = {0.0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        impulse[k] = now->thin[k] ? -s->state->touch_down[k].impulse : 0.0;
+    }
     add_impulses(s, drift, now, u);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        impulse[k] += now->thin[k] ? s->state->touch_down[k].impulse : 0.0;
+    }
     vi_structure_project(s);
-    s->state->energies.contact_loss += follow ? before - energy_now(s) : 0.0;
+    if (follow) {
+        const double work = VI_STOPS_MOVE ? vi_stop_motions_work(s, impulse) : 0.0;
+        s->state->energies.forcing_work += work;
+        s->state->energies.contact_loss += before - energy_now(s) + work;
+    }
 }
 
 static void follow_energies(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)

@@ -9,6 +9,7 @@
 #include "body/law_check.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/loads.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
@@ -69,7 +70,7 @@ static void find_nominals(const vi_structure *s)
     const vi_structure_model *model = s->model;
     const vi_structure_state *state = s->state;
     double displacement = 0.0, velocity = 0.0, slowest = 0.0;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const double own = mode->natural > 0.0 ? mode->natural : mode->angular_frequency;
         const double rate = own > 0.0 ? own : 1.0;
@@ -109,13 +110,14 @@ bool vi_exchange_set_time(const vi_exchange_body *body, double time)
         return false;
     }
     body->parts.state->now = instant;
+    vi_structure_load(&body->parts);
     return true;
 }
 
 /* From the body's modes to the states of the description; states beyond the modes in use are 0. */
 static void show(const vi_exchange_body *body, const double modal[], double shown[])
 {
-    const int used = vi_structure_modes(body->parts.model);
+    const int used = vi_structure_free_modes(body->parts.model);
     for (int j = 0; j < body->modes; ++j) {
         if (body->shape != NULL) {
             shown[j] = j < used ? vi_structure_at(body->parts.model, body->shape[j], modal) : 0.0;
@@ -128,7 +130,7 @@ static void show(const vi_exchange_body *body, const double modal[], double show
 /* From the states of the description to the body's modes: q = Psi' M x is the inverse of x = Psi q. */
 static void take(const vi_exchange_body *body, const double shown[], double modal[])
 {
-    const int used = vi_structure_modes(body->parts.model);
+    const int used = vi_structure_free_modes(body->parts.model);
     for (int j = 0; j < used; ++j) {
         modal[j] = body->shape != NULL ? 0.0 : body->scale * shown[j];
         for (int i = 0; i < used && body->shape != NULL; ++i) {
@@ -152,7 +154,7 @@ void vi_exchange_set_states(const vi_exchange_body *body, const double states[])
 bool vi_exchange_states_are_finite(const vi_exchange_body *body)
 {
     bool finite = true;
-    for (int j = 0; j < vi_structure_modes(body->parts.model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(body->parts.model); ++j) {
         finite = finite && isfinite(body->parts.state->q[j]) && isfinite(body->parts.state->p[j]);
     }
     return finite;
@@ -161,7 +163,7 @@ bool vi_exchange_states_are_finite(const vi_exchange_body *body)
 void vi_exchange_get_nominals(const vi_exchange_body *body, double nominals[])
 {
     for (int j = 0; j < body->modes; ++j) {
-        const double scale = body->mass == NULL ? body->scale : j < vi_structure_modes(body->parts.model) ? sqrt(body->mass[j]) : 1.0;
+        const double scale = body->mass == NULL ? body->scale : j < vi_structure_free_modes(body->parts.model) ? sqrt(body->mass[j]) : 1.0;
         nominals[j] = body->parts.state->exchange.displacement / scale;
         nominals[body->modes + j] = body->parts.state->exchange.velocity / scale;
     }

@@ -222,7 +222,7 @@ static void add_powers(const vi_structure *s, const double p[], const double hel
     const vi_structure_model *model = s->model;
     const double cosine = cos(angle);
     double work = 0.0, loss = 0.0;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
         work += vi_structure_is_plain(s) ? 0.0 : further_load(s, j, u, further) * p[j];
@@ -277,6 +277,11 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
         vi_further_after(&s->model->mode[0], start, t, further);
         add_powers(s, p, held, t, angle + w * t, further, slope * weight);
         for (int k = 0; k < s->model->contacts; ++k) {
+            if (VI_STOPS_MOVE && s->state->status[k] >= VI_CONTACT_HELD) {
+                vi_polynomial_at(drift->force[k], r, value);
+                const double speed = vi_structure_stop_velocity(s, k, p) * vi_structure_direction(s, k);
+                s->state->energies.forcing_work -= slope * weight * value[0] * speed;
+            }
             if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
                 vi_polynomial_at(drift->force[k], r, value);
                 const double force = value[0];
@@ -295,7 +300,7 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
     vi_phase further[VI_SINES_ROOM];
     vi_further_after(&s->model->mode[0], vi_structure_further(s), u, further);
     vi_drift_at(drift, u, zero, p, moved);
-    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+    for (int j = 0; j < vi_structure_free_modes(s->model); ++j) {
         const double back = q[j] + moved[j] - s->state->q[j];
         work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
         work += vi_structure_is_plain(s) ? 0.0 : further_load(s, j, u, further) * back;

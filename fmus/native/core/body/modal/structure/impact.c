@@ -9,6 +9,7 @@
 #include "body/landing.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
@@ -63,12 +64,24 @@ static double bounce_resolution(const vi_structure *s, int k, double pressure, d
     return vi_max(integrated, resolution(s, k, pressure, rebound));
 }
 
+/* Balance the energies of an impact: moving stops do work on the bodies, the contacts lose the rest. before: kinetic
+ * energy, J; impulse: of the contacts, N s. */
+static void balance(const vi_structure *s, double before, const double impulse[])
+{
+    vi_energies *energies = &s->state->energies;
+    if (s->state->follow_energies) {
+        const double work = VI_STOPS_MOVE ? vi_stop_motions_work(s, impulse) : 0.0;
+        energies->forcing_work += work;
+        energies->contact_loss += before - vi_structure_kinetic(s) + work;
+    }
+}
+
 /* Apply the plastic impact that replaces the rest of a chatter sequence, or acts on a stop without rebound. */
 static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
 {
     const double before = s->state->follow_energies ? vi_structure_kinetic(s) : 0.0;
     memcpy(s->state->p, view->p, sizeof view->p);
-    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+    balance(s, before, view->impulse);
     vi_structure_rest(s, k, delay, tail_impulse);
 }
 
@@ -324,8 +337,8 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS], impulse[VI_PORTS], impulse_low[VI_PORTS];
-    int in_play[VI_PORTS], resting[VI_PORTS];
+    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS] = {0.0}, impulse[VI_PORTS], impulse_low[VI_PORTS];
+    int in_play[VI_PORTS] = {0}, resting[VI_PORTS];
     const double before = vi_structure_kinetic(s);
     for (int k = 0; k < n; ++k) {
         approach[k] = restitution[k] = change[k] = 0.0;
@@ -340,7 +353,7 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     find_in_play(s, hit, in_play);
     joint_impulses(s, in_play, change, impulse, impulse_low);
     give_impulses(s, impulse, impulse_low);
-    state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+    balance(s, before, impulse);
     for (int k = 0; k < n; ++k) {
         if (resting[k]) {
             stay_or_part(s, k, in_play[k], impulse[k]);
@@ -367,7 +380,7 @@ static void stop_contacts(const vi_structure *s, const int chosen[])
         vi_structure_push(s, k, impulse[k], s->state->p);
         s->contacts[k].total_impulse += impulse[k];
     }
-    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+    balance(s, before, impulse);
 }
 
 /* A body between stops that leave no room: every touching contact comes to rest. False where the stops leave room. */

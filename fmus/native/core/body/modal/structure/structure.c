@@ -7,7 +7,9 @@
 #include "body/landing.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/loads.h"
 #include "body/modal/modal_flight.h"
+#include "body/modal/stop_motion.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/drift.h"
@@ -30,9 +32,11 @@ static const double SMALLEST = 1e-154;
 static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
     const double length = vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
-    if (VI_DEGREE > 1 && s->state->loads_last < length) {
+    double room = VI_STOPS_MOVE ? vi_stop_motions_room(s) : HUGE_VAL;
+    room = VI_DEGREE > 1 ? vi_min(room, s->state->loads_last) : room;
+    if (room < length) {
         *end = VI_ENDS_ANYWHERE;
-        return s->state->loads_last;
+        return room;
     }
     return length;
 }
@@ -91,6 +95,7 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     } else {
         state->now = after;
     }
+    vi_structure_load(s);
 }
 
 /* ---- flight ---- */
@@ -98,7 +103,9 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 /* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    return !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
+    const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
+    return lasts && !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods
+           && !s->state->follow_energies;
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -312,10 +319,11 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.further_at.periods = INT64_MAX; /* no phase is known */
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
-    fresh.now = fresh.held_since = now;
+    fresh.now = fresh.held_since = fresh.input_since = now;
     fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
+    vi_stop_motions_at(s, now);
     s->model->asks = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_law *law = vi_law_of(s->contacts[k].law.law);
@@ -392,8 +400,12 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     } else if (coupled || !fly(s, target, request)) {
         return VI_STEP_NOT_FINITE;
     }
+    int pair[2];
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
+    }
+    if (VI_STOPS_MOVE && vi_stop_motions_jam(s, VI_ROUNDING, pair)) {
+        return VI_STEP_STANDSTILL;
     }
     vi_structure_settle(s, stops_here(s, target, request));
     return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
@@ -420,8 +432,10 @@ void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
         const int32_t status = s->state->status[k];
         const bool on_stop = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
         const double *shape = s->model->shape[k];
-        contact->displacement = on_stop ? contact->position : vi_structure_at(s->model, shape, s->state->q);
-        contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, shape, s->state->p);
+        contact->displacement = on_stop ? vi_structure_stop_position(s, k)
+                                        : vi_structure_at_body(s->model, shape, s->state->q);
+        contact->velocity = status == VI_CONTACT_HELD ? vi_structure_stop_velocity(s, k, s->state->p)
+                                                      : vi_structure_at_body(s->model, shape, s->state->p);
         contact->force = vi_max(0.0, force[k]);
         contact->open = vi_structure_is_open(s, k);
     }

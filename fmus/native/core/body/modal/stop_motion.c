@@ -1,0 +1,341 @@
+#include "body/modal/stop_motion.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "body/landing.h"
+#include "body/modal/structure/contact.h"
+#include "motion/majorant.h"
+
+/* ---- the modes of the motions ---- */
+
+static bool is_sine(const vi_stop_motion *m)
+{
+    return m->amplitude != 0.0;
+}
+
+static bool is_driven(const vi_stop_motion *m)
+{
+    return m->velocity != 0.0 || m->place != 0.0 || m->knots > 0;
+}
+
+int vi_stop_motions_count(const vi_stop_motion motion[], int contacts)
+{
+    int count = 0;
+    for (int k = 0; k < contacts; ++k) {
+        count += is_sine(&motion[k]) + is_driven(&motion[k]);
+    }
+    return count;
+}
+
+/* The mode of this motion, new unless another stop has the same. */
+static int mode_of(vi_structure_model *model, const vi_stop_motion *motion)
+{
+    const int first = vi_structure_free_modes(model);
+    for (int j = first; j < model->modes; ++j) {
+        if (memcmp(&model->given[j - first].motion, motion, sizeof *motion) == 0) {
+            return j;
+        }
+    }
+    const int j = model->modes;
+    model->given[j - first] = (vi_given_mode){.motion = *motion};
+    model->modes += 1;
+    model->given_modes += 1;
+    for (int r = 0; r < VI_PORTS; ++r) {
+        model->shape[r][j] = model->impulse[r][j] = 0.0;
+    }
+    for (int i = 0; i < model->modes && model->coupled; ++i) {
+        model->coupling[i][j] = model->coupling[j][i] = 0.0;
+    }
+    model->observed[j] = 0.0;
+    vi_structure_mode(model, j, motion->angular_frequency, 0.0, 0.0, model->clock.angular_frequency);
+    return j;
+}
+
+void vi_stop_motions_begin(vi_structure_model *model, const vi_stop_motion motion[])
+{
+    model->modes = vi_structure_free_modes(model);
+    model->given_modes = 0;
+    for (int k = 0; k < model->contacts; ++k) {
+        vi_stop_motion sine, driven;
+        memset(&sine, 0, sizeof sine); /* motions are compared by their bytes */
+        memset(&driven, 0, sizeof driven);
+        model->stop_motion[k] = motion[k];
+        if (is_sine(&motion[k])) {
+            sine.angular_frequency = motion[k].angular_frequency;
+            sine.phase = motion[k].phase;
+            sine.shift = motion[k].shift;
+            model->shape[k][mode_of(model, &sine)] = -motion[k].amplitude;
+        }
+        if (is_driven(&motion[k])) {
+            driven.velocity = motion[k].velocity;
+            driven.place = motion[k].place;
+            driven.since = motion[k].since;
+            driven.first = motion[k].first;
+            driven.knots = motion[k].knots;
+            model->shape[k][mode_of(model, &driven)] = -1.0;
+        }
+    }
+}
+
+/* Count a sine by the clock. */
+static void count_by(vi_given_mode *given, const vi_clock *clock)
+{
+    const vi_stop_motion *m = &given->motion;
+    if (m->angular_frequency > 0.0) {
+        given->sine = vi_sine_start(clock, m->angular_frequency, m->phase + m->shift);
+    }
+}
+
+void vi_stop_motions_count_by(vi_structure_model *model)
+{
+    const int first = vi_structure_free_modes(model);
+    for (int j = first; j < vi_structure_modes(model); ++j) {
+        vi_given_mode *given = &model->given[j - first];
+        count_by(given, &model->clock);
+        vi_mode_drive(&model->mode[j], 0.0, model->clock.angular_frequency);
+    }
+}
+
+/* ---- the motions in time ---- */
+
+/* The spline of a table about an instant. Before the first instant and from the last one on it is a straight line. */
+static void look_up(const vi_structure *s, const vi_stop_motion *m, vi_twofold time, vi_piece *piece)
+{
+    const int first = (int)m->first, count = (int)m->knots, last = first + count - 1;
+    const vi_table *all = &s->tables;
+    const vi_table table = {count, all->time + first, all->value + first, all->bend + first};
+    const double resolution = vi_piece_resolution(time);
+    const double before = (all->time[first] - time.high) - time.low, left = (all->time[last] - time.high) - time.low;
+    if (before <= resolution && left > resolution) {
+        vi_table_piece(&table, time, resolution, piece);
+        return;
+    }
+    const int end = before > resolution ? first : last;
+    vi_table_piece(&table, (vi_twofold){all->time[end == first ? first : last - 1], 0.0}, 0.0, piece);
+    vi_piece_shift(piece, end == first ? 0.0 : all->time[last] - all->time[last - 1]);
+    *piece = (vi_piece){.degree = 1,
+                        .length = end == first ? before : HUGE_VAL,
+                        .coefficient = {all->value[end], piece->coefficient[1]}};
+    vi_piece_shift(piece, (time.high - all->time[end]) + time.low);
+}
+
+/* The course of a mode, for the amplitude 1 of a sine. */
+static vi_stop_course course_of(const vi_structure *s, const vi_given_mode *given, vi_instant now)
+{
+    const vi_stop_motion *m = &given->motion;
+    if (m->angular_frequency > 0.0) {
+        const double w = m->angular_frequency, square = w * w;
+        const vi_phase phase = vi_sine_phase(&given->sine, now);
+        const double velocity = -w * phase.sine;
+        return (vi_stop_course){phase.cosine, velocity, -square * phase.cosine, -square * velocity};
+    }
+    double low;
+    const double time = vi_clock_time_twofold(&s->model->clock, now, &low);
+    vi_piece piece = {.degree = 0};
+    if (m->knots > 0) {
+        look_up(s, m, (vi_twofold){time, low}, &piece);
+    }
+    const double along = m->place + m->velocity * ((time - m->since) + low), *c = piece.coefficient;
+    return (vi_stop_course){along + c[0], m->velocity + c[1], 2.0 * c[2], 6.0 * c[3]};
+}
+
+void vi_stop_motions_at(const vi_structure *s, vi_instant now)
+{
+    vi_structure_state *state = s->state;
+    const int first = vi_structure_free_modes(s->model);
+    for (int j = first; j < vi_structure_modes(s->model); ++j) {
+        const vi_stop_course c = course_of(s, &s->model->given[j - first], now);
+        state->q[j] = c.displacement;
+        state->p[j] = c.velocity;
+        state->held[j] = state->held_rate[j] = 0.0;
+        if (s->model->given[j - first].motion.knots > 0) { /* its acceleration is a load, counted like the inputs */
+            state->held_rate[j] = c.jerk;
+            state->held[j] = c.acceleration - c.jerk * vi_clock_elapsed(&s->model->clock, state->held_since, now);
+        }
+    }
+}
+
+double vi_stop_motions_room(const vi_structure *s)
+{
+    const int first = vi_structure_free_modes(s->model);
+    double room = HUGE_VAL, low;
+    vi_piece piece;
+    for (int j = first; j < vi_structure_modes(s->model); ++j) {
+        const vi_stop_motion *m = &s->model->given[j - first].motion;
+        if (m->knots > 0) {
+            const double time = vi_clock_time_twofold(&s->model->clock, s->state->now, &low);
+            look_up(s, m, (vi_twofold){time, low}, &piece);
+            room = vi_min(room, piece.length);
+        }
+    }
+    return room;
+}
+
+vi_stop_course vi_stop_course_of(const vi_structure *s, int k)
+{
+    vi_stop_course sum = {0.0, 0.0, 0.0, 0.0};
+    const int first = vi_structure_free_modes(s->model);
+    for (int j = first; j < vi_structure_modes(s->model); ++j) {
+        const double share = -s->model->shape[k][j];
+        if (share != 0.0) {
+            const vi_stop_course c = course_of(s, &s->model->given[j - first], s->state->now);
+            sum.displacement += share * c.displacement;
+            sum.velocity += share * c.velocity;
+            sum.acceleration += share * c.acceleration;
+            sum.jerk += share * c.jerk;
+        }
+    }
+    return sum;
+}
+
+double vi_stop_motions_work(const vi_structure *s, const double impulse[])
+{
+    double work = 0.0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (impulse[k] != 0.0) {
+            work -= vi_structure_direction(s, k) * impulse[k] * vi_structure_stop_velocity(s, k, s->state->p);
+        }
+    }
+    return work;
+}
+
+/* ---- stops that leave no room ---- */
+
+/* Difference of the directions of two rows up to which they count as one line, relative to their sizes. */
+static const double PARALLEL = 16.0 * DBL_EPSILON;
+
+/* Room between the stops of contacts i and k, relative to their displacements, where they hold one line of a body from
+ * both sides; HUGE_VAL where they do not. */
+static double room_between(const vi_structure *s, int i, int k)
+{
+    const vi_structure_model *model = s->model;
+    const double one = vi_structure_direction(s, i), other = vi_structure_direction(s, k);
+    const double size = sqrt(model->compliance[i][i] * model->compliance[k][k]);
+    if (!(one * other * model->compliance[i][k] <= -(1.0 - PARALLEL) * size)
+        || !(vi_structure_stop_moves(model, i) || vi_structure_stop_moves(model, k))) {
+        return HUGE_VAL;
+    }
+    const double first = sqrt(model->compliance[i][i]), second = sqrt(model->compliance[k][k]);
+    const double room = one * vi_structure_stop_position(s, i) / first + other * vi_structure_stop_position(s, k) / second;
+    return room / (vi_structure_displacement_size(s, i) / first + vi_structure_displacement_size(s, k) / second);
+}
+
+bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2])
+{
+    for (int i = 0; i < s->model->contacts && vi_structure_stops_move(s->model); ++i) {
+        for (int k = i + 1; k < s->model->contacts && s->model->stop[i] == VI_RIGID_STOP; ++k) {
+            if (s->model->stop[k] == VI_RIGID_STOP && room_between(s, i, k) <= least) {
+                pair[0] = i;
+                pair[1] = k;
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* ---- other motions ---- */
+
+/* The instant of time 0, which the phases are for. */
+static vi_instant time_zero(const vi_clock *clock)
+{
+    vi_instant zero = {0, 0.0, 0.0};
+    (void)vi_clock_instant(clock, 0.0, 0.0, &zero);
+    return zero;
+}
+
+/* The motion from now on: it goes on from its phase and its place where a frequency or a velocity changes. */
+static vi_stop_motion continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
+{
+    double low;
+    const double time = vi_clock_time_twofold(&s->model->clock, s->state->now, &low);
+    motion.shift = was->shift;
+    motion.place = was->place;
+    motion.since = was->since;
+    if (motion.angular_frequency != was->angular_frequency && is_sine(was) && is_sine(&motion)) {
+        const vi_clock *clock = &s->model->clock;
+        const vi_sine sine = vi_sine_start(clock, was->angular_frequency, was->phase + was->shift);
+        const double angle = vi_sine_phase(&sine, s->state->now).angle + motion.phase - was->phase;
+        const vi_sine from = vi_sine_from(clock, motion.angular_frequency, s->state->now, angle);
+        motion.shift = vi_sine_phase(&from, time_zero(clock)).angle - motion.phase;
+    }
+    if (motion.velocity != was->velocity) {
+        motion.place += was->velocity * ((time - was->since) + low);
+        motion.since = time;
+    }
+    return motion;
+}
+
+/* Displacement of a stop by its motion now, m. */
+static double displacement_by(const vi_structure *s, const vi_stop_motion *motion)
+{
+    vi_given_mode sine = {.motion = *motion}, driven = {.motion = *motion};
+    double sum = 0.0;
+    if (is_sine(motion)) {
+        count_by(&sine, &s->model->clock);
+        sum += motion->amplitude * course_of(s, &sine, s->state->now).displacement;
+    }
+    if (is_driven(motion)) {
+        driven.motion.angular_frequency = 0.0;
+        sum += course_of(s, &driven, s->state->now).displacement;
+    }
+    return sum;
+}
+
+/* Contact k after its stop has taken another place. */
+static void meet_moved(const vi_structure *s, int k)
+{
+    vi_structure_state *state = s->state;
+    if (state->status[k] == VI_CONTACT_HELD) {
+        vi_structure_release(s, k, 0);
+    }
+    if (state->status[k] == VI_CONTACT_TOUCHING) {
+        state->status[k] = VI_CONTACT_FREE;
+    }
+    state->leaving[k] = 0;
+    const double clearance = vi_structure_clearance(s, k), noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
+    if (state->status[k] == VI_CONTACT_FREE && clearance < -noise) {
+        vi_structure_touch_down(s, k); /* of a stop that yields: a rigid one is refused */
+    } else if (state->status[k] == VI_CONTACT_FREE && clearance <= noise) {
+        state->status[k] = VI_CONTACT_TOUCHING;
+    } else if (state->status[k] == VI_CONTACT_YIELDING && clearance >= 0.0) {
+        vi_structure_separate(s, k, false);
+    } else if (state->status[k] == VI_CONTACT_RECEDING && clearance >= 0.0) {
+        state->status[k] = VI_CONTACT_FREE;
+    }
+}
+
+bool vi_stop_motions_change(const vi_structure *s, const vi_stop_motion motion[], int *contact)
+{
+    vi_structure_model *model = s->model;
+    vi_stop_motion next[VI_PORTS];
+    int moved[VI_PORTS];
+    for (int k = 0; k < model->contacts; ++k) {
+        next[k] = continued(s, &model->stop_motion[k], motion[k]);
+        moved[k] = memcmp(&next[k], &model->stop_motion[k], sizeof next[k]) != 0;
+        const double step = moved[k] ? displacement_by(s, &next[k]) - displacement_by(s, &model->stop_motion[k]) : 0.0;
+        const double noise = VI_ROUNDING * (vi_structure_displacement_size(s, k) + fabs(step));
+        if (model->stop[k] == VI_RIGID_STOP
+            && vi_structure_clearance(s, k) + vi_structure_direction(s, k) * step < -noise) {
+            *contact = k + 1;
+            return false;
+        }
+    }
+    vi_stop_motions_begin(model, next);
+    vi_stop_motions_count_by(model);
+    vi_structure_prepare(model);
+    vi_stop_motions_at(s, s->state->now);
+    for (int k = 0; k < model->contacts; ++k) {
+        if (moved[k] && model->stop[k] != VI_NO_STOP) {
+            meet_moved(s, k);
+        }
+    }
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        s->state->origin[j].known = 0;
+    }
+    s->state->rest.known = 0;
+    s->state->budget.unfinished = 0;
+    return true;
+}
