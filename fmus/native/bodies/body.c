@@ -97,11 +97,14 @@ int vi_body_ports(const vi_body *c)
 static void drive(void *self, vi_body *c)
 {
     double force[VI_MODES];
+    char message[VI_MESSAGE_LENGTH] = "";
     if (!c->forcing_changed) {
         return;
     }
+    form->check_forcing(self, message);
     form->find_forcing(self, force);
-    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
+    bool good = message[0] == '\0'
+                && vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
     for (int j = 0; j < vi_structure_modes(&c->model); ++j) {
         good = good && isfinite(force[j]);
     }

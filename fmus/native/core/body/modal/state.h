@@ -262,7 +262,7 @@ vi_phase vi_structure_phase(const vi_structure *s);
 /* Phases of the further sines. */
 const vi_phase *vi_structure_further(const vi_structure *s);
 
-/* What acts on the modes from now on; `held` is set to the present loads. */
+/* Drive of the modes from now on; `held` is set to the present loads. */
 vi_drive vi_structure_drive_now(const vi_structure *s, double held[]);
 
 /* Sum of the sizes of the harmonic forces on mode j. */
