@@ -274,7 +274,7 @@ static void check_sizes(int modes, int contacts, int64_t yielding, double rate, 
     static sample good, bad;
     static results whole, other;
     const int64_t sampled = ((int64_t)1 << VI_LANES_CONTACTS) | (((int64_t)1 << contacts) - 1);
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 0, 200, yielding, sampled, rate};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 0, 0, 200, yielding, sampled, rate};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;

@@ -117,6 +117,7 @@ def run(
         each_period,
         instructions,
         coupled,
+        len(points.get("further_force", ())),
         impact_limit,
         yields,
         sampled,

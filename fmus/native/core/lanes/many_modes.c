@@ -84,6 +84,7 @@ static motion motion_from(const vi_lane_group *g, int lane, int modes, const pla
     for (int j = 0; j < modes; ++j) {
         const double drag = g->many.drag[j][lane], spring = g->many.spring[j][lane];
         double *term = m.mode[j].term;
+        m.mode[j].order = VI_LANE_ORDER;
         term[0] = s->q[j];
         term[1] = s->p[j] * g->cell[lane];
         for (int n = 0; n + 2 <= VI_LANE_ORDER; ++n) {
@@ -100,7 +101,7 @@ static vi_lane_cell point_motion(const vi_lane_group *g, int lane, int modes, in
     const double c = many->cosine[point][lane], n = many->sine[point][lane];
     const double turn = many->turn[lane], square = turn * turn;
     double drive[2] = {c * s->cosine + n * s->sine, turn * (n * s->cosine - c * s->sine)};
-    vi_lane_cell cell;
+    vi_lane_cell cell = {.order = VI_LANE_ORDER};
     for (int i = 0; i <= VI_LANE_ORDER; ++i) {
         cell.term[i] = drive[0] + (i == 0 ? many->offset[point][lane] : 0.0);
         const double next = -drive[0] * square / ((i + 1.0) * (i + 2.0));

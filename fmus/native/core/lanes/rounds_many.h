@@ -205,9 +205,13 @@ void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *poi
         run_phase_rounds(g, plan, points, 1);
     } else if (plan->yielding) {
         run_phase_rounds(g, plan, points, 2);
+    } else if (plan->further && plan->contacts < 2) {
+        run_rounds(g, plan, points, 1, plan->further);
+    } else if (plan->further) {
+        run_rounds(g, plan, points, 2, plan->further);
     } else if (plan->contacts < 2) {
-        run_rounds(g, plan, points, 1);
+        run_rounds(g, plan, points, 1, 0);
     } else {
-        run_rounds(g, plan, points, 2);
+        run_rounds(g, plan, points, 2, 0);
     }
 }
