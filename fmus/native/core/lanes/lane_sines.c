@@ -77,3 +77,8 @@ vi_lane_phases vi_lane_phases_at(const vi_lane_group *g, int lane, double period
     }
     return found;
 }
+
+void vi_lane_set_sines(vi_lane_group *g, int lane, int own)
+{
+    set_sines(g, lane, own, vi_further_sines(g));
+}

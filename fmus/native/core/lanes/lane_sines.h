@@ -20,6 +20,9 @@ typedef struct {
 /* The phases at an instant. */
 vi_lane_phases vi_lane_phases_at(const vi_lane_group *group, int lane, double periods, double rest);
 
+/* Set the modes of the further sines, after the `own` modes of a body, by the lane's clock. */
+void vi_lane_set_sines(vi_lane_group *group, int lane, int own);
+
 /* The value of a table's row with the shares of `further` sines. */
 static inline double vi_lane_add_sines(double value, const vi_lane_array row[][VI_SINE_PARTS], int lane, int further,
                                        const vi_lane_phases *phases)

@@ -94,7 +94,7 @@ LANES_INLINE vector third_of(const vector term[], vector share)
 LANES_INLINE place step_from(const vector term[], int order, vector y, const place *from, const place *to, vector share, mask *found)
 {
     const place at = place_at(term, order, share);
-    const vector half = half_bend(term, order, share - MIDDLE), third = third_of(term, share), inverse = 1.0 / at.slope;
+    const vector half = half_bend(term, VI_LANE_ORDER, share - MIDDLE), third = third_of(term, share), inverse = 1.0 / at.slope;
     const vector whole = (y + at.added) * inverse, bent = half * inverse, next = share - whole * (1.0 + whole * bent);
     place after = {.share = smaller(larger(next, from->share), to->share)};
     const vector step = after.share - share;

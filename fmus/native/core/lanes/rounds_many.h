@@ -157,6 +157,9 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
     cells_ahead ahead;
     certified_flight s;
     vector amplitude[VI_REAL_MODES];
+    if (plan->further) {
+        set_sines(g, at, vi_own_modes(plan), plan->further);
+    }
     begin_round_many(g, at, modes, &ahead, amplitude);
     if (plan->rate > 0.0) {
         sample_instants_from(g, at);

@@ -43,6 +43,22 @@ LANES_INLINE void phases_of_lane(const vi_lane_group *g, int lane, int further, 
     }
 }
 
+/* Set the modes of the further sines of several modes, after the `own` modes of the body: the motion cos(phase) and the
+ * motion sin(phase), exact at the start of each round. */
+LANES_INLINE void set_sines(vi_lane_group *g, int at, int own, int further)
+{
+    phases of;
+    phases_at(g, at, further, load(g->periods + at), load(g->rest + at), &of);
+    for (int k = 0; k < further; ++k) {
+        const vector w = load(g->sines->angular_frequency[k] + at);
+        const int cosine = own + 2 * k, sine = cosine + 1;
+        store(g->q[cosine] + at, of.cosine[k]);
+        store(g->p[cosine] + at, -(w * of.sine[k]));
+        store(g->q[sine] + at, of.sine[k]);
+        store(g->p[sine] + at, w * of.cosine[k]);
+    }
+}
+
 /* Add the shares of the further sines to values of some rows of a table, `stride` rows apart. */
 LANES_INLINE void add_sines(const vi_lane_array table[][VI_FURTHER_SINES][VI_SINE_PARTS], int stride, int count, int at,
                             int further, const phases *of, vector value[])
