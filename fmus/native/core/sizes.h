@@ -11,5 +11,14 @@
 #ifndef VI_ONLY_MODES
 #define VI_ONLY_MODES 0 /* number of modes that all bodies have, known to the compiler; 0: any up to VI_MODES */
 #endif
+#ifndef VI_SINES
+#define VI_SINES 0 /* sines of the forcing besides the clock's */
+#endif
+#ifndef VI_DEGREE
+#define VI_DEGREE 1 /* degree of the polynomials in time that inputs are on a segment, >= 1 */
+#endif
+
+/* Rooms of arrays that may be unused: C has no empty arrays. */
+enum { VI_SINES_ROOM = VI_SINES > 0 ? VI_SINES : 1, VI_HIGHER_ROOM = VI_DEGREE > 1 ? VI_DEGREE - 1 : 1 };
 
 #endif

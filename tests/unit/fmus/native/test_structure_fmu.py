@@ -284,14 +284,15 @@ def good_members(tmp_path_factory: pytest.TempPathFactory) -> Members:
 @pytest.mark.parametrize(
     ("content", "rule"),
     [
-        (b"", "a file that begins with VISTRUC1 and three sizes, got another"),
-        (b"VISTRUC2" + HEAD[8:], "a file that begins with VISTRUC1"),
-        (HEAD[:-1], "208 bytes for 2 modes and 1 contacts, got fewer"),
-        (HEAD + b"\0", "208 bytes for 2 modes and 1 contacts, got more"),
+        (b"", "a file that begins with VISTRUC2 and four sizes, got another"),
+        (b"VISTRUC1" + HEAD[8:], "a file that begins with VISTRUC2"),
+        (HEAD[:-1], "216 bytes for 2 modes, 1 contacts and 0 sines, got fewer"),
+        (HEAD + b"\0", "216 bytes for 2 modes, 1 contacts and 0 sines, got more"),
         (HEAD[:8] + bytes(8) + HEAD[16:], "1 to 64 modes, got 0"),
         (HEAD[:8] + b"\x41" + HEAD[9:], "1 to 64 modes, got 65"),
         (HEAD[:16] + b"\xff" * 8 + HEAD[24:], "0 to 32 contacts, got -1"),
-        (HEAD[:24] + b"\2" + HEAD[25:], "0 to 1 as mark of coupled damping, got 2"),
+        (HEAD[:24] + b"\x10" + HEAD[25:], "0 to 15 sines, got 16"),
+        (HEAD[:32] + b"\2" + HEAD[33:], "0 to 1 as mark of coupled damping, got 2"),
         (HEAD[:-8] + b"\xff" * 8, "finite numbers, got"),
     ],
 )
@@ -308,7 +309,7 @@ def test_a_damaged_file_is_refused_by_one_line(
 
 
 def test_a_damaged_file_is_not_exported(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 208 bytes"):
+    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 216 bytes"):
         export_fmu("Structure", tmp_path / "new.fmu", modes=2, contacts=1, structure=HEAD[:-1])
     assert not (tmp_path / "new.fmu").exists()
 
@@ -318,6 +319,93 @@ def test_more_modes_than_the_file_has_are_refused(tmp_path: Path) -> None:
         UsageError, match=r"modes: expected at most the 2 modes of resources/structure\.bin, got 3"
     ):
         export_fmu("Structure", tmp_path / "new.fmu", modes=3, contacts=1, structure=HEAD)
+
+
+# ---- further sines ----
+
+FORCED: Arrays = {
+    "mode.angular_frequency": [0.8, 2.1],
+    "mode.damping_ratio": [0.03, 0.02],
+    "mode.contact_shape": [[1.0, 0.6]],
+    "mode.observed_shape": [1.0, 0.6],
+    "mode.forcing": [1.0, 0.6],
+    "mode.base": [-1.0, 0.4],
+    "mode.sine": [[0.5, -1.0], [-1.0, 0.4]],
+}
+SINES = {
+    **{"forcing.amplitude": 0.4, "forcing.angular_frequency": 1.0, "forcing.phase": 0.3},
+    **{"sine[1].amplitude": 0.3, "sine[1].angular_frequency": 1.7, "sine[1].phase": 2.0},
+    **{
+        "sine[2].amplitude": 0.2,
+        "sine[2].angular_frequency": 0.6,
+        "sine[2].phase": -0.5,
+        "sine[2].of_base": True,
+    },
+}
+
+
+@pytest.mark.parametrize("version", ["3.0", "2.0"])
+def test_a_file_holds_the_rows_of_sines(tmp_path: Path, version: str) -> None:
+    scene = {**SINES, **stop(0.4, 0.6)}
+    path = export_fmu(
+        "Structure", tmp_path / "two.fmu", modes=2, contacts=1, fmi=version, starts=scene,
+        structure=structure_file(FORCED),
+    )  # fmt: skip
+    with structure_fmu(FORCED, scene) as own, ComponentFmu(path, version=version) as exported:
+        assert np.array_equal(history(own, 30.0, 10), history(exported, 30.0, 10))
+        assert own.get("contact[1].count") > 3
+
+
+def test_an_acceleration_of_the_base_by_a_sine_is_in_the_absolute_acceleration() -> None:
+    still = {"mode.angular_frequency": [0.0], "mode.base": [-1.0], "mode.sine": [[-1.0], [-1.0], [1.0]]}
+    of_base = {"sine[1].amplitude": 0.3, "sine[1].angular_frequency": 1.7, "sine[1].of_base": True}
+    of_base |= {"sine[2].amplitude": 0.5, "sine[2].of_base": True}
+    of_base |= {"sine[3].amplitude": 0.2, "sine[3].angular_frequency": 0.3}
+    with structure_fmu(still, of_base) as fmu:
+        fmu.step(2.0)
+        assert fmu.get("acceleration") == pytest.approx(0.2 * math.cos(0.6), abs=1e-13)
+
+
+def test_tuned_sines_keep_their_phases() -> None:
+    at, tuned = (
+        31.7,
+        {"forcing.angular_frequency": 1.1, "sine[1].amplitude": 0.5, "sine[2].angular_frequency": 0.7},
+    )
+    shifted = {"forcing.phase": 0.3 - 0.1 * at, "sine[2].phase": -0.5 - 0.1 * at}
+    with structure_fmu(FORCED, {**SINES, **stop(0.4, 0.6)}) as fmu:
+        fmu.step(at)
+        start = {
+            f"mode.{name}_start": [fmu.get(f"modal_{name}[{k}]") for k in (1, 2)]
+            for name in ("displacement", "velocity")
+        }
+        for name, value in tuned.items():
+            fmu.set(name, value)
+        fmu.step(10.0)
+        reached = fmu.state()
+    again = {**SINES, **tuned, **shifted, **stop(0.4, 0.6)}
+    with structure_fmu({**FORCED, **start}, again, start_time=at) as fmu:
+        fmu.step(10.0)
+        assert fmu.state() == pytest.approx(reached, abs=1e-10)
+        assert fmu.get("contact[1].count") >= 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "rule"),
+    [
+        ("sine[1].amplitude", math.inf, "a finite number, got inf"),
+        ("sine[1].angular_frequency", -1.0, "0, or 1e-150 to 1e"),
+        ("sine[1].angular_frequency", 0.0, "> 0, as at the start, got 0"),
+        ("sine[3].angular_frequency", 1.0, "0, as at the start, got 1"),
+    ],
+)
+def test_a_sine_is_not_tuned_to_what_it_cannot_be(name: str, value: float, rule: str) -> None:
+    messages: list[str] = []
+    with structure_fmu(FORCED, {**SINES, **stop(0.4, 0.6)}, messages=messages) as fmu:
+        fmu.step(1.0)
+        fmu.set(name, value)
+        with pytest.raises(FMICallException):
+            fmu.step(1.0)
+    assert f"{name}: expected {rule}" in messages[-1]
 
 
 # ---- what is refused ----
