@@ -18,7 +18,7 @@ from vibroimpact.fmus.errors import UsageError
 
 MOST_MODES = 8
 MOST_CONTACTS = 4
-MOST_FURTHER = 7
+MOST_SINES = 8
 IMPACT_WIDTH = 8
 PERIOD_WIDTH = 5
 """Numbers of columns of an impact and of a period, see `lanes/lane_points.h`."""
