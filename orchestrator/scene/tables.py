@@ -35,7 +35,7 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
 
         reading = read_components(document, folder)
     else:
-        reading = _read_body(document)
+        reading = _read_body(document, folder)
     problems = [*unknown, *reading.draft.problems, *reading.problems]
     return ({}, problems) if problems else ({**dict(reading.draft.header or {}), **reading.parts()}, [])
 
@@ -49,22 +49,20 @@ def _mixed_problem(general: list[str], short: list[str]) -> Problem:
     return Problem(general[0], expected, got, hint)
 
 
-def _read_body(document: Mapping[str, Any]) -> Reading:
+def _read_body(document: Mapping[str, Any], folder: Path) -> Reading:
     axes, wrong_axes = read_short_sweep(document) if "sweep" in document else ((), [])
-    draft = Draft(document, axes)
+    draft = Draft(document, axes, folder)
     return Reading(draft, wrong_axes + rule_problems(draft), partial(_parts, draft))
 
 
 def _parts(draft: Draft) -> dict[str, Any]:
     assert draft.record is not None
     return {
-        "bodies": (draft.body,),
+        "bodies": (draft.simulated_body,),
         "contacts": (*draft.stops, *draft.meetings),
         "record": _applicable(draft.record),
         "sweep": draft.axes + (draft.replay.axes if draft.replay else ()),
-        **{
-            name: getattr(draft, name) for name in ("forcing", "sensor", *CHAIN_TABLES, "execution", "replay")
-        },
+        **{name: getattr(draft, name) for name in ("forces", "sensor", *CHAIN_TABLES, "execution", "replay")},
     }
 
 

@@ -10,7 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from support.component_fmu import ComponentFmu
 
-MODES, CONTACTS, SINES = 64, 32, 15
+MODES, CONTACTS = 64, 32
+#: Shapes of the arrays of a Structure that have not one number for each mode.
+SHAPES = {
+    "mode.contact_shape": (CONTACTS, MODES),
+    "mode.damping": (MODES, MODES),
+    "mode.sine": (15, MODES),
+    "mode.signal": (8, MODES),
+    "table.time": (8192,),
+    "table.value": (8192,),
+}
 Arrays = Mapping[str, ArrayLike]
 
 
@@ -38,15 +47,13 @@ def structure_fmu(
     for name, values in arrays.items():
         set_array(fmu, name, values)
     if initialize:
-        fmu.initialize(fmu.time)
+        fmu.initialize()
     return fmu
 
 
 def set_array(fmu: ComponentFmu, name: str, values: ArrayLike) -> None:
     """Set an array of the Structure from its part in use; the rest is 0."""
     part = np.asarray(values, dtype=float)
-    rows = {"mode.contact_shape": CONTACTS, "mode.damping": MODES, "mode.sine": SINES}
-    sizes = {array: (count, MODES) for array, count in rows.items()}
-    whole = np.zeros(sizes.get(name, (MODES,)))
+    whole = np.zeros(SHAPES.get(name, (MODES,)))
     whole[tuple(map(slice, part.shape))] = part
     fmu.fmu.setFloat64([fmu.reference(name)], whole.ravel().tolist())
