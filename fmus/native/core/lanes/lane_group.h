@@ -223,8 +223,8 @@ static inline int vi_own_modes(const vi_lanes_plan *plan)
     return plan->coupled ? 2 * plan->modes : plan->modes;
 }
 
-/* Number of real modes in a lane. Each further sine of a body of several modes is two undamped modes, its cosine and its
- * sine; their shapes are the steady responses of the points. */
+/* Number of real modes in a lane. Beside several modes each further sine is two undamped modes: its cosine and its sine.
+ * Their shapes are the steady responses of the points. */
 static inline int vi_real_modes(const vi_lanes_plan *plan)
 {
     return vi_own_modes(plan) + (plan->modes > 1 ? 2 * plan->further : 0);

@@ -7,8 +7,8 @@
 #include "lanes/lane_group.h"
 #include "motion/clock.h"
 
-/* Set the phases of a point's further sines by its clock, for up to `last` periods; false where they are invalid, or the
- * periods too many. */
+/* Set the phases of a point's further sines by its clock. False where they are invalid, or the `last` period is beyond
+ * VI_MOST_TURNS. */
 bool vi_lane_take_sines(vi_lane_group *group, int lane, const vi_lanes_points *points, int64_t point,
                         const vi_clock *clock, int64_t last);
 

@@ -43,8 +43,8 @@ LANES_INLINE void phases_of_lane(const vi_lane_group *g, int lane, int further, 
     }
 }
 
-/* Set the modes of the further sines of several modes, after the `own` modes of the body: the motion cos(phase) and the
- * motion sin(phase), exact at the start of each round. */
+/* Set the modes of the further sines, after the `own` modes of a body of several modes: cos(phase) and sin(phase). So
+ * they are exact at the start of each round. */
 LANES_INLINE void set_sines(vi_lane_group *g, int at, int own, int further)
 {
     phases of;
