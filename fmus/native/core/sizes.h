@@ -11,5 +11,8 @@
 #ifndef VI_ONLY_MODES
 #define VI_ONLY_MODES 0 /* number of modes that all bodies have, known to the compiler; 0: any up to VI_MODES */
 #endif
+#ifndef VI_GROWING
+#define VI_GROWING 1 /* may modes have negative stiffness or damping? */
+#endif
 
 #endif

@@ -4,13 +4,15 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/growth.h"
 
 /* ---- the model ---- */
 
 void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
                        double angular_frequency)
 {
-    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
+    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * fabs(natural), natural * fabs(natural), force,
+                  angular_frequency);
 }
 
 /* Bound on the rates of a full damping matrix. */
@@ -60,6 +62,7 @@ void vi_structure_prepare(vi_structure_model *model)
         model->fastest = vi_max(model->fastest, rate);
     }
     model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
+    model->growth = VI_GROWING ? vi_growth_of(model) : 0.0;
 }
 
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)

@@ -6,6 +6,7 @@
 
 #include "body/landing.h"
 #include "body/modal/forces.h"
+#include "body/modal/growth.h"
 #include "body/modal/held.h"
 #include "body/modal/modal_flight.h"
 #include "body/modal/structure/arrival.h"
@@ -14,6 +15,7 @@
 #include "body/modal/structure/extremes.h"
 #include "body/modal/structure/search.h"
 #include "body/modal/structure/settle.h"
+#include "body/modal/structure/unbounded.h"
 #include "motion/majorant.h"
 
 /* Time that a released contact stays on its stop, in units of 1 / fastest rate + |time|. Contacts released together
@@ -93,7 +95,8 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 /* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies;
+    return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies
+           && !(vi_structure_grows(s->model) && s->model->displacement_limit > 0.0);
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -176,7 +179,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_phase phase;
     vi_structure_held_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
-                    vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
+                    vi_min(vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), vi_growth_reach(s->model)),
+                    bounce < HUGE_VAL);
     vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
     vi_search_points(s, &flight, points);
     const bool idle = vi_search_is_idle(s, &flight, points);
@@ -189,7 +193,9 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     if (search_result == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool meets = search_result == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
+    const bool meets = search_result == VI_SEARCH_CONTACT;
+    const bool ends = !meets && vi_unbounded_flight(s, &flight, points, &found.u);
+    const bool whole = !meets && !ends && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);
@@ -381,6 +387,9 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
+    if (state->unbounded) {
+        return VI_STEP_UNBOUNDED;
+    }
     vi_structure_settle(s, stops_here(s, target, request));
     return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
 }
@@ -388,6 +397,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     begin_step(s);
+    s->state->unbounded = VI_BOUNDED;
     vi_step_result result = VI_STEP_DONE;
     while (result == VI_STEP_DONE && !s->state->pending
            && vi_clock_is_before(s->state->now, target)) {
