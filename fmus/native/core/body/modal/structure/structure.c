@@ -193,8 +193,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     if (search_result == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool meets = search_result == VI_SEARCH_CONTACT;
-    const bool ends = !meets && vi_unbounded_flight(s, &flight, points, &found.u);
+    const bool touches = search_result == VI_SEARCH_CONTACT;
+    const bool ends = vi_unbounded_flight(s, &flight, points, touches, &found.u), meets = touches && !ends;
     const bool whole = !meets && !ends && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {

@@ -10,20 +10,82 @@ enum { HALVINGS = 60 };
 
 /* ---- the limit ---- */
 
-/* Largest displacement of the observed points and of the contacts, m. */
-static double farthest(const vi_structure *s, const double q[])
+/* Shape of an observed point or contact: a row of the model's shapes; the row behind them is the observed point. */
+static const double *shape_of(const vi_structure *s, int row)
 {
-    const vi_structure_model *model = s->model;
-    double most = fabs(vi_structure_at(model, model->observed, q));
-    for (int r = 0; r < model->rows; ++r) {
-        most = vi_max(most, fabs(vi_structure_at(model, model->shape[r], q)));
-    }
-    return most;
+    return row < s->model->rows ? s->model->shape[row] : s->model->observed;
 }
 
-static bool is_beyond(const vi_structure *s, const double q[])
+/* Bound of the displacement of a point over a flight, m. */
+static double reach_of(const vi_flight *flight, const vi_flight_instant *start, const vi_point *point)
 {
-    return farthest(s, q) > s->model->displacement_limit;
+    double reach = point->steady + fabs(point->level) + fabs(point->level_rate) * flight->length;
+    for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
+        const vi_segment *segment = &flight->segment[j];
+        reach += point->shape[j] != 0.0 ? fabs(point->shape[j]) * (start->part[j].reach + fabs(segment->origin)) : 0.0;
+    }
+    return reach;
+}
+
+/* Time within `end` at which a point passes the limit on the side of `sign`; HUGE_VAL where it does not. */
+static double time_beyond(const vi_structure *s, const vi_flight *flight, const vi_flight_instant *start, int row,
+                          double sign, double end)
+{
+    vi_point point;
+    vi_flight_instant now = *start;
+    const double limit = s->model->displacement_limit, *shape = shape_of(s, row);
+    vi_point_start(&point, flight, shape, sign, limit - sign * vi_structure_at(s->model, shape, s->state->q));
+    if (reach_of(flight, start, &point) < limit) {
+        return HUGE_VAL;
+    }
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
+        const vi_approach p = vi_point_approach(&point, flight, &now);
+        const double step = vi_point_step(&point, flight, &now, end - now.u);
+        if (p.clearance <= VI_ROUNDING * point.scale) {
+            return now.u;
+        }
+        if (!(step < end - now.u)) {
+            return HUGE_VAL;
+        }
+        vi_budget_spend(&s->state->budget, vi_structure_modes(s->model));
+        vi_flight_at(flight, vi_max(now.u + step, nextafter(now.u, HUGE_VAL)), &now);
+    }
+    return now.u;
+}
+
+static double flight_beyond(const vi_structure *s, const vi_flight *flight, double end)
+{
+    double first = HUGE_VAL;
+    vi_flight_instant start;
+    vi_flight_at(flight, 0.0, &start);
+    for (int row = 0; row <= s->model->rows; ++row) {
+        for (double sign = -1.0; sign <= 1.0; sign += 2.0) {
+            first = vi_min(first, time_beyond(s, flight, &start, row, sign, vi_min(end, first)));
+        }
+    }
+    return first;
+}
+
+static double drift_beyond(const vi_structure *s, const vi_drift *drift, double end)
+{
+    double first = HUGE_VAL;
+    for (int row = 0; row <= s->model->rows; ++row) {
+        for (double sign = -1.0; sign <= 1.0; sign += 2.0) {
+            const double *shape = shape_of(s, row);
+            double room[VI_ORDER + 1];
+            vi_drift_point(drift, shape, room);
+            for (int n = 0; n <= VI_ORDER; ++n) {
+                room[n] *= -sign;
+            }
+            room[0] += s->model->displacement_limit - sign * vi_structure_at(s->model, shape, s->state->q);
+            if (!(room[0] > 0.0)) {
+                return 0.0;
+            }
+            const vi_fall fall = vi_polynomial_fall(room, 0.0, end, VI_ROUNDING * vi_polynomial_size(room, end));
+            first = fall.found ? vi_min(first, fall.time) : first;
+        }
+    }
+    return first;
 }
 
 /* ---- stops out of reach ---- */
@@ -105,64 +167,49 @@ static bool is_left_alone(const vi_structure *s, const vi_flight *flight)
 
 /* ---- the end ---- */
 
-static bool flight_is_unbounded(const vi_structure *s, const vi_flight *flight, const vi_point points[],
-                                vi_unbounded reason, double u)
+/* The first instant at which all stops are out of reach, in (0, high] or 0; from then on they stay so. */
+static double first_out_of_reach(const vi_structure *s, const vi_flight *flight, const vi_point points[], double high)
 {
-    double q[VI_MODES], p[VI_MODES];
-    if (reason == VI_STOPS_OUT_OF_REACH) {
-        return is_out_of_reach(s, flight, points, u);
-    }
-    vi_flight_end(flight, u, flight->phase.angle + flight->angular_frequency * u, q, p);
-    return is_beyond(s, q);
-}
-
-/* Halve [0, *u] towards the first instant; both reasons hold from their first instant on. */
-static void end_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], vi_unbounded reason,
-                       double *u)
-{
-    double low = 0.0, high = flight_is_unbounded(s, flight, points, reason, 0.0) ? 0.0 : *u;
-    for (int i = 0; i < HALVINGS && low < high; ++i) {
-        const double middle = 0.5 * (low + high);
-        *(flight_is_unbounded(s, flight, points, reason, middle) ? &high : &low) = middle;
-    }
+    double low = 0.0;
     vi_budget_spend(&s->state->budget, HALVINGS * vi_structure_modes(s->model));
-    s->state->unbounded = (int32_t)reason;
-    *u = high;
+    if (is_out_of_reach(s, flight, points, 0.0)) {
+        return 0.0;
+    }
+    for (int i = 0; i < HALVINGS; ++i) {
+        const double middle = 0.5 * (low + high);
+        *(is_out_of_reach(s, flight, points, middle) ? &high : &low) = middle;
+    }
+    return high;
 }
 
-bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
+bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u)
 {
     if (!vi_structure_grows(s->model)) {
         return false;
     }
-    const bool limited = s->model->displacement_limit > 0.0, alone = is_left_alone(s, flight);
-    vi_budget_spend(&s->state->budget, (limited + alone) * vi_structure_modes(s->model));
-    if (limited && flight_is_unbounded(s, flight, points, VI_BEYOND_LIMIT, *u)) {
-        end_flight(s, flight, points, VI_BEYOND_LIMIT, u);
+    if (s->model->displacement_limit > 0.0) {
+        const double passed = flight_beyond(s, flight, *u);
+        s->state->unbounded = passed < HUGE_VAL ? VI_BEYOND_LIMIT : VI_BOUNDED;
+        *u = vi_min(*u, passed);
     }
-    if (alone && flight_is_unbounded(s, flight, points, VI_STOPS_OUT_OF_REACH, *u)) {
-        end_flight(s, flight, points, VI_STOPS_OUT_OF_REACH, u);
+    if (!meets && is_left_alone(s, flight) && is_out_of_reach(s, flight, points, *u)) {
+        s->state->unbounded = VI_STOPS_OUT_OF_REACH;
+        *u = first_out_of_reach(s, flight, points, *u);
     }
     return s->state->unbounded != VI_BOUNDED;
 }
 
 bool vi_unbounded_drift(const vi_structure *s, const vi_drift *drift, double *u)
 {
-    double low = 0.0, high = *u, q[VI_MODES], p[VI_MODES];
     if (!vi_structure_grows(s->model) || !(s->model->displacement_limit > 0.0)) {
         return false;
     }
-    vi_drift_at(drift, high, s->state->q, p, q);
-    if (!is_beyond(s, q)) {
+    const double passed = drift->rooted ? HUGE_VAL : drift_beyond(s, drift, *u);
+    if (!(passed < HUGE_VAL)) {
         return false;
     }
-    for (int i = 0; i < HALVINGS && low < high; ++i) {
-        const double middle = 0.5 * (low + high);
-        vi_drift_at(drift, middle, s->state->q, p, q);
-        *(is_beyond(s, q) ? &high : &low) = middle;
-    }
     s->state->unbounded = VI_BEYOND_LIMIT;
-    *u = high;
+    *u = passed;
     return true;
 }
 

@@ -6,9 +6,9 @@
 #include "body/modal/modal_flight.h"
 #include "body/modal/state.h"
 
-/* Does a flight, or a drift, without an event up to *u seconds become unbounded? *u is then the first such instant, and
+/* Does a flight that goes on or `meets` a stop after *u seconds, or a drift, become unbounded before? *u is then the first such instant, and
  * state->unbounded has the reason. */
-bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u);
+bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u);
 bool vi_unbounded_drift(const vi_structure *s, const vi_drift *drift, double *u);
 
 /* Say why the motion has ended at `time`, s, after VI_STEP_UNBOUNDED. */
