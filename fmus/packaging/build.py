@@ -216,8 +216,9 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     modes = blocks.get("mode", blocks.get("mass"))
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
-    # the constant removes loops over modes from a body with only one
-    return {**arrays, "VI_ONLY_MODES": 0 if modes is not None else 1, "VI_GROWING": int(component.growing)}
+    # the constants remove loops over modes from a body with only one, and further loads from bodies without
+    constants = {"VI_ONLY_MODES": 0 if modes is not None else 1, "VI_SINES": blocks.get("sine", 0)}
+    return {**arrays, **constants, "VI_DEGREE": component.degree, "VI_GROWING": int(component.growing)}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:

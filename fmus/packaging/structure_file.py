@@ -12,32 +12,32 @@ from vibroimpact.fmus.errors import UsageError
 
 #: Place of the file in an FMU.
 STRUCTURE_MEMBER = "resources/structure.bin"
-MAGIC = b"VISTRUC1"
+MAGIC = b"VISTRUC2"
 #: Bytes before the arrays, and the largest number of modes.
-HEAD, MOST_MODES = len(MAGIC) + 3 * 8, 64
+HEAD, MOST_MODES = len(MAGIC) + 4 * 8, 64
 #: Arrays of the file in their order; each has a row of one number for each mode, or several rows.
 STRUCTURE_ARRAYS = (
     *("mode.angular_frequency", "mode.damping_ratio", "mode.damping", "mode.contact_shape"),
     *("mode.observed_shape", "mode.forcing", "mode.base", "mode.force"),
-    *("mode.displacement_start", "mode.velocity_start"),
+    *("mode.displacement_start", "mode.velocity_start", "mode.sine"),
 )
 
 
 def structure_file(arrays: Mapping[str, Any], *, coupled: bool = False) -> bytes:
     """Return the content of the file for the arrays of a Structure, by variable name.
 
-    `mode.angular_frequency` has one number for each mode, N; `mode.contact_shape` has shape (contacts, N) and
-    `mode.damping` (N, N). Absent arrays are zeros. Raise UsageError for an array of another shape or an unknown name.
+    `mode.angular_frequency` has one number for each mode, N; `mode.contact_shape` has shape (contacts, N),
+    `mode.sine` (sines, N) and `mode.damping` (N, N). Absent arrays are zeros. Raise UsageError for an array of another shape or an unknown name.
     """
     natural = np.asarray(arrays["mode.angular_frequency"], dtype=np.float64)
     modes = natural.size
     shapes = dict.fromkeys(STRUCTURE_ARRAYS, (modes,)) | {"mode.damping": (modes, modes)}
-    contacts = len(arrays.get("mode.contact_shape", ()))
-    shapes["mode.contact_shape"] = (contacts, modes)
+    contacts, sines = (len(arrays.get(f"mode.{name}", ())) for name in ("contact_shape", "sine"))
+    shapes |= {"mode.contact_shape": (contacts, modes), "mode.sine": (sines, modes)}
     for name in arrays:
         if name not in shapes:
             raise UsageError(f"{name}: expected one of {', '.join(STRUCTURE_ARRAYS)}, got another.")
-    rows = [MAGIC, struct.pack("<3q", modes, contacts, coupled)]
+    rows = [MAGIC, struct.pack("<4q", modes, contacts, sines, coupled)]
     for name, shape in shapes.items():
         array = np.asarray(arrays.get(name, np.zeros(shape)), dtype="<f8")
         if array.size != np.prod(shape) or (array.size > 0 and array.shape != shape):

@@ -130,8 +130,8 @@ int main(void)
     for (int run = 0; run < 1000; ++run) {
         double p[VI_MODES] = {0.0}, q_end[VI_MODES], p_end[VI_MODES], y[2 * MODES], before[VI_MODES];
         make(&seed, p);
-        const vi_drift_start start = {start_q, p,        cos(phase), sin(phase), held,
-                                      held_rate, start_at, sign,       press};
+        const vi_drive drive = {.phase = vi_phase_of(phase), .held = held, .held_rate = held_rate, .degree = 1};
+        const vi_drift_start start = {start_q, p, drive, start_at, sign, press};
         vi_drift_begin(&drift, &model, &start, uniform(&seed, 0.01, 1.0));
         CHECK(drift.length > 1e-4, "run %d: a segment of %g s", run, drift.length);
         memcpy(before, start_q, sizeof before);

@@ -107,8 +107,8 @@ int main(void)
     for (int run = 0; run < 500; ++run) {
         double p[VI_MODES] = {0.0}, q_end[VI_MODES], p_end[VI_MODES], y[2 * MODES + 1], depth[4];
         make(&seed, p);
-        const vi_drift_start start = {start_q, p,        cos(phase), sin(phase), held,
-                                      held_rate, start_at, sign,       press};
+        const vi_drive drive = {.phase = vi_phase_of(phase), .held = held, .held_rate = held_rate, .degree = 1};
+        const vi_drift_start start = {start_q, p, drive, start_at, sign, press};
         CHECK(vi_entry_begin(&drift, &model, &start, 0, uniform(&seed, 0.01, 1.0)), "run %d", run);
         memset(y, 0, sizeof y);
         memcpy(y, start_q, MODES * sizeof y[0]);
@@ -135,7 +135,8 @@ int main(void)
     CHECK(checked > 300, "only %d entries", checked);
     press[0].exponent = 1.3;
     double p[VI_MODES] = {1.0};
-    const vi_drift_start start = {start_q, p, 1.0, 0.0, held, held_rate, start_at, sign, press};
+    const vi_drive drive = {.phase = vi_phase_of(0.0), .held = held, .held_rate = held_rate, .degree = 1};
+    const vi_drift_start start = {start_q, p, drive, start_at, sign, press};
     CHECK(!vi_entry_begin(&drift, &model, &start, 0, 1.0), "%s", "d^1.3 has no such series");
     return 0;
 }

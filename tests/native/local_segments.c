@@ -54,7 +54,8 @@ int main(void)
             held_rate[j] = choice(&seed, 2) ? uniform(&seed, -1.0, 1.0) : 0.0;
         }
         memset(together, 0, sizeof together);
-        vi_segments_start_local(together, mode, count, x, v, phase, held, held_rate, length);
+        const vi_drive drive = {.phase = phase, .held = held, .held_rate = held_rate, .degree = 1};
+        vi_segments_start_local(together, mode, count, x, v, &drive, length);
         for (int j = 0; j < count; ++j) {
             memset(&alone, 0, sizeof alone);
             vi_segment_start(&alone, &mode[j], x[j], v[j], phase, held[j], held_rate[j], length, true);
@@ -66,7 +67,7 @@ int main(void)
             CHECK(fabs(near.v - start.v) + fabs(near.a - start.a) + fabs(near.j - start.j) < 1e-280, "mode %d, case %d", j, n);
             double q, p;
             vi_segment_part(&alone, alone.length, &end);
-            vi_segment_end(&alone, alone.length, phase, &q, &p);
+            vi_segment_end(&alone, alone.length, phase, NULL, &q, &p);
             CHECK(q == x[j] + end.x && p == end.v, "mode %d, case %d", j, n);
         }
         check_parts(&seed, together, count, length);

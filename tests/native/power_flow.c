@@ -147,7 +147,8 @@ static double by_series(double phase, double length, double q_end[VI_MODES], dou
         for (int j = 0; j < MODES; ++j) {
             load[j] = held[j] + held_rate[j] * u;
         }
-        const vi_drift_start start = {q_end, p_end, cos(angle), sin(angle), load, held_rate, depth, sign, press};
+        const vi_drive drive = {.phase = vi_phase_of(angle), .held = load, .held_rate = held_rate, .degree = 1};
+        const vi_drift_start start = {q_end, p_end, drive, depth, sign, press};
         vi_drift_begin(&drift, &model, &start, 2.0 * (length - u));
         part = 0.5 * drift.length < length - u ? 0.5 * drift.length : length - u;
         impulse += vi_drift_impulse(&drift, 0, part);
@@ -173,7 +174,8 @@ static void check_steps(uint64_t *seed)
         const double phase = make(seed);
         CHECK(vi_power_tables_fit(&tables, &model), "run %d", run);
         const vi_power_level *level = vi_power_level_of(&tables, &model, (int)choice(seed, LEVEL + 1));
-        const vi_drift_start state = {q, p, cos(phase), sin(phase), held, held_rate, at, sign, press};
+        const vi_drive drive = {.phase = vi_phase_of(phase), .held = held, .held_rate = held_rate, .degree = 1};
+        const vi_drift_start state = {q, p, drive, at, sign, press};
         vi_power_start start;
         vi_power_course course[VI_PORTS];
         const int port[1] = {0};

@@ -139,7 +139,8 @@ static double follow_by_series(const vi_structure *s, const vi_pressed_flow *flo
             at[k] = free ? vi_structure_at(s->model, s->model->shape[k], s->state->q) : 0.0;
         }
         const double angle = flow->angle + flow->angular_frequency * time;
-        const vi_drift_start start = {s->state->q, s->state->p, cos(angle), sin(angle), held, none, at, sign, press};
+        const vi_drive drive = {.phase = vi_phase_of(angle), .held = held, .held_rate = none, .degree = 1};
+        const vi_drift_start start = {s->state->q, s->state->p, drive, at, sign, press};
         vi_drift_begin(&drift, s->model, &start, 1.0);
         for (int k = 0; k < contacts; ++k) {
             double sum = 0.0;

@@ -103,6 +103,9 @@ static void drive(void *self, vi_body *c)
     if (good) {
         const vi_structure parts = vi_body_parts(c);
         vi_structure_drive(&parts, force, c->forcing_angular_frequency);
+        if (form->drive_further != NULL) {
+            form->drive_further(self, false);
+        }
         c->forcing_changed = 0;
     }
 }
@@ -192,8 +195,9 @@ static void update_outputs(void *self)
     vi_body *c = vi_body_of(self);
     vi_body_refresh_inputs(self);
     *(double *)(void *)((char *)self + vi_this_description.time) = present_time(self);
-    const double base = base_acceleration(c, form->base_forcing(self));
     const vi_structure parts = vi_body_parts(c);
+    double base = base_acceleration(c, form->base_forcing(self));
+    base += form->base_further != NULL ? form->base_further(self, vi_structure_further(&parts)) : 0.0;
     vi_structure_outputs(&parts, c->modal_acceleration);
     c->displacement = vi_structure_observed(&parts);
     c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
@@ -243,7 +247,7 @@ static bool starts_free(vi_body *c, char *message)
     return false;
 }
 
-static bool start(vi_body *c, double start_time, char *message)
+static bool start(void *self, vi_body *c, double start_time, char *message)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
         vi_contact_clear(&c->contacts[k]);
@@ -258,6 +262,9 @@ static bool start(vi_body *c, double start_time, char *message)
         return false;
     }
     const vi_structure parts = vi_body_parts(c);
+    if (form->drive_further != NULL) {
+        form->drive_further(self, true);
+    }
     vi_structure_start(&parts, now);
     return true;
 }
@@ -265,7 +272,7 @@ static bool start(vi_body *c, double start_time, char *message)
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     vi_body *c = vi_body_of(self);
-    if (!form->prepare(self, message) || !start(c, start_time, message)) {
+    if (!form->prepare(self, message) || !start(self, c, start_time, message)) {
         return false;
     }
     hold_inputs(self, c);

@@ -66,12 +66,16 @@ typedef struct {
     void (*check_forcing)(const void *self, char message[VI_MESSAGE_LENGTH]);
     /* Amplitudes of the forcing's modal forces; a force of frequency 0 is constant. */
     void (*find_forcing)(const void *self, double force[VI_MODES]);
+    /* Put the further sines on the modes: at the start, or tuned ones, whose phases go on. NULL: there are none. */
+    void (*drive_further)(void *self, bool at_start);
     /* Modal forces of the inputs, and their slopes. */
     void (*find_inputs)(const void *self, double held[VI_MODES], double held_rate[VI_MODES]);
     /* Adapt the modes to the present amplitudes, until the next step; NULL: modes do not depend on amplitudes. */
     void (*follow_amplitudes)(void *self);
     /* Amplitude of the base's acceleration by the forcing, m/s^2. */
     double (*base_forcing)(const void *self);
+    /* Present acceleration of the base by further forces, m/s^2; NULL: there are none. */
+    double (*base_further)(const void *self, const vi_phase further[]);
     /* Compute the component's own outputs from the absolute acceleration of the base, m/s^2. */
     void (*update_outputs)(void *self, double base_acceleration);
     /* Describe its states in the model description. */

@@ -69,10 +69,16 @@ static void attach(void *self, const void *resources)
     for (int k = 0; k < file->contacts; ++k) {
         next = take(next, n, s->body.model.shape[k]);
     }
+    for (int k = 0; k < VI_SINES; ++k) {
+        memset(s->sine_shape[k], 0, sizeof s->sine_shape[k]);
+    }
     double *const rows[] = {s->body.model.observed, s->forcing, s->base, s->force_shape, s->displacement_start,
                             s->velocity_start};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
         next = take(next, n, rows[i]);
+    }
+    for (int k = 0; k < file->sines; ++k) {
+        next = take(next, n, s->sine_shape[k]);
     }
 }
 
@@ -154,6 +160,12 @@ static void check_shapes(const modal_structure *s, char *message)
     vi_check_each(message, vi_check_finite, "mode.forcing", s->forcing, n);
     vi_check_each(message, vi_check_finite, "mode.base", s->base, n);
     vi_check_each(message, vi_check_finite, "mode.force", s->force_shape, n);
+    for (int k = 0; k < VI_SINES; ++k) {
+        vi_check_each(message, vi_check_finite, "mode.sine", s->sine_shape[k], n);
+        if (!isfinite(s->sine[k].phase)) {
+            vi_complain(message, "sine[%d].phase: expected a finite number, got %.17g", k + 1, s->sine[k].phase);
+        }
+    }
 }
 
 static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
@@ -168,6 +180,21 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
     const modal_structure *s = self;
     vi_check_finite(message, "forcing.amplitude", s->forcing_amplitude);
     vi_check_finite(message, "forcing.base_acceleration", s->forcing_base_acceleration);
+    for (int k = 0; k < VI_SINES; ++k) {
+        const vi_structure_sine *sine = &s->sine[k];
+        const double w = sine->angular_frequency;
+        if (!isfinite(sine->amplitude)) {
+            vi_complain(message, "sine[%d].amplitude: expected a finite number, got %.17g", k + 1, sine->amplitude);
+        }
+        if (!(w == 0.0 || (w >= SLOWEST && w <= FASTEST))) {
+            vi_complain(message, "sine[%d].angular_frequency: expected 0, or %g to %g, got %.17g", k + 1, SLOWEST, FASTEST,
+                        w);
+        }
+        if (s->sines_started && (w > 0.0) != s->turns[k]) {
+            vi_complain(message, "sine[%d].angular_frequency: expected %s, as at the start, got %.17g", k + 1,
+                        s->turns[k] ? "> 0" : "0", w);
+        }
+    }
 }
 
 static bool parameters_are_good(const modal_structure *s, char *message)
@@ -219,9 +246,33 @@ static double ratio_of(const modal_structure *s, int j)
     return s->natural[j] != 0.0 ? 0.5 * s->body.model.coupling[j][j] / fabs(s->natural[j]) : 0.0;
 }
 
+/* Further sines with a frequency; those without are constant loads. */
+static void drive_further(void *self, bool at_start)
+{
+    modal_structure *s = self;
+    double force[VI_SINES_ROOM][VI_MODES], w[VI_SINES_ROOM], phase[VI_SINES_ROOM];
+    int count = 0;
+    for (int k = 0; k < VI_SINES; ++k) {
+        const vi_structure_sine *sine = &s->sine[k];
+        s->turns[k] = sine->angular_frequency > 0.0;
+        if (!s->turns[k]) {
+            continue;
+        }
+        for (int j = 0; j < s->modes; ++j) {
+            force[count][j] = sine->amplitude * s->sine_shape[k][j];
+        }
+        w[count] = sine->angular_frequency;
+        phase[count++] = sine->phase;
+    }
+    const vi_structure parts = vi_body_parts(&s->body);
+    s->sines_started = 1;
+    vi_structure_drive_further(&parts, count, force, w, at_start ? phase : NULL);
+}
+
 static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
 {
     modal_structure *s = self;
+    s->sines_started = 0;
     if (!parameters_are_good(s, message)) {
         return false;
     }
@@ -255,6 +306,26 @@ static void find_inputs(const void *self, double held[VI_MODES], double held_rat
         held[j] = s->force * s->force_shape[j] + s->body.base_acceleration * s->base[j];
         held_rate[j] = s->force_rate * s->force_shape[j] + s->body.base_acceleration_rate * s->base[j];
     }
+    for (int k = 0; k < VI_SINES; ++k) {
+        const vi_structure_sine *sine = &s->sine[k];
+        const double load = sine->angular_frequency == 0.0 ? sine->amplitude * cos(sine->phase) : 0.0;
+        for (int j = 0; j < s->modes && load != 0.0; ++j) {
+            held[j] += load * s->sine_shape[k][j];
+        }
+    }
+}
+
+static double base_further(const void *self, const vi_phase further[])
+{
+    const modal_structure *s = self;
+    double sum = 0.0;
+    int count = 0;
+    for (int k = 0; k < VI_SINES; ++k) {
+        const vi_structure_sine *sine = &s->sine[k];
+        const double cosine = sine->angular_frequency > 0.0 ? further[count++].cosine : cos(sine->phase);
+        sum += sine->of_base ? sine->amplitude * cosine : 0.0;
+    }
+    return sum;
 }
 
 static double base_forcing(const void *self)
@@ -292,6 +363,8 @@ const vi_body_form vi_this_body = {
     .find_forcing = find_forcing,
     .find_inputs = find_inputs,
     .base_forcing = base_forcing,
+    .drive_further = drive_further,
+    .base_further = base_further,
     .update_outputs = update_outputs,
     .show_states = show_states,
 };

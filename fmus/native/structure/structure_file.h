@@ -1,7 +1,7 @@
 /* The modes of a structure in the file structure.bin of an FMU's resources, which a tool without arrays cannot set.
  *
- * Little-endian: the eight letters VISTRUC1, then as int64 the number of modes, of contacts, and 1 or 0: does the damping
- * couple the modes? Then as float64 the arrays of variables.toml in their order, for these modes and contacts only.
+ * Little-endian: the eight letters VISTRUC2, then as int64 the number of modes, of contacts, of sines, and 1 or 0: does the
+ * damping couple the modes? Then as float64 the arrays of variables.toml in their order, for these modes, contacts and sines only.
  */
 #ifndef VIBROIMPACT_STRUCTURE_FILE_H
 #define VIBROIMPACT_STRUCTURE_FILE_H
@@ -11,11 +11,11 @@
 #include "body/complaint.h"
 #include "sizes.h"
 
-/* Numbers of a file: eight rows, the damping matrix and the rows of the contacts. */
-enum { VI_STRUCTURE_ROWS = 8, VI_MOST_NUMBERS = VI_MODES * (VI_STRUCTURE_ROWS + VI_MODES + VI_PORTS) };
+/* Numbers of a file: eight rows, the damping matrix and the rows of contacts and sines. */
+enum { VI_STRUCTURE_ROWS = 8, VI_MOST_NUMBERS = VI_MODES * (VI_STRUCTURE_ROWS + VI_MODES + VI_PORTS + VI_SINES) };
 
 typedef struct {
-    int32_t modes, contacts, coupled; /* modes: 0 without a file */
+    int32_t modes, contacts, sines, coupled; /* modes: 0 without a file */
     double numbers[VI_MOST_NUMBERS];  /* finite */
 } vi_structure_file;
 

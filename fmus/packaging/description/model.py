@@ -134,6 +134,8 @@ class ComponentDescription:
         Start values, by variable name, for an export without start values of its own: its run shows motion.
     core : tuple of str
         Modules of the core in this component, `body/complaint`; empty: all of them.
+    degree : int
+        Highest degree of the polynomials in time that inputs are on a segment.
     """
 
     name: str
@@ -152,6 +154,7 @@ class ComponentDescription:
     variables: tuple[Variable, ...]
     start_of_export: Mapping[str, Number]
     core: tuple[str, ...] = ()
+    degree: int = 1
 
     def uses(self, file: str) -> bool:
         """Return whether a file of the core, by its path there, belongs to the component."""

@@ -12,6 +12,7 @@ static const double LARGEST_SPLIT = 8.0;
  * decay time. */
 static const double LONGEST_SERIES = 1e4;
 static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
+
 /* stiffness/mass - (damping/(2 mass))^2 without cancellation: 0 exactly at critical damping. */
 static double discriminant(double mass, double damping, double stiffness)
 {
@@ -28,21 +29,39 @@ static inline double detuning_of(const vi_mode *mode, double w)
     return mode->stiffness < 0.0 ? mode->stiffness - w * w : (mode->natural - w) * (mode->natural + w);
 }
 
-static void start_steady(vi_mode *mode)
+/* Steady response to force cos(phase), as a multiple of the cosine and of the sine, and its amplitude. Returns whether
+ * it exists and is not 0. */
+static bool respond(const vi_mode *mode, double force, double w, double *cosine, double *sine, double *amplitude)
 {
-    const double w = mode->angular_frequency;
     const double detuning = detuning_of(mode, w);
     const double drag = 2.0 * mode->decay * w;
     const double size = vi_magnitude(detuning, drag);
-    mode->steady_exists = size > 0.0 && mode->force != 0.0;
-    mode->steady_cos = mode->steady_sin = mode->steady_amplitude = 0.0;
-    if (mode->steady_exists) {
-        mode->steady_cos = mode->force * (detuning / size) / size;
-        mode->steady_sin = mode->force * (drag / size) / size;
-        mode->steady_amplitude = fabs(mode->force) / size;
-        mode->steady_exists = isfinite(mode->steady_amplitude);
+    *cosine = *sine = *amplitude = 0.0;
+    if (!(size > 0.0 && force != 0.0)) {
+        return false;
     }
+    *cosine = force * (detuning / size) / size;
+    *sine = force * (drag / size) / size;
+    *amplitude = fabs(force) / size;
+    return isfinite(*amplitude);
+}
+
+static void start_steady(vi_mode *mode)
+{
+    double w = mode->angular_frequency;
+    const bool exists =
+        respond(mode, mode->force, w, &mode->steady_cos, &mode->steady_sin, &mode->steady_amplitude);
+    mode->steady_exists = mode->force == 0.0 || exists;
     mode->steady_snap = w * w * w * w * mode->steady_amplitude;
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        vi_further *sine = &mode->further[k];
+        double amplitude;
+        w = sine->angular_frequency;
+        const bool one = respond(mode, sine->force, w, &sine->cosine, &sine->sine, &amplitude);
+        mode->steady_exists = mode->steady_exists && (sine->force == 0.0 || one);
+        mode->steady_amplitude += amplitude;
+        mode->steady_snap += w * w * w * w * amplitude;
+    }
 }
 
 void vi_mode_drive(vi_mode *mode, double force, double angular_frequency)
@@ -53,7 +72,46 @@ void vi_mode_drive(vi_mode *mode, double force, double angular_frequency)
     if (mode->stiffness < 0.0) {
         mode->fastest = fmax(mode->fastest, fmax(mode->fast, -mode->slow));
     }
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        mode->fastest = fmax(mode->fastest, mode->further[k].angular_frequency);
+    }
     start_steady(mode);
+}
+
+void vi_mode_drive_further(vi_mode *mode, int sines, const double force[], const double angular_frequency[])
+{
+    mode->sines = sines;
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        mode->further[k] = (vi_further){.force = force[k], .angular_frequency = angular_frequency[k]};
+    }
+    vi_mode_drive(mode, mode->force, mode->angular_frequency);
+}
+
+double vi_further_force(const vi_mode *mode, const vi_phase further[])
+{
+    double sum = 0.0;
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        sum += mode->further[k].force * further[k].cosine;
+    }
+    return sum;
+}
+
+/* Add the steady response to the further sines at these phases. */
+static inline void add_further(const vi_mode *mode, const vi_phase further[], double *x, double *v)
+{
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        const vi_further *sine = &mode->further[k];
+        const double c = further[k].cosine, s = further[k].sine;
+        *x += sine->cosine * c + sine->sine * s;
+        *v += sine->angular_frequency * (sine->sine * c - sine->cosine * s);
+    }
+}
+
+void vi_further_after(const vi_mode *mode, const vi_phase start[], double u, vi_phase end[])
+{
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        end[k] = vi_phase_of(start[k].angle + mode->further[k].angular_frequency * u);
+    }
 }
 
 /* The two rates of decay; the smaller is found from the larger one, without cancellation. */
@@ -80,6 +138,7 @@ void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness,
     mode->regime = d > 0.0 ? VI_UNDERDAMPED : d < 0.0 ? VI_OVERDAMPED : VI_CRITICAL;
     mode->rate = sqrt(fabs(d));
     find_rates(mode);
+    mode->sines = 0;
     vi_mode_drive(mode, amplitude / mass, angular_frequency);
 }
 
@@ -186,7 +245,10 @@ static inline propagator propagate_segment(const vi_segment *s, double u)
 static double largest_split(const vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
-    const double load = fabs(mode->force) + fabs(s->held);
+    double load = fabs(mode->force) + fabs(s->held);
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        load += fabs(mode->further[k].force);
+    }
     if (mode->regime == VI_OVERDAMPED && mode->decay > 0.0 && mode->fastest * s->length > LONGEST_SERIES) {
         return LARGEST_SPLIT_OVERDAMPED * (fabs(x) + (fabs(v) + load * s->length) / mode->fast);
     }
@@ -194,16 +256,41 @@ static double largest_split(const vi_segment *s, double x, double v)
     return LARGEST_SPLIT * (fabs(x) + (fabs(v) + load * time) * time);
 }
 
-/* Split off the steady response and the level of the held input; false when digits would be lost. */
+/* Find the particular solution of a load of higher degree; false when it is larger than `most` within the segment. */
+static bool level_higher(vi_segment *s, double most)
+{
+    const vi_mode *mode = s->mode;
+    const int degree = vi_segment_degree(s);
+    double next = 0.0, after = 0.0, size = 0.0, power = s->length;
+    for (int n = degree; n >= 0; --n) {
+        const double order = (double)n + 1.0;
+        const double load = n >= 2 ? s->higher[n - 2] : n == 1 ? s->held_rate : s->held;
+        const double level = (load - order * (2.0 * mode->decay * next + (order + 1.0) * after)) / mode->stiffness;
+        *(n >= 2 ? &s->level_higher[n - 2] : n == 1 ? &s->level_rate : &s->level) = level;
+        after = next;
+        next = level;
+    }
+    for (int n = 2; n <= degree; ++n) {
+        power *= s->length;
+        size += fabs(s->level_higher[n - 2]) * power;
+    }
+    return fabs(s->level) <= most && fabs(s->level_rate) * s->length <= most && size <= most;
+}
+
+/* Split off the steady response and the particular solution of the load; false when digits would be lost. */
 static bool split(vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
     const double most = largest_split(s, x, v);
-    if ((mode->force != 0.0 && !mode->steady_exists) || mode->steady_amplitude > most) {
+    if (!mode->steady_exists || mode->steady_amplitude > most) {
         return false;
     }
     s->level = s->level_rate = 0.0;
-    if (s->held != 0.0 || s->held_rate != 0.0) {
+    if (vi_segment_degree(s) > 1) {
+        if (!level_higher(s, most)) {
+            return false;
+        }
+    } else if (s->held != 0.0 || s->held_rate != 0.0) {
         s->level_rate = s->held_rate / mode->stiffness;
         s->level = (s->held - 2.0 * mode->decay * s->level_rate) / mode->stiffness;
         if (!(fabs(s->level) <= most && fabs(s->level_rate) * s->length <= most)) {
@@ -213,6 +300,12 @@ static bool split(vi_segment *s, double x, double v)
     const double c = s->phase.cosine, sn = s->phase.sine;
     s->x = x - s->level - (mode->steady_cos * c + mode->steady_sin * sn);
     s->v = v - s->level_rate - mode->angular_frequency * (mode->steady_sin * c - mode->steady_cos * sn);
+    if (vi_mode_sines(mode) > 0) {
+        double steady = 0.0, rate = 0.0;
+        add_further(mode, s->further, &steady, &rate);
+        s->x -= steady;
+        s->v -= rate;
+    }
     return true;
 }
 
@@ -228,6 +321,11 @@ static void bound_split(vi_segment *s)
         s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
     }
     s->scale = s->swell * fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
+    double power = s->length;
+    for (int n = 2; n <= vi_segment_degree(s); ++n) {
+        power *= s->length;
+        s->scale += fabs(s->level_higher[n - 2]) * power;
+    }
 }
 
 /* Bound on the homogeneous |x''''| from the energy of the present state while this energy does not grow. */
@@ -317,37 +415,27 @@ vi_phase vi_phase_of(double angle)
     return (vi_phase){angle, cos(angle), sin(angle)};
 }
 
-void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *m)
-{
-    const vi_mode *mode = segment->mode;
-    const double damping = 2.0 * mode->decay;
-    m->x = x - segment->origin;
-    m->v = v;
-    m->a = mode->force * segment->phase.cosine + segment->held - damping * v - mode->stiffness * x;
-    m->j = segment->held_rate - mode->force * mode->angular_frequency * segment->phase.sine - damping * m->a
-           - mode->stiffness * v;
-    m->snap_bound = segment->series ? segment->series_snap_bound
-                                    : homogeneous_bound(segment, 1.0, 1.0, segment->x, segment->v) + mode->steady_snap;
-}
-
-/* Set the members of a segment that do not depend on its form. */
-static void set_out(vi_segment *segment, const vi_mode *mode, vi_phase phase, double held, double held_rate,
-                    double length)
+/* Set the members of mode j's segment that do not depend on its form. */
+static void set_out(vi_segment *segment, const vi_mode *mode, const vi_drive *drive, int j, double length)
 {
     segment->mode = mode;
     segment->origin = 0.0;
-    segment->phase = phase;
-    segment->held = held;
-    segment->held_rate = held_rate;
+    segment->phase = drive->phase;
+    segment->further = drive->further;
+    segment->held = drive->held[j];
+    segment->held_rate = drive->held_rate[j];
+    segment->degree = drive->degree;
+    for (int n = 2; n <= vi_segment_degree(segment); ++n) {
+        segment->higher[n - 2] = drive->higher[n - 2][j];
+    }
     segment->length = length;
     segment->since = segment->since_low = 0.0;
     segment->swell = vi_mode_grows(mode) ? exp(2.0 * mode->growth * length) : 1.0;
 }
 
-void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
-                      double held_rate, double length, bool local)
+/* Choose the form of a segment whose other members are set. */
+static void begin(vi_segment *segment, double x, double v, bool local)
 {
-    set_out(segment, mode, phase, held, held_rate, length);
     segment->series = local || !split(segment, x, v);
     if (segment->series) {
         vi_series_begin(segment, x, v);
@@ -358,12 +446,28 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
     }
 }
 
-void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[],
-                             const double v[], vi_phase phase, const double held[], const double held_rate[],
-                             double length)
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
+                      double held_rate, double length, bool local)
+{
+    const vi_drive drive = {.phase = phase, .held = &held, .held_rate = &held_rate, .degree = 1};
+    set_out(segment, mode, &drive, 0, length);
+    begin(segment, x, v, local);
+}
+
+void vi_segments_start(vi_segment segments[], const vi_mode modes[], int count, const double x[], const double v[],
+                       const vi_drive *drive, double length)
 {
     for (int j = 0; j < count; ++j) {
-        set_out(&segments[j], &modes[j], phase, held[j], held_rate[j], length);
+        set_out(&segments[j], &modes[j], drive, j, length);
+        begin(&segments[j], x[j], v[j], false);
+    }
+}
+
+void vi_segments_start_local(vi_segment segments[], const vi_mode modes[], int count, const double x[],
+                             const double v[], const vi_drive *drive, double length)
+{
+    for (int j = 0; j < count; ++j) {
+        set_out(&segments[j], &modes[j], drive, j, length);
         segments[j].series = true;
     }
     vi_series_begin_all(segments, count, x, v);
@@ -388,7 +492,7 @@ void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
     }
 }
 
-void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double *x, double *v)
+void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, const vi_phase further[], double *x, double *v)
 {
     if (segment->series) {
         vi_series_end(segment, u, x, v);
@@ -401,24 +505,18 @@ void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, double 
          + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
     *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v
          + w * (mode->steady_sin * c - mode->steady_cos * sn) + segment->level_rate;
-}
-
-bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest)
-{
-    const vi_mode *mode = segment->mode;
-    if (segment->series || mode->natural == 0.0 || vi_mode_grows(mode) || segment->level_rate != 0.0) {
-        return false;
+    if (vi_mode_sines(mode) > 0 || vi_segment_degree(segment) > 1) {
+        vi_segment_add_further(segment, u, further, x, v);
     }
-    const double reach = sqrt(segment->x * segment->x + segment->v * segment->v / mode->stiffness)
-                         + mode->steady_amplitude;
-    *lowest = segment->level - reach;
-    *highest = segment->level + reach;
-    return isfinite(reach);
 }
 
-void vi_mode_held(const vi_mode *mode, double x, vi_phase phase, double held, double held_rate, double *acceleration,
-                  double *slope)
+void vi_segment_add_further(const vi_segment *segment, double u, const vi_phase further[], double *x, double *v)
 {
-    *acceleration = mode->force * phase.cosine + held - mode->stiffness * x;
-    *slope = held_rate - mode->force * mode->angular_frequency * phase.sine;
+    add_further(segment->mode, further, x, v);
+    if (vi_segment_degree(segment) > 1) {
+        double value[4] = {0.0};
+        vi_add_higher(segment->level_higher, vi_segment_degree(segment), u, value);
+        *x += value[0];
+        *v += value[1];
+    }
 }

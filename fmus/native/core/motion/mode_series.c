@@ -26,6 +26,34 @@ enum { ABREAST = 8 };
 /* Taylor coefficients, indexed by order n, then by mode. */
 typedef double coefficients[VI_SERIES_ORDER + 1][ABREAST];
 
+/* Taylor coefficients of the loads without the clock's force: further sines, and polynomials of degree 2 and above.
+ * False where there are none; then the coefficients are not set. */
+INLINE bool add_more(double more[VI_SERIES_ORDER - 1][ABREAST], const vi_segment s[], const double x[], const int count)
+{
+    const int sines = vi_mode_sines(s[0].mode), degree = vi_segment_degree(&s[0]);
+    if (sines == 0 && degree < 2) {
+        return false;
+    }
+    for (int n = 0; n <= VI_SERIES_ORDER - 2; ++n) {
+        for (int i = 0; i < count; ++i) {
+            more[n][i] = n == 0 ? s[i].held - s[i].mode->stiffness * x[i] : n == 1 ? s[i].held_rate : 0.0;
+            more[n][i] += n >= 2 && n <= degree ? s[i].higher[n - 2] : 0.0;
+        }
+    }
+    for (int k = 0; k < sines; ++k) {
+        for (int i = 0; i < count; ++i) {
+            const vi_further *sine = &s[i].mode->further[k];
+            const double w = sine->angular_frequency;
+            double load[2] = {sine->force * s[i].further[k].cosine, -sine->force * w * s[i].further[k].sine};
+            for (int n = 0; n <= VI_SERIES_ORDER - 2; ++n) {
+                more[n][i] += load[n % 2];
+                load[n % 2] = -load[n % 2] * w * w * SHARE[n];
+            }
+        }
+    }
+    return true;
+}
+
 /* Taylor coefficients of `count` modes from the differential equation itself. Each caller passes a constant count:
  * loops over one mode vanish, loops over ABREAST become vectors. */
 INLINE void find_coefficients(coefficients c, const vi_segment s[], const double x[], const double v[],
@@ -44,8 +72,10 @@ INLINE void find_coefficients(coefficients c, const vi_segment s[], const double
         c[0][i] = 0.0;
         c[1][i] = v[i];
     }
+    double more[VI_SERIES_ORDER - 1][ABREAST];
+    const bool any_more = add_more(more, s, x, count);
     for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
-        const double next = (double)n + 1.0, share = SHARE[n], *restrict constant = held[n < 2 ? n : 2];
+        const double next = (double)n + 1.0, share = SHARE[n], *restrict constant = any_more ? more[n] : held[n < 2 ? n : 2];
         const double *restrict now = c[n], *restrict later = c[n + 1];
         double *restrict load = drive[n % 2], *restrict last = c[n + 2];
         for (int i = 0; i < count; ++i) {

@@ -52,6 +52,8 @@ typedef struct {
     int width;                                             /* of the rows, in whole lanes */
     double stiffness[VI_ROW], drag[VI_ROW], force[VI_ROW]; /* drag: 0 where the damping couples the modes */
     double held[2][VI_ROW];                                /* constant load at the start, and its slope */
+    int any_more;                                          /* are there other loads than these and the clock's force? */
+    double more[VI_ORDER - 1][VI_ROW];                     /* the Taylor coefficients of those */
     double toward[VI_PORTS][VI_ROW];                       /* shapes, towards the stops */
     int yields[VI_PORTS], yielding;                        /* the contacts that yield, and their number */
     double compliance[VI_PORTS][VI_PORTS];                 /* of each contact to yielding contacts' forces */
@@ -76,6 +78,31 @@ static void set_up_contacts(equation *e, const vi_structure_model *model, const 
     }
 }
 
+/* Set the coefficients of the further sines, and those of the loads from degree 2 on. */
+static void set_up_more(equation *e, const vi_structure_model *model, const vi_drive *drive)
+{
+    const int sines = vi_structure_sines(model), degree = VI_DEGREE > 1 ? drive->degree : 1;
+    e->any_more = sines > 0 || degree > 1;
+    if (!e->any_more) {
+        return;
+    }
+    memset(e->more, 0, sizeof e->more);
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        for (int n = 2; n <= degree; ++n) {
+            e->more[n][j] = drive->higher[n - 2][j];
+        }
+        for (int k = 0; k < sines; ++k) {
+            const vi_further *sine = &model->mode[j].further[k];
+            const double w = sine->angular_frequency;
+            double load[2] = {sine->force * drive->further[k].cosine, -sine->force * w * drive->further[k].sine};
+            for (int n = 0; n + 2 <= VI_ORDER; ++n) {
+                e->more[n][j] += load[n % 2];
+                load[n % 2] = -load[n % 2] * w * w / ((double)(n + 1) * (double)(n + 2));
+            }
+        }
+    }
+}
+
 static void set_up(equation *e, const vi_structure_model *model, const vi_drift_start *start)
 {
     e->width = VI_WHOLE_LANES(vi_structure_modes(model));
@@ -85,9 +112,10 @@ static void set_up(equation *e, const vi_structure_model *model, const vi_drift_
         e->stiffness[j] = moves ? mode->stiffness : 0.0;
         e->drag[j] = moves && !model->coupled ? 2.0 * mode->decay : 0.0;
         e->force[j] = moves ? mode->force : 0.0;
-        e->held[0][j] = moves ? start->held[j] - mode->stiffness * start->q[j] : 0.0;
-        e->held[1][j] = moves ? start->held_rate[j] : 0.0;
+        e->held[0][j] = moves ? start->drive.held[j] - mode->stiffness * start->q[j] : 0.0;
+        e->held[1][j] = moves ? start->drive.held_rate[j] : 0.0;
     }
+    set_up_more(e, model, &start->drive);
     set_up_contacts(e, model, start);
     for (int k = 0; k < model->contacts; ++k) {
         for (int y = 0; y < e->yielding; ++y) {
@@ -212,7 +240,7 @@ static void size_loads(const vi_structure_model *model, const vi_drift_start *st
 {
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        size[j] = fabs(mode->force) + fabs(start->held[j]) + fabs(mode->stiffness * start->q[j]);
+        size[j] = vi_mode_force_size(mode) + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
         size[j] += vi_structure_drag_size(model, j, start->p);
     }
 }
@@ -338,14 +366,17 @@ INLINE void find_series(vi_drift *drift, equation *e, const vi_drift_start *star
 {
     const vi_structure_model *model = drift->model;
     const double w = model->clock.angular_frequency;
-    const bool any_held = contacts > yielding && e->any_held, apart = !model->coupled && !any_held;
-    double drive[2] = {start->cosine, -w * start->sine};
+    const bool any_held = contacts > yielding && e->any_held, apart = !model->coupled && !any_held && !e->any_more;
+    double drive[2] = {start->drive.phase.cosine, -w * start->drive.phase.sine};
     for (int n = 0; n + 2 <= VI_ORDER; ++n) {
         const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
         press(drift, e, start, n, yielding, power);
         extend(drift, e, drive[0], n, share, contacts, yielding, apart);
         if (n < 2) {
             vi_row_add(drift->modal[n + 2], share, e->held[n], e->width);
+        }
+        if (e->any_more) {
+            vi_row_add(drift->modal[n + 2], share, e->more[n], e->width);
         }
         if (model->coupled) {
             drag(drift, n, share);

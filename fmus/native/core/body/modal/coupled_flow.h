@@ -1,6 +1,6 @@
 /* The motion of a structure whose modes are coupled by stops that hold it or yield to it, or by its own damping.
  *
- *     q'' = f cos(phase) + held + held_rate u - D q' - W q - sum_k sign_k shape_k F_k
+ *     q'' = f cos(phase) + further sines + held + held_rate u + ... - D q' - W q - sum_k sign_k shape_k F_k
  *
  * A contact force F_k is linear in the penetration and its rate, or a power law, or the force that keeps the contact in
  * place. The solution is a Taylor series, exact to the last bit for any damping and any stiffness. Contacts, forces and
@@ -39,8 +39,7 @@ static inline double vi_drift_variable(const vi_drift *drift, double u)
 /* Start of a drift. */
 typedef struct {
     const double *q, *p;
-    double cosine, sine; /* of the forcing phase */
-    const double *held, *held_rate;
+    vi_drive drive;
     const double *penetration; /* of each contact, exact where it touches */
     const double *sign;        /* direction of each contact */
     const vi_press *press;

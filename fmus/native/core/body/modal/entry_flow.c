@@ -46,8 +46,8 @@ static void extend(vi_drift *drift, const entry *at, double drive, int n)
         const vi_mode *mode = &model->mode[j];
         double load = drive * mode->force - mode->stiffness * x[j] - rate * (2.0 * mode->decay * v[j])
                       - shape[j] * push;
-        load += n == 0 ? at->start->held[j] - mode->stiffness * at->start->q[j] : 0.0;
-        load += n == 2 ? at->start->held_rate[j] : 0.0;
+        load += n == 0 ? at->start->drive.held[j] - mode->stiffness * at->start->q[j] : 0.0;
+        load += n == 2 ? at->start->drive.held_rate[j] : 0.0;
         drift->modal[n + 4][j] = share * load;
     }
     for (int k = 0; k < model->contacts; ++k) {
@@ -108,7 +108,7 @@ static double reach(const vi_drift *drift, const entry *at)
 bool vi_entry_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, int k, double length)
 {
     const double doubled = 2.0 * start->press[k].exponent, w = model->clock.angular_frequency;
-    double drive[2] = {start->cosine, -w * start->sine};
+    double drive[2] = {start->drive.phase.cosine, -w * start->drive.phase.sine};
     if (!(doubled == floor(doubled)) || !(doubled < VI_ORDER / 2)) {
         return false;
     }

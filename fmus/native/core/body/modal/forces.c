@@ -58,10 +58,12 @@ void vi_structure_accelerate_freely(const vi_structure *s, double acceleration[]
     const vi_structure_model *model = s->model;
     const vi_structure_state *state = s->state;
     const double cosine = vi_structure_phase(s).cosine;
+    const vi_phase *further = vi_structure_further(s);
     vi_structure_held_now(s, acceleration);
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         acceleration[j] += mode->force * cosine - mode->stiffness * state->q[j];
+        acceleration[j] += vi_mode_sines(mode) > 0 ? vi_further_force(mode, further) : 0.0;
         acceleration[j] -= model->coupled ? vi_structure_at(model, model->coupling[j], state->p)
                                           : 2.0 * mode->decay * state->p[j];
     }

@@ -14,7 +14,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
 {
     const vi_structure_model *model = s->model;
     vi_structure_state *state = s->state;
-    double g[VI_PORTS][VI_PORTS], x[VI_PORTS] = {0.0}, unit[VI_PORTS], held[VI_MODES], at[VI_PORTS], sign[VI_PORTS];
+    double g[VI_PORTS][VI_PORTS], x[VI_PORTS] = {0.0}, unit[VI_PORTS], loads[VI_MODES], at[VI_PORTS], sign[VI_PORTS];
     int active[VI_PORTS] = {0};
     vi_press press[VI_PORTS];
     for (int l = 0; l < model->contacts; ++l) {
@@ -38,10 +38,8 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     for (int l = 0; l < model->contacts; ++l) {
         vi_structure_push(s, l, unit[l], view->p);
     }
-    const vi_phase phase = vi_structure_phase(s);
-    vi_structure_held_now(s, held);
     at[k] = 0.0;
-    const vi_drift_start start = {state->q, view->p, phase.cosine, phase.sine, held, state->held_rate, at, sign, press};
+    const vi_drift_start start = {state->q, view->p, vi_structure_drive_now(s, loads), at, sign, press};
     vi_drift drift;
     vi_drift_begin(&drift, model, &start, 1.0);
     view->pressure = drift.force[k][0] * view->mobility;
@@ -52,11 +50,28 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
 
+/* Size of the further sines' part, and of loads of degree 2 and above, in coefficient n of mode j. */
+static double more_size(const vi_series_noise *noise, int j)
+{
+    const vi_structure *s = noise->s;
+    const vi_mode *mode = &s->model->mode[j];
+    const int load = noise->n - 2; /* order of the load */
+    double size = load >= 2 && load <= vi_structure_degree(s) ? fabs(s->state->higher[load - 2][j]) : 0.0;
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        double term = fabs(mode->further[k].force);
+        for (int n = 1; n <= load; ++n) {
+            term *= mode->further[k].angular_frequency / (double)n;
+        }
+        size += term;
+    }
+    return size;
+}
+
 /* Size of the part of the forcing and of the constant loads in coefficient n of mode j. */
 static double load_size(const vi_series_noise *noise, int j)
 {
     const vi_mode *mode = &noise->s->model->mode[j];
-    double size = fabs(mode->force) * noise->drive;
+    double size = fabs(mode->force) * noise->drive + more_size(noise, j);
     if (noise->n == 2) {
         size += fabs(noise->held[j]) + fabs(mode->stiffness * noise->s->state->q[j]);
     } else if (noise->n == 3) {
@@ -117,7 +132,7 @@ void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const 
     vi_structure_held_now(s, noise->held);
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const vi_mode *mode = &s->model->mode[j];
-        const double loads = fabs(mode->force) + fabs(noise->held[j]);
+        const double loads = vi_mode_force_size(mode) + fabs(noise->held[j]);
         const double within = mode->natural * fabs(s->state->q[j]) + loads * s->model->radian;
         const double velocity = fabs(drift->modal[1][j]) + within;
         noise->before[j] = 0.0; /* the series begins at the body's place */

@@ -28,8 +28,17 @@ static void renew(vi_scan *scan, const vi_structure_model *model)
     for (int j = 0; j < vi_structure_modes(model) && same; ++j) {
         same = scan->stiffness[j] == model->mode[j].stiffness && scan->decay[j] == model->mode[j].decay;
     }
+    const vi_mode *first = &model->mode[0];
+    same = same && scan->sines == vi_mode_sines(first);
+    for (int k = 0; k < vi_mode_sines(first) && same; ++k) {
+        same = scan->further[k] == first->further[k].angular_frequency;
+    }
     if (same) {
         return;
+    }
+    scan->sines = vi_mode_sines(first);
+    for (int k = 0; k < vi_mode_sines(first); ++k) {
+        scan->further[k] = first->further[k].angular_frequency;
     }
     scan->modes = vi_structure_modes(model);
     scan->angular_frequency = model->clock.angular_frequency;
@@ -54,6 +63,10 @@ static void make(vi_scan_level *level, const vi_scan *scan, const vi_structure_m
         const double time = (double)(i + 1) * level->step;
         level->cosine[i] = cos(scan->angular_frequency * time);
         level->sine[i] = sin(scan->angular_frequency * time);
+        for (int k = 0; k < vi_mode_sines(&model->mode[0]); ++k) {
+            level->further_cosine[k][i] = cos(scan->further[k] * time);
+            level->further_sine[k][i] = sin(scan->further[k] * time);
+        }
         for (int j = 0; j < vi_structure_modes(model); ++j) {
             double phi[4];
             vi_mode_propagator(&model->mode[j], time, phi);
@@ -79,7 +92,8 @@ typedef struct {
 
 /* An instant from which samples are counted. */
 typedef struct {
-    double u, cosine, sine; /* s after the start; of the forcing phase */
+    double u, cosine, sine; /* s after the start; of the clock's phase */
+    double further_cosine[VI_SINES_ROOM], further_sine[VI_SINES_ROOM];
     double x[VI_MODES], v[VI_MODES]; /* unforced parts */
 } place;
 
@@ -160,6 +174,16 @@ static opening opening_of(const scanner *s, int k, double step)
     } else {
         o.off_cubic = point->steady * (w * w * w * w * share);
     }
+    for (int n = 0; n < s->flight->sines; ++n) {
+        const double amplitude = point->further[n].amplitude, f = point->further[n].angular_frequency;
+        if (ripples(f * f * f * f, share, 1.0)) {
+            o.ripple += amplitude;
+            speed += amplitude * f;
+        } else {
+            o.off_cubic += amplitude * (f * f * f * f * share);
+        }
+    }
+    o.off_cubic += vi_flight_degree(s->flight) > 1 ? point->higher_snap * share : 0.0;
     const extents *e = &s->extent[k];
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         if (ripples(e->fourth[j], share, e->reach[j])) {
@@ -223,6 +247,36 @@ typedef struct {
     double clearance[VI_SCAN_SAMPLES + 1], third[VI_SCAN_SAMPLES + 1];
 } samples;
 
+/* Add the response to the further sines, without those that ripple, and to loads of higher degree. */
+static void sample_further(const scanner *s, const vi_scan_level *level, int k, samples *out)
+{
+    const vi_point *point = &s->points[k];
+    const double square = level->step * level->step, share = SHARE_OF_FOURTH * square * square;
+    const double part = level->step * THIRD;
+    for (int n = 0; n < s->flight->sines; ++n) {
+        const vi_point_sine *sine = &point->further[n];
+        const double w = sine->angular_frequency;
+        if (ripples(w * w * w * w, share, 1.0)) {
+            continue;
+        }
+        const double x = -point->sign * (sine->cosine * s->at.further_cosine[n] + sine->sine * s->at.further_sine[n]);
+        const double y = -point->sign * (sine->sine * s->at.further_cosine[n] - sine->cosine * s->at.further_sine[n]);
+        out->clearance[0] += x;
+        out->third[0] += part * w * y;
+        for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
+            const double c = level->further_cosine[n][i], e = level->further_sine[n][i];
+            out->clearance[i + 1] += x * c + y * e;
+            out->third[i + 1] += part * w * (y * c - x * e);
+        }
+    }
+    for (int i = 0; i <= VI_SCAN_SAMPLES && vi_flight_degree(s->flight) > 1; ++i) {
+        double value[4] = {0.0};
+        vi_add_higher(point->higher, vi_flight_degree(s->flight), s->at.u + (double)i * level->step, value);
+        out->clearance[i] -= point->sign * value[0];
+        out->third[i] -= point->sign * part * value[1];
+    }
+}
+
 static void sample(const scanner *s, const vi_scan_level *level, int k, samples *out)
 {
     const vi_point *point = &s->points[k];
@@ -243,6 +297,9 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
     for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
         clearance[i] = start + (double)(i + 1) * rise + c * level->cosine[i] + n * level->sine[i];
         third[i] = third_of_rise + nw * level->cosine[i] - cw * level->sine[i];
+    }
+    if (s->flight->sines > 0 || vi_flight_degree(s->flight) > 1) {
+        sample_further(s, level, k, out);
     }
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         if (ripples(s->extent[k].fourth[j], share, s->extent[k].reach[j])) {
@@ -325,11 +382,13 @@ static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, 
     return least;
 }
 
-/* The longest level of steps; the bounds of growing motions hold for one step beyond the end of the flight. */
+/* The longest level of steps. The bounds of growing motions, and of polynomials, hold for twice the flight. */
 static int longest_level(const vi_flight *flight)
 {
+    const double growing = vi_structure_grows(flight->model) ? 1.0 : 0.0;
+    const double samples = vi_flight_degree(flight) > 1 ? (double)VI_SCAN_SAMPLES : growing;
     int l = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
-    while (vi_structure_grows(flight->model) && l >= 0 && step_of(flight->model, l) > flight->length) {
+    while (samples > 0.0 && l >= 0 && step_of(flight->model, l) * samples > flight->length) {
         --l;
     }
     return l;
@@ -344,6 +403,13 @@ static void go(place *at, const vi_structure_model *model, const vi_scan_level *
     const double c = at->cosine * level->cosine[i] - at->sine * level->sine[i];
     at->sine = at->sine * level->cosine[i] + at->cosine * level->sine[i];
     at->cosine = c;
+    for (int k = 0; k < vi_mode_sines(&model->mode[0]); ++k) {
+        const double turned =
+            at->further_cosine[k] * level->further_cosine[k][i] - at->further_sine[k] * level->further_sine[k][i];
+        at->further_sine[k] =
+            at->further_sine[k] * level->further_cosine[k][i] + at->further_cosine[k] * level->further_sine[k][i];
+        at->further_cosine[k] = turned;
+    }
     at->u += (double)steps * level->step;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const double x = level->x_of_x[j][i] * at->x[j] + level->x_of_v[j][i] * at->v[j];
@@ -361,6 +427,21 @@ static vi_approach approach_at(const scanner *s, const place *at, int k)
     const double forced = point->cosine * at->cosine + point->sine * at->sine;
     double x = forced + point->level + point->level_rate * at->u, a = -square * forced;
     double v = w * (point->sine * at->cosine - point->cosine * at->sine) + point->level_rate;
+    for (int n = 0; n < s->flight->sines; ++n) {
+        const vi_point_sine *sine = &point->further[n];
+        const double f = sine->angular_frequency;
+        const double steady = sine->cosine * at->further_cosine[n] + sine->sine * at->further_sine[n];
+        x += steady;
+        v += f * (sine->sine * at->further_cosine[n] - sine->cosine * at->further_sine[n]);
+        a -= f * f * steady;
+    }
+    if (vi_flight_degree(s->flight) > 1) {
+        double value[4] = {0.0};
+        vi_add_higher(point->higher, vi_flight_degree(s->flight), at->u, value);
+        x += value[0];
+        v += value[1];
+        a += value[2];
+    }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         x += point->shape[j] * at->x[j];
@@ -424,6 +505,10 @@ static void begin(scanner *s, const vi_flight_instant *from, const vi_approach f
     s->at.u = from->u;
     s->at.cosine = from->cosine;
     s->at.sine = from->sine;
+    for (int k = 0; k < s->flight->sines; ++k) {
+        s->at.further_cosine[k] = from->further[k].cosine;
+        s->at.further_sine[k] = from->further[k].sine;
+    }
     s->contacts = s->flight->model->contacts;
     s->begins = true;
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {

@@ -55,7 +55,7 @@ static void begin_contact(vi_power_start *start, vi_power_contact *contact, cons
     for (int j = 0; j < width; j += VI_LANES) {
         for (int i = j; i < j + VI_LANES; ++i) {
             contact->toward[i] *= contact->sign;
-            acceleration[i] = start->gain[i] + start->tables->force[i] * state->cosine;
+            acceleration[i] = start->gain[i] + start->tables->force[i] * state->drive.phase.cosine;
         }
     }
     contact->rate = vi_row_dot(contact->toward, start->p, width);
@@ -81,7 +81,7 @@ static void load_modes(vi_power_start *start, const vi_drift_start *state, doubl
     const double *restrict stiffness = start->tables->stiffness, *restrict decay = start->tables->decay;
     double q[VI_POWER_ROW], held[VI_POWER_ROW];
     fill_row(start, state->q, q);
-    fill_row(start, state->held, held);
+    fill_row(start, state->drive.held, held);
     for (int j = 0; j < width_of(start); j += VI_LANES) {
         for (int i = j; i < j + VI_LANES; ++i) {
             const double load = held[i] + start->slope[i] * u - stiffness[i] * q[i];
@@ -98,14 +98,14 @@ void vi_power_begin(vi_power_start *start, const vi_structure_model *model, cons
     start->model = model;
     start->tables = tables;
     start->contacts = contacts;
-    start->cosine = state->cosine;
-    start->sine = state->sine;
+    start->cosine = state->drive.phase.cosine;
+    start->sine = state->drive.phase.sine;
     start->ramps = false;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
-        start->ramps = start->ramps || state->held_rate[j] != 0.0;
+        start->ramps = start->ramps || state->drive.held_rate[j] != 0.0;
     }
     fill_row(start, state->p, start->p);
-    fill_row(start, state->held_rate, start->slope);
+    fill_row(start, state->drive.held_rate, start->slope);
     load_modes(start, state, u);
     for (int i = 0; i < contacts; ++i) {
         begin_contact(start, &start->contact[i], state, port[i], depth[port[i]]);

@@ -68,11 +68,16 @@ void vi_structure_prepare(vi_structure_model *model)
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)
 {
     vi_structure_state *state = s->state;
+    const vi_phase *further = vi_structure_further(s);
     vi_instant *past[VI_PORTS + 3] = {&state->held_since, &state->standstill.instant, &state->budget.mark};
     for (int k = 0; k < VI_PORTS; ++k) {
         past[3 + k] = &state->separated[k];
     }
     vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 3);
+    for (int k = 0; k < vi_structure_sines(s->model); ++k) {
+        vi_sine *sine = &s->model->sine[k];
+        *sine = vi_sine_from(&s->model->clock, sine->angular_frequency, state->now, further[k].angle);
+    }
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
@@ -82,7 +87,58 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
     vi_structure_prepare(s->model);
 }
 
+void vi_structure_drive_further(const vi_structure *s, int sines, double (*force)[VI_MODES],
+                                const double angular_frequency[], const double phase[])
+{
+    vi_structure_model *model = s->model;
+    vi_structure_state *state = s->state;
+    for (int k = 0; k < sines && VI_SINES > 0; ++k) {
+        model->sine[k] = phase != NULL
+                             ? vi_sine_start(&model->clock, angular_frequency[k], phase[k])
+                             : vi_sine_from(&model->clock, angular_frequency[k], state->now, state->further[k].angle);
+    }
+    model->sines = sines;
+    state->further_at.periods = INT64_MAX; /* no phase is known */
+    for (int j = 0; j < vi_structure_modes(model); ++j) {
+        double of_mode[VI_SINES_ROOM];
+        for (int k = 0; k < sines && VI_SINES > 0; ++k) {
+            of_mode[k] = force[k][j];
+        }
+        vi_mode_drive_further(&model->mode[j], sines, of_mode, angular_frequency);
+        state->origin[j].known = 0;
+    }
+    state->rest.known = 0;
+    state->budget.unfinished = 0;
+    vi_structure_prepare(model);
+}
+
 /* ---- the present instant ---- */
+
+const vi_phase *vi_structure_further(const vi_structure *s)
+{
+    vi_structure_state *state = s->state;
+    const vi_instant at = state->further_at, now = state->now;
+    if (vi_structure_sines(s->model) > 0
+        && !(at.periods == now.periods && at.rest == now.rest && at.rest_low == now.rest_low)) {
+        for (int k = 0; k < vi_structure_sines(s->model); ++k) {
+            state->further[k] = vi_sine_phase(&s->model->sine[k], now);
+        }
+        state->further_at = now;
+    }
+    return state->further;
+}
+
+vi_drive vi_structure_drive_now(const vi_structure *s, double held[])
+{
+    const vi_structure_state *state = s->state;
+    vi_structure_held_now(s, held);
+    return (vi_drive){.phase = vi_structure_phase(s),
+                      .further = vi_structure_further(s),
+                      .held = held,
+                      .held_rate = state->held_rate,
+                      .degree = vi_structure_degree(s),
+                      .higher = state->higher};
+}
 
 vi_phase vi_structure_phase(const vi_structure *s)
 {
@@ -177,7 +233,7 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
     double sum = 0.0;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        const double loads = fabs(mode->force) + fabs(s->state->held[j]);
+        const double loads = vi_mode_force_size(mode) + fabs(s->state->held[j]);
         sum += fabs(model->shape[k][j])
                * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * model->radian);
     }
@@ -196,7 +252,7 @@ double vi_structure_most_acceleration(const vi_structure *s, int k)
             return HUGE_VAL;
         }
     }
-    return s->model->coupled ? HUGE_VAL : s->model->fastest * vi_structure_velocity_size(s, k);
+    return s->model->coupled || vi_structure_degree(s) > 1 ? HUGE_VAL : s->model->fastest * vi_structure_velocity_size(s, k);
 }
 
 double vi_structure_kinetic(const vi_structure *s)

@@ -20,6 +20,7 @@
 #include "motion/clock.h"
 #include "motion/flow.h"
 #include "motion/origin.h"
+#include "motion/sines.h"
 #include "sizes.h"
 
 /* Constants after the start. */
@@ -35,6 +36,8 @@ typedef struct {
     int32_t ends_unbounded; /* end a motion that grows where its stops are out of reach? */
     int32_t unused;         /* no padding, which would be saved */
     vi_clock clock;
+    int32_t sines;                 /* further sines: those of the modes, with their phases */
+    vi_sine sine[VI_SINES_ROOM];
     vi_mode mode[VI_MODES]; /* set by vi_structure_mode, in ascending order of stiffness */
     double shape[VI_PORTS][VI_MODES];
     /* modal velocities after a unit impulse at the contact, kg^(-1/2); equal to shape except for collocation */
@@ -112,11 +115,16 @@ typedef struct {
     vi_cascade cascade;
     vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
-    vi_phase phase;                  /* of the force, as last evaluated */
+    vi_phase phase;                  /* of the clock's force, as last evaluated */
+    vi_instant further_at;           /* instant of `further` */
+    vi_phase further[VI_SINES_ROOM]; /* of the further sines, as last evaluated */
     vi_origin origin[VI_MODES];
     vi_rest_origin rest;
     vi_instant held_since;
     double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */
+    int64_t degree;                             /* of the loads; above 1 held_since is the present instant */
+    double higher[VI_HIGHER_ROOM][VI_MODES];    /* coefficients 2 to degree */
+    double loads_last;                          /* time from now for which they are valid, s; HUGE_VAL for any time */
     int32_t status[VI_PORTS];   /* vi_contact_status */
     int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
@@ -170,6 +178,29 @@ void vi_structure_mode(vi_structure_model *model, int j, double natural, double 
 /* Change the harmonic force from now on, at its present phase: modal amplitudes, and an angular frequency > 0 if the
  * clock counts a forcing. Modal displacements and velocities stay. */
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency);
+
+/* Put further sines on the modes, or change them: force[k][mode] are modal amplitudes. Angular frequencies are > 0 and
+ * at most VI_SINES. Before the start, phase[] (rad) are those at time 0; afterwards NULL, and the present phases stay. */
+void vi_structure_drive_further(const vi_structure *s, int sines, double (*force)[VI_MODES],
+                                const double angular_frequency[], const double phase[]);
+
+/* Number of further sines; a constant where a component has none. */
+static inline int vi_structure_sines(const vi_structure_model *model)
+{
+    return VI_SINES > 0 ? model->sines : 0;
+}
+
+/* Degree of the loads; a constant where a component has none above 1. */
+static inline int vi_structure_degree(const vi_structure *s)
+{
+    return VI_DEGREE > 1 ? (int)s->state->degree : 1;
+}
+
+/* Does the clock's force act alone, with loads that grow at most linearly? Some ways of following a motion need it. */
+static inline bool vi_structure_is_plain(const vi_structure *s)
+{
+    return vi_structure_sines(s->model) == 0 && vi_structure_degree(s) == 1;
+}
 
 /* Derive the model's remaining members, after modes, shapes and impulses are set. */
 void vi_structure_prepare(vi_structure_model *model);
@@ -234,6 +265,22 @@ static inline double vi_structure_direction(const vi_structure *s, int k)
 }
 
 vi_phase vi_structure_phase(const vi_structure *s);
+
+/* Phases of the further sines. */
+const vi_phase *vi_structure_further(const vi_structure *s);
+
+/* What acts on the modes from now on; `held` is set to the present loads. */
+vi_drive vi_structure_drive_now(const vi_structure *s, double held[]);
+
+/* Sum of the sizes of the harmonic forces on mode j. */
+static inline double vi_mode_force_size(const vi_mode *mode)
+{
+    double size = fabs(mode->force);
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        size += fabs(mode->further[k].force);
+    }
+    return size;
+}
 
 /* Set the forcing phase found at this instant; it agrees except for whole turns and the rounding of its angle. */
 void vi_structure_phase_is(const vi_structure *s, vi_phase phase);

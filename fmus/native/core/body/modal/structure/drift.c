@@ -131,7 +131,7 @@ static int entering(const vi_structure *s, const vi_situation *now)
             return -1;
         }
     }
-    return s->model->coupled ? -1 : found;
+    return s->model->coupled || !vi_structure_is_plain(s) ? -1 : found;
 }
 
 /* Follow the beginning of a contact if it goes in further than rounding. */
@@ -202,7 +202,7 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
     }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        const bool forced = mode->force != 0.0 && model->clock.angular_frequency > 0.0;
+        const bool forced = (mode->force != 0.0 && model->clock.angular_frequency > 0.0) || !vi_structure_is_plain(s);
         const double load = fabs(now->held[j]) + fabs(mode->force) + fabs(mode->stiffness * s->state->q[j]);
         if (forced || s->state->held_rate[j] != 0.0 || s->state->p[j] != 0.0
             || fabs(2.0 * drift->modal[2][j]) > VI_ROUNDING * load) {
@@ -228,14 +228,13 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
         *k = -1;
         return rested;
     }
-    const vi_phase phase = vi_structure_phase(s);
+    double loads[VI_MODES];
     vi_situation now;
     vi_drift drift;
     state->series += 1;
     look(s, &now);
     vi_budget_spend(&state->budget, drift_evaluations(s->model));
-    const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,
-                                  now.at, now.sign, now.press};
+    const vi_drift_start start = {state->q, state->p, vi_structure_drive_now(s, loads), now.at, now.sign, now.press};
     if (!enter(s, &now, &start, length + room, &drift)) {
         look_at_powers(s, &now);
         const double pressed = vi_structure_press_on(s, &now, &start, length);

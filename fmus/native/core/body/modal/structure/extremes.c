@@ -202,9 +202,22 @@ void vi_peaks_of_drift(const vi_structure *s, const vi_drift *drift, double u)
 
 /* ---- energies ---- */
 
+/* Load on mode j by the further sines and by the terms of degree 2 and above. */
+static double further_load(const vi_structure *s, int j, double u, const vi_phase further[])
+{
+    double value[4] = {0.0}, coefficient[VI_HIGHER_ROOM];
+    for (int n = 2; n <= vi_structure_degree(s); ++n) {
+        coefficient[n - 2] = s->state->higher[n - 2][j];
+    }
+    if (vi_structure_degree(s) > 1) {
+        vi_add_higher(coefficient, vi_structure_degree(s), u, value);
+    }
+    return value[0] + vi_further_force(&s->model->mode[j], further);
+}
+
 /* Add the power of the applied forces and of the damping at modal velocities p and forcing phase `angle`. */
 static void add_powers(const vi_structure *s, const double p[], const double held[], double u, double angle,
-                       double weight)
+                       const vi_phase further[], double weight)
 {
     const vi_structure_model *model = s->model;
     const double cosine = cos(angle);
@@ -212,6 +225,7 @@ static void add_powers(const vi_structure *s, const double p[], const double hel
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
+        work += vi_structure_is_plain(s) ? 0.0 : further_load(s, j, u, further) * p[j];
         loss += p[j] * (model->coupled ? vi_structure_at(model, model->coupling[j], p) : 2.0 * mode->decay * p[j]);
     }
     s->state->energies.forcing_work += weight * work;
@@ -235,12 +249,15 @@ void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const
 {
     const double count = ceil(vi_max(1.0, u * s->model->fastest / PIECE)), piece = u / count;
     double q[VI_MODES], p[VI_MODES], weight;
+    vi_phase further[VI_SINES_ROOM];
     vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * vi_structure_modes(s->model));
     for (double n = 0.0; n < count; n += 1.0) {
         for (int i = 0; i < 8; ++i) {
-            const double t = node(n * piece, piece, i, &weight), angle = flight->phase.angle + flight->angular_frequency * t;
-            vi_flight_end(flight, t, angle, q, p);
-            add_powers(s, p, held, t, angle, weight);
+            const double t = node(n * piece, piece, i, &weight);
+            const double angle = flight->drive.phase.angle + flight->angular_frequency * t;
+            vi_flight_further(flight, t, further);
+            vi_flight_end(flight, t, angle, further, q, p);
+            add_powers(s, p, held, t, angle, further, weight);
         }
     }
 }
@@ -251,11 +268,14 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
     const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
     const double piece = vi_drift_variable(drift, u) / (double)DRIFT_PIECES;
     double q[VI_MODES], p[VI_MODES], weight, value[4];
+    const vi_phase *start = vi_structure_further(s);
+    vi_phase further[VI_SINES_ROOM];
     for (int i = 0; i < 8 * DRIFT_PIECES; ++i) {
         const double r = node((double)(i / 8) * piece, piece, i % 8, &weight), t = drift->rooted ? r * r : r;
         const double slope = drift->rooted ? 2.0 * r : 1.0; /* derivative of t over r */
         vi_drift_at(drift, t, s->state->q, p, q);
-        add_powers(s, p, held, t, angle + w * t, slope * weight);
+        vi_further_after(&s->model->mode[0], start, t, further);
+        add_powers(s, p, held, t, angle + w * t, further, slope * weight);
         for (int k = 0; k < s->model->contacts; ++k) {
             if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
                 vi_polynomial_at(drift->force[k], r, value);
@@ -272,10 +292,13 @@ void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const
 {
     const double cosine = cos(s->model->clock.angular_frequency * (s->state->now.rest + u)), zero[VI_MODES] = {0.0};
     double moved[VI_MODES], p[VI_MODES], work = 0.0, way = 0.0, undone = 0.0;
+    vi_phase further[VI_SINES_ROOM];
+    vi_further_after(&s->model->mode[0], vi_structure_further(s), u, further);
     vi_drift_at(drift, u, zero, p, moved);
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const double back = q[j] + moved[j] - s->state->q[j];
         work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
+        work += vi_structure_is_plain(s) ? 0.0 : further_load(s, j, u, further) * back;
         way += fabs(moved[j]);
         undone += fabs(back);
     }

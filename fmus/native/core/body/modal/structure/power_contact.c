@@ -65,7 +65,8 @@ static bool fits(const vi_structure *s, const vi_situation *now, double length)
 {
     const int64_t modes = vi_structure_modes(s->model);
     return modes >= FEWEST_MODES && s->power != NULL && s->state->budget.events * modes * modes >= REPAID
-           && !s->model->coupled && !s->model->varies && !vi_structure_grows(s->model) && !now->any_thin && !s->state->follow_energies
+           && vi_structure_is_plain(s) && !s->model->coupled && !s->model->varies && !vi_structure_grows(s->model)
+           && !now->any_thin && !s->state->follow_energies
            && length * s->model->fastest > ONE_SEGMENT && moves(s);
 }
 
@@ -321,8 +322,7 @@ double vi_structure_press_on(const vi_structure *s, const vi_situation *now, con
         moved = step_once(s, &start, length - u);
         u += moved;
         const double angle = w * (s->state->now.rest + u);
-        here.cosine = cos(angle);
-        here.sine = sin(angle);
+        here.drive.phase = vi_phase_of(angle);
     }
     return u;
 }

@@ -289,7 +289,8 @@ static double rest_for_long(const vi_structure *s, const vi_pressed *pressed, do
 double vi_structure_rest_on(const vi_structure *s, double length, double room)
 {
     int32_t port[VI_PORTS];
-    if (s->pressed == NULL || s->state->series < PATIENCE_HELD || vi_structure_grows(s->model) || !moves(s)) {
+    if (s->pressed == NULL || !vi_structure_is_plain(s) || s->state->series < PATIENCE_HELD
+        || vi_structure_grows(s->model) || !moves(s)) {
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);

@@ -31,7 +31,12 @@ static const double SMALLEST = 1e-154;
 /* Length of one segment, s, and the kind of its end. */
 static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
-    return vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
+    const double length = vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
+    if (VI_DEGREE > 1 && s->state->loads_last < length) {
+        *end = VI_ENDS_ANYWHERE;
+        return s->state->loads_last;
+    }
+    return length;
 }
 
 static double landing_room(const vi_structure *s)
@@ -95,8 +100,8 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 /* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    return !flight->series && !s->record->extrema && !s->record->periods && !s->state->follow_energies
-           && !(vi_structure_grows(s->model) && s->model->displacement_limit > 0.0);
+    return !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods
+           && !s->state->follow_energies && !(vi_structure_grows(s->model) && s->model->displacement_limit > 0.0);
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -160,7 +165,11 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
 {
     const vi_clock *clock = &s->model->clock;
     const double u = vi_clock_elapsed(clock, s->state->now, target);
-    vi_flight_end(flight, u, clock->angular_frequency * target.rest, s->state->q, s->state->p);
+    vi_phase further[VI_SINES_ROOM];
+    for (int k = 0; k < vi_structure_sines(s->model); ++k) {
+        further[k] = vi_sine_phase(&s->model->sine[k], target);
+    }
+    vi_flight_end(flight, u, clock->angular_frequency * target.rest, further, s->state->q, s->state->p);
     vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
     move(s, u, VI_ENDS_AT_TARGET, target);
 }
@@ -177,8 +186,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_point points[VI_PORTS];
     vi_search_found found;
     vi_phase phase;
-    vi_structure_held_now(s, held);
-    vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
+    const vi_drive drive = vi_structure_drive_now(s, held);
+    vi_flight_start(&flight, s->model, state->q, state->p, &drive,
                     vi_min(vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), vi_growth_reach(s->model)),
                     bounce < HUGE_VAL);
     vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
@@ -207,7 +216,9 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     if (near) {
         vi_flight_end_near(&flight, &found.now, found.moment, state->q, state->p, &phase);
     } else {
-        vi_flight_end(&flight, u, flight.phase.angle + flight.angular_frequency * u, state->q, state->p);
+        vi_phase further[VI_SINES_ROOM];
+        vi_flight_further(&flight, u, further);
+        vi_flight_end(&flight, u, drive.phase.angle + flight.angular_frequency * u, further, state->q, state->p);
     }
     if (!meets) {
         vi_flight_reach(&flight, state->now, state->q, state->p, state->origin);
@@ -302,6 +313,9 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     memcpy(fresh.p, state->p, sizeof fresh.p);
     memcpy(fresh.held, state->held, sizeof fresh.held);
     memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
+    fresh.degree = 1;
+    fresh.loads_last = HUGE_VAL;
+    fresh.further_at.periods = INT64_MAX; /* no phase is known */
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
     fresh.now = fresh.held_since = now;
@@ -337,7 +351,7 @@ static bool loads_are_finite(const vi_structure *s)
 {
     double sum = 0.0;
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
-        const double load = fabs(s->model->mode[j].force) + fabs(s->state->held[j]);
+        const double load = vi_mode_force_size(&s->model->mode[j]) + fabs(s->state->held[j]);
         sum += load * load;
     }
     return sum <= DBL_MAX;

@@ -10,6 +10,21 @@
 /* Relative change of a depth below which the depth hardly changes and quadrature replaces differences of powers. */
 static const double SMALL_CHANGE = 0.1;
 
+/* Upper bound of the rate at which the applied load of mode j changes within a radian. */
+static double load_rate(const vi_structure *s, int j)
+{
+    const vi_mode *mode = &s->model->mode[j];
+    double rate = fabs(mode->force) * s->model->clock.angular_frequency + fabs(s->state->held_rate[j]), power = 1.0;
+    for (int k = 0; k < vi_mode_sines(mode); ++k) {
+        rate += fabs(mode->further[k].force) * mode->further[k].angular_frequency;
+    }
+    for (int n = 2; n <= vi_structure_degree(s); ++n) {
+        power *= vi_min(s->model->radian, s->state->loads_last);
+        rate += (double)n * fabs(s->state->higher[n - 2][j]) * power;
+    }
+    return rate;
+}
+
 /* Upper bound of the rate at which the other forces change the modal accelerations, m/s^3 kg^(1/2). A projection on
  * held stops makes it no longer. */
 static double jerk_size(const vi_structure *s, int k, const double acceleration[])
@@ -20,8 +35,7 @@ static double jerk_size(const vi_structure *s, int k, const double acceleration[
         const vi_mode *mode = &model->mode[j];
         const double damped = model->coupled ? vi_structure_at(model, model->coupling[j], acceleration)
                                              : 2.0 * mode->decay * acceleration[j];
-        const double jerk = fabs(mode->force) * model->clock.angular_frequency + fabs(s->state->held_rate[j])
-                            + fabs(mode->stiffness * s->state->p[j] + damped);
+        const double jerk = load_rate(s, j) + fabs(mode->stiffness * s->state->p[j] + damped);
         square += jerk * jerk;
     }
     double size = sqrt(square);

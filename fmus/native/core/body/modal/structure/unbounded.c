@@ -16,10 +16,16 @@ static const double *shape_of(const vi_structure *s, int row)
     return row < s->model->rows ? s->model->shape[row] : s->model->observed;
 }
 
-/* Bound of the displacement of a point over a flight, m. */
+/* Bound of the displacement of a point over a flight, m; HUGE_VAL under loads of a higher degree. */
 static double reach_of(const vi_flight *flight, const vi_flight_instant *start, const vi_point *point)
 {
     double reach = point->steady + fabs(point->level) + fabs(point->level_rate) * flight->length;
+    if (vi_flight_degree(flight) > 1) {
+        return HUGE_VAL;
+    }
+    for (int k = 0; k < flight->sines; ++k) {
+        reach += point->further[k].amplitude;
+    }
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {
         const vi_segment *segment = &flight->segment[j];
         reach += point->shape[j] != 0.0 ? fabs(point->shape[j]) * (start->part[j].reach + fabs(segment->origin)) : 0.0;
@@ -120,14 +126,24 @@ static double approach_of(const vi_segment *segment, const vi_part *part, double
     return mode->slow * first >= -mode->fast * second ? 0.0 : HUGE_VAL;
 }
 
+/* Distance by which a steady response of this amplitude may come closer to its stop, m. */
+static double swing_of(double amplitude, double cosine, double sine, double sign, double c, double s)
+{
+    return amplitude > 0.0 ? amplitude - sign * (cosine * c + sine * s) : 0.0;
+}
+
 /* Is contact k out of reach for ever? */
 static bool never_meets(const vi_structure *s, const vi_flight *flight, const vi_point *point, int k,
                         const vi_flight_instant *now, bool *leaves)
 {
     const vi_approach p = vi_point_approach(point, flight, now);
-    const double here = point->sign * (point->cosine * now->cosine + point->sine * now->sine);
     const bool on_stop = now->u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
-    double closer = point->steady > 0.0 ? point->steady - here : 0.0;
+    double closer = swing_of(point->steady, point->cosine, point->sine, point->sign, now->cosine, now->sine);
+    for (int i = 0; i < flight->sines; ++i) {
+        const vi_point_sine *sine = &point->further[i];
+        const vi_phase *phase = &now->further[i];
+        closer += swing_of(sine->amplitude, sine->cosine, sine->sine, point->sign, phase->cosine, phase->sine);
+    }
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         closer += approach_of(&flight->segment[j], &now->part[j], point->sign * point->shape[j], leaves);
     }
@@ -154,7 +170,8 @@ static bool is_out_of_reach(const vi_structure *s, const vi_flight *flight, cons
 /* May the certificate be asked for? Loads that change, and stops of other components, may bring the motion back. */
 static bool is_left_alone(const vi_structure *s, const vi_flight *flight)
 {
-    if (!s->model->ends_unbounded || s->model->asks || flight->series || s->model->varies) {
+    if (!s->model->ends_unbounded || s->model->asks || flight->series || s->model->varies
+        || vi_flight_degree(flight) > 1) {
         return false;
     }
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
