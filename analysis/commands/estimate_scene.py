@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.analysis.dataset.clock import refuse_several_forces
 from vibroimpact.analysis.dataset.naming import file_name_of
 from vibroimpact.analysis.dataset.schema import scene_of, swept_names
 from vibroimpact.analysis.dataset.stores.runs import read_runs
@@ -61,6 +62,7 @@ def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, An
     if not recording.attrs.get("simulated"):
         return {}
     scene = scene_of(recording.attrs)
+    refuse_several_forces(scene, "estimate")
     flat = read_runs(data)
     row = 0 if run is None else flat.run_index.values.tolist().index(run)
     for key in scene.get("sweep", {}):

@@ -6,7 +6,8 @@ import os
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.schema import Outcome, swept_names
+from vibroimpact.analysis.dataset.clock import refuse_several_forces
+from vibroimpact.analysis.dataset.schema import Outcome, scene_of, swept_names
 from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.analysis.decay.resonance import Curve
 from vibroimpact.analysis.decay.samples import Floats
@@ -43,6 +44,7 @@ def swept_response(
         Nothing is swept, no extrema are recorded, or too few runs remain.
     """
     flat = read_runs(path)
+    refuse_several_forces(scene_of(flat.attrs), os.fspath(path))
     swept = swept_names(flat)
     name = next((name for name in ("angular_frequency", "frequency") if name in swept), None)
     if name is None or "displacement_max" not in flat:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from vibroimpact.analysis.dataset.clock import CLOCK_PERIODS
 from vibroimpact.analysis.dataset.schema import scene_of
 
 _ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
@@ -118,17 +119,32 @@ def limits(dataset: xr.Dataset, name: str) -> list[float]:
 def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
     """Return the angular frequency of the forcing of a run, rad/s; None without an oscillating force.
 
+    Several sines have the frequency of their common period, else of the first sine.
+
     The rows of the run have its swept values as coordinates.
     """
     scene = scene_of(dataset.attrs)
+    owner, forcing = _first_sine(scene)
+    periods = max(1, int(dataset.attrs.get(CLOCK_PERIODS, 1)))
     for key, factor in (("angular_frequency", 1.0), ("frequency", 2.0 * math.pi)):
-        value = table(scene, "forcing").get(key)
-        if f"forcing.{key}" in swept_keys(scene):
-            column = column_of(f"forcing.{key}", [str(name) for name in run.coords])
+        value = forcing.get(key)
+        if f"{owner}.{key}" in swept_keys(scene):
+            column = column_of(f"{owner}.{key}", [str(name) for name in run.coords])
             value = None if column is None else run[column].item()
         if isinstance(value, int | float) and math.isfinite(value) and value > 0.0:
-            return factor * value
+            return factor * value / periods
     return None
+
+
+def _first_sine(scene: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return the key and the table of the first sine of a scene; an empty table where it has none."""
+    forces = scene.get("forcing")
+    if not isinstance(forces, list):
+        return "forcing", table(scene, "forcing")
+    for number, force in enumerate(forces, start=1):
+        if force.get("signal", "sine") == "sine":
+            return f"forcing[{number}]", force
+    return "forcing", {}
 
 
 def in_scene_order(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.clock import refuse_quasi_periodic
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.analysis.jumps.classes import classes_of
@@ -53,6 +54,7 @@ def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
             "jumps: expected values of each recorded period, got one for all. "
             "Run it without each_period = false."
         )
+    refuse_quasi_periodic(dataset.attrs, "jumps")
     runs = dataset.vibroimpact.runs
     values = runs[names[0]].values
     directions = np.broadcast_to(runs["direction"].values, values.shape)

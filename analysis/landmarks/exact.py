@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vibroimpact.analysis.dataset.clock import refuse_several_forces
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.safe_toml import parse_toml
 
@@ -115,6 +116,7 @@ class ImpactOscillator:
             If the scene is not an oscillator with one impulsive stop in front of it.
         """
         scene = parse_toml(text)
+        refuse_several_forces(scene, "scene")
         stops = scene.get("stop", [])
         body = scene.get("body")
         kind = body.get("kind", "oscillator") if isinstance(body, dict) else "none"

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
 from vibroimpact.analysis.dataset.accessor import columns_of_runs, run_ids
+from vibroimpact.analysis.dataset.clock import refuse_quasi_periodic
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
 from vibroimpact.analysis.files.stores import Place
@@ -160,6 +161,7 @@ class ClassesOfDataset(Study[RunClass]):
         A dataset of one value for all periods, or without strobe and extrema, raises DatasetError.
         """
         runs = self.runs
+        refuse_quasi_periodic(runs.attrs, "classify")
         columns = [name for name in _STATES if name in runs.variables]
         if not columns and has_named_contacts(runs):
             ends = runs.vibroimpact.runs["outcome"].values

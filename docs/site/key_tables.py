@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 from vibroimpact.orchestrator.scene import (
     body_models,
     component_models,
+    forcing_models,
     measuring_models,
     models,
     replay_models,
@@ -41,7 +42,15 @@ def with_key_tables(page: str) -> str:
     """
     tables = {
         name: found
-        for module in (models, body_models, measuring_models, replay_models, sweep_models, component_models)
+        for module in (
+            models,
+            forcing_models,
+            body_models,
+            measuring_models,
+            replay_models,
+            sweep_models,
+            component_models,
+        )
         for name, found in vars(module).items()
         if isinstance(found, type) and issubclass(found, BaseModel)
     }

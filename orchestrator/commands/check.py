@@ -25,6 +25,7 @@ from vibroimpact.orchestrator.operations.check import Check
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.run.summary import (
+    clock_remark,
     contacts,
     effects,
     engine,
@@ -70,6 +71,8 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "fused", remark
     if remark := out_of_lanes(scene):
         yield "lanes", remark
+    if remark := clock_remark(scene):
+        yield "clock", remark
     known = effects(scene)
     listed = ("stops" if scene.stops else "", "contacts")
     yield (

@@ -33,6 +33,7 @@ from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "transients followed by vibroimpact"
@@ -280,6 +281,9 @@ def _refuse(study: Transients) -> None:
 
 def _with_the_first_mode(scene: Scene) -> Scene:
     """Return a scene without a force as a scene with zero force, with the period of its first mode on a spring."""
+    if scene.has_several_forces:
+        got = forces_in_words(scene.forces)
+        raise UsageError(f"{scene.source}: forcing: expected one sine, or no force, got {got}.")
 
     def forced(frequency: float) -> Scene:
         record = {"transient_periods": 0, "recorded_periods": 1}

@@ -20,7 +20,7 @@ STRUCTURES = ("Chain", "Beam", "Structure")
 BODIES = ("Oscillator", *STRUCTURES)
 _PLACE = r"(\[\d+\])?"
 _OF_A_BODY = {
-    "forcing": re.compile(rf"forcing\.(amplitude|base_acceleration){_PLACE}"),
+    "forcing": re.compile(rf"forcing\.(amplitude|base_acceleration){_PLACE}|sine\[\d+\]\.amplitude"),
     DAMPING: re.compile(rf"(far_)?damping(_ratio)?{_PLACE}|rayleigh\.(mass|stiffness)"),
     AMPLITUDE: re.compile(rf"amplitude\.[a-z_]+{_PLACE}"),
     "stops": re.compile(rf"contact{_PLACE}\.law"),

@@ -241,7 +241,7 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         units = dict(scene.declared_units)
         stored = {file: units[key] for key, file in names.items() if key in units}
         return units | stored if scene.units == "SI" else stored
-    forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
+    forcing = _units_of_forces(scene)
     forcing |= dict.fromkeys(scene.channels, "V")
     if isinstance(scene.body, StructureBody):
         forcing |= {
@@ -250,12 +250,21 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     return forcing | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
+def _units_of_forces(scene: Scene) -> dict[str, str]:
+    """Return the units of the sampled forces, by name in a time series."""
+    forcing = None if scene.has_several_forces else scene.forcing
+    if forcing is not None:
+        return {"forcing": FORCING_UNITS[forcing.kind]}
+    return {f"forcing[{n}]": FORCING_UNITS[force.kind] for n, force in enumerate(scene.forces, start=1)}
+
+
 def cf_unit(scene: Scene, key: str) -> str | None:
     """Return the unit of a number of the short form in CF notation; None where CF has no notation for it."""
     if key == RECORDING_KEY:
         return "1"
-    if key.startswith("forcing.amplitude") and scene.forcing is not None:
-        return "V" if scene.exciter is not None else FORCING_UNITS[scene.forcing.kind]
+    for table, force in zip(scene.forcing_keys, scene.forces, strict=True):
+        if key.startswith(f"{table}.amplitude"):
+            return "V" if scene.exciter is not None else FORCING_UNITS[force.kind]
     try:
         return si_unit(_unit(scene, key).replace("^", "")).cf
     except UsageError:  # UDUNITS has no broken exponents, and a wrong unit would be worse than none

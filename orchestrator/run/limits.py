@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.run.called_effects import called_by_numbers
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.record import OBSERVED
 from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -46,6 +47,7 @@ LIMITS = {
         lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
     ),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
+    "forces": Limit(lanes=True, orbits="one sine, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
     "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
@@ -82,6 +84,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("body", "body", "a scene of components" if scene.replay is None else "a replay")
     if scene.period is None:
         yield Seen("forcing", "forcing", "none")
+    if scene.has_several_forces:
+        yield Seen("forces", "forcing", forces_in_words(scene.forces))
     if not scene.stops:
         yield Seen("stop", "stop", "none")
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints, Columns
 from vibroimpact.fmus.core.contact_laws import contact_laws
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.forces import force_floats, force_integers
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import named_numbers
 from vibroimpact.orchestrator.scene.keys import MODES
@@ -32,17 +33,19 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
         oscillator, else the values of `state_variables`. A state beyond a rigid stop that has moved is put back, see
         `free_state`. None: the scene's own start.
     """
-    body = scene.body
-    parameters = named_numbers(body, body.size) | body.fmu_floats(scene.forcing, scene.stops, scene.sensor)
+    body, forcing = scene.body, None if scene.has_several_forces else scene.forcing
+    parameters = named_numbers(body, body.size) | body.fmu_floats(forcing, scene.stops, scene.sensor)
     parameters |= contact_floats(scene)
-    if scene.forcing is not None:
-        parameters |= named_numbers(scene.forcing)
+    if forcing is not None:
+        parameters |= named_numbers(forcing)
+    if scene.has_several_forces:
+        parameters |= force_floats(scene, begins_anew=start is None)
     if scene.exciter is not None:
         parameters |= _exciter_floats(scene, scene.exciter, parameters)
     parameters |= named_numbers(scene.execution)
     if start is not None:
         parameters |= dict(zip(scene.body.start_names, free_state(scene, start, parameters), strict=True))
-        if scene.period is not None:
+        if scene.period is not None and not scene.has_several_forces:
             parameters["forcing.phase"] = 0.0
     return parameters
 
@@ -53,7 +56,8 @@ def exported_floats(scene: Scene) -> dict[str, float]:
     They equal `float_parameters`, except for a moving base of an oscillator or a chain. A run gives such a body the
     inertial force and adds the base to the accelerations itself; an export has the base.
     """
-    parameters, forcing = float_parameters(scene, None), scene.forcing
+    parameters = float_parameters(scene, None)
+    forcing = None if scene.has_several_forces else scene.forcing
     if forcing is None or forcing.kind != "base_acceleration" or scene.body.KNOWS_BASE:
         return parameters
     forces = [name for name in parameters if name.startswith("forcing.amplitude")]
@@ -87,7 +91,10 @@ def integer_parameters(scene: Scene) -> dict[str, int]:
     """Return the integer, enumeration and Boolean (`bool`) parameters of the body's FMU."""
     refuse_unknown_modes(scene)
     parameters = {"impact_limit": scene.execution.impact_limit}
-    parameters |= scene.body.fmu_integers(scene.forcing, scene.stops)
+    if scene.has_several_forces:
+        parameters |= scene.body.fmu_integers(None, scene.stops) | force_integers(scene)
+    else:
+        parameters |= scene.body.fmu_integers(scene.forcing, scene.stops)
     for k, stop in enumerate(scene.stops, start=1):
         parameters[f"contact[{k}].law"] = contact_laws()[stop.law].number
         parameters[f"contact[{k}].side"] = SIDE_NUMBERS[stop.side]

@@ -300,8 +300,8 @@ class _Run:
 
     def _take_samples(self, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         if len(times):
-            forcing, parameters = self.scene.forcing, self.parameters
-            rows = self.plan.rows(values, self.plan.variables, forcing, parameters, times)
+            forces, parameters = self.scene.forces, self.parameters
+            rows = self.plan.rows(values, self.plan.variables, forces, parameters, times)
             self.samples.append(np.column_stack([times, rows]))
 
     # ---- record ----

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.dataset.clock import CLOCK_PERIODS
 from vibroimpact.analysis.dataset.provenance import program_attributes, versions
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.summary import in_one_line
@@ -26,6 +27,7 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "engine": in_one_line(scene, identity.execution),
         "engine_version": identity.engine,
         "instruction_set": identity.instruction_set,
+        **_clock(scene),
         **scene.found,
     }
 
@@ -43,6 +45,12 @@ def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
 def runs_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the global attributes of a study's dataset, for a study of runs in a dataset with `attrs`."""
     return {name: attrs[name] for name in ("title", "scene", "units_system") if name in attrs}
+
+
+def _clock(scene: Scene) -> dict[str, int]:
+    """Return the periods of the first of several sines in a forcing period, 0 without a common period."""
+    clock = scene.clock if scene.has_several_forces else None
+    return {} if clock is None else {CLOCK_PERIODS: clock.periods if clock.is_common else 0}
 
 
 def _seed(scene: Scene) -> str:

@@ -125,7 +125,7 @@ class Session:
                 "Open a scene that says so."
             )
         self._inputs.values[:] = 0.0
-        self._forcing, self._plan = scene.forcing, self._plan.at(scene)
+        self._forces, self._plan = scene.forces, self._plan.at(scene)
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)
         self._driver.record(impacts=True, extrema=False, periods=False)
@@ -157,7 +157,7 @@ class Session:
 
     def sample(self) -> Sequence[float]:
         """Return the present outputs, in the order of `outputs`."""
-        return self._plan.row(self._driver.sampled(), self._forcing, self._parameters, self.time)
+        return self._plan.row(self._driver.sampled(), self._forces, self._parameters, self.time)
 
     def follow(self, times: Floats, name: str | None = None, values: Floats | None = None) -> Floats:
         """Advance through all instants with an input that is linear between them; return the outputs at each.
@@ -185,7 +185,7 @@ class Session:
             self._set_input(name, values[-1], 0.0)
             found.append(self._driver.sampled())
         plan = self._plan
-        return plan.rows(np.vstack(found), plan.variables, self._forcing, self._parameters, times)
+        return plan.rows(np.vstack(found), plan.variables, self._forces, self._parameters, times)
 
     def _follow_coupled(
         self, times: Floats, name: str | None, values: Floats | None, slopes: Floats
@@ -241,7 +241,7 @@ class Session:
         driver = self._driver
         if not isinstance(driver, BodyDriver) or not self._has("force"):
             raise UsageError("hold: expected a fused oscillator or beam, got another body or a coupled one.")
-        if not self._plan.is_plain(self._forcing):
+        if not self._plan.is_plain(self._forces):
             raise UsageError(
                 f"hold: expected outputs that the FMU has as they are, got {', '.join(self.outputs)}."
             )

@@ -8,6 +8,7 @@ from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.forcing_clock import sines_of, sweeps_frequencies
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
@@ -109,6 +110,31 @@ def out_of_lanes(scene: Scene) -> str:
     return "none, as record.observed has more than one entry: the points run one by one"
 
 
+def clock_remark(scene: Scene) -> str:
+    """Return a remark on the forcing period of several sines; empty where it is the period of the first sine.
+
+    Examples
+    --------
+    >>> from vibroimpact.orchestrator.scene.scene import parse_scene
+    >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_periods = 5\\n"
+    >>> sines = [f"[[forcing]]\\namplitude = 1\\nangular_frequency = {w}\\n" for w in (1.0, 1.5, 2**0.5)]
+    >>> clock_remark(parse_scene(text + sines[0] + sines[1], "two.toml"))
+    'a forcing period is the common period of 2 sines: 2 periods of the first'
+    >>> clock_remark(parse_scene(text + sines[0] + sines[2], "two.toml"))
+    'quasi-periodic: 2 sines without a common period; a forcing period is one of the first'
+    """
+    clock, sines = scene.clock, len(sines_of(scene.forces))
+    if clock is None or sines < 2 or clock.periods == 1 == int(clock.is_common):
+        return ""
+    if clock.is_common:
+        return f"a forcing period is the common period of {sines} sines: {clock.periods} periods of the first"
+    near = "".join(
+        f"; forcing[{number}] is nearly {p}/{q} of the first frequency" for number, p, q in clock.near
+    )
+    swept = "a frequency is swept" if sweeps_frequencies(scene.sweep) else "quasi-periodic"
+    return f"{swept}: {sines} sines without a common period; a forcing period is one of the first{near}"
+
+
 def _met(contact: StopContactSpec | PairSpec) -> str:
     if isinstance(contact, PairSpec):
         return f"{contact.name}, {contact.law}"
@@ -132,7 +158,7 @@ def effects(scene: Scene) -> dict[str, bool]:
         return {name: name in called for name in EFFECTS_OF_THE_SHORT_FORM} | found | common
     called, followed = called_by_numbers(scene), scene.body.IS_STRUCTURE
     return {
-        "forcing": scene.forcing is not None,
+        "forcing": bool(scene.forces),
         "recorded drive": scene.replay is not None and scene.replay.drive is not None,
         DAMPING: DAMPING in called or getattr(scene.body, "rayleigh", None) is not None,
         "stops": bool(scene.stops),
@@ -165,4 +191,5 @@ def in_one_line(scene: Scene, execution: str = "auto") -> str:
     stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
     listed = ("stops" if scene.stops else "", "contacts")
     called = [name for name, there in effects(scene).items() if there and name not in listed]
-    return "; ".join(part for part in (engine(scene, execution), ", ".join(stops), ", ".join(called)) if part)
+    parts = engine(scene, execution), ", ".join(stops), ", ".join(called), clock_remark(scene)
+    return "; ".join(part for part in parts if part)

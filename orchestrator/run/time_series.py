@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.orchestrator.run.forces import Forces, cosines
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing, is_one_sine
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
-from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.sampled_names import AT_CONTACT
 
 FEWEST_SAMPLES = 10
@@ -54,24 +56,24 @@ class TimeSeriesPlan:
         """Return the plan at a point of the scene's sweep, whose bodies may have other modes."""
         return TimeSeriesPlan(scene, self.all_names) if any(map(len, self._weights)) else self
 
-    def is_plain(self, forcing: Forcing | None) -> bool:
+    def is_plain(self, forces: Sequence[Force]) -> bool:
         """Return whether the sampled variables are the FMU's own, one by one, so that `row` changes nothing."""
-        untouched = forcing is None or not any(n.startswith(("forcing", "acceleration")) for n in self.names)
+        untouched = not forces or not any(n.startswith(("forcing", "acceleration")) for n in self.names)
         plain = untouched and self._columns == [[place] for place in range(len(self.names))]
         return plain and not any(map(len, self._weights))
 
     def row(
         self,
         values: NDArray[np.float64],
-        forcing: Forcing | None,
+        forces: Sequence[Force],
         parameters: Mapping[str, float],
         time: float,
     ) -> Sequence[float]:
         """Return the sampled variables at one instant, s, from the values of the FMU, shape (variables,).
 
-        The parameters are the body's, see `parameters.float_parameters`; `forcing` drives the body.
+        The parameters are the body's, see `parameters.float_parameters`; the forces drive the body.
         """
-        cosine = 0.0
+        forcing, cosine = _only(forces), 0.0
         if forcing is not None:
             cosine = math.cos(forcing.angular_frequency * time + parameters["forcing.phase"])
         base = forcing.scalar_amplitude * cosine if forcing and self._is_relative(forcing) else 0.0
@@ -79,8 +81,10 @@ class TimeSeriesPlan:
         for name, columns, weights in zip(self.names, self._columns, self._weights, strict=True):
             own = values[columns] * weights if len(weights) else values[columns]
             value = math.fsum(own.tolist())
-            if name.startswith("forcing"):
-                value = _amplitude(forcing, name) * cosine
+            if name.startswith("forcing") and forcing is not None:
+                value = _amplitude(forcing, number_of_force(name)) * cosine
+            elif name.startswith("forcing"):
+                value = float(np.sum(_forces_at(forces, name, parameters, np.array([time]))))
             elif name.startswith("acceleration"):
                 value += base
             row.append(value)
@@ -91,18 +95,19 @@ class TimeSeriesPlan:
         return forcing.kind == "base_acceleration" and self._relative
 
     def base(
-        self, forcing: Forcing | None, parameters: Mapping[str, float], times: NDArray[np.float64]
+        self, forces: Sequence[Force], parameters: Mapping[str, float], times: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the acceleration of the base to be added to the FMU's at instants, m/s^2, shape (instant,)."""
+        forcing = _only(forces)
         if forcing is None or not self._is_relative(forcing):
-            return np.zeros(len(times))
+            return np.zeros(len(times))  # the FMU of several forces has the base
         return forcing.scalar_amplitude * _cosines(forcing, parameters, times)
 
     def rows(
         self,
         values: NDArray[np.float64],
         variables: Sequence[str],
-        forcing: Forcing | None,
+        forces: Sequence[Force],
         parameters: Mapping[str, float],
         times: NDArray[np.float64],
     ) -> NDArray[np.float64]:
@@ -113,12 +118,12 @@ class TimeSeriesPlan:
         place = {name: column for column, name in enumerate(variables)}
         own = [place[name] for name in self.variables]
         found = np.zeros((len(times), len(self.names)))
-        base = self.base(forcing, parameters, times)
+        base = self.base(forces, parameters, times)
         for column, (name, parts, weights) in enumerate(
             zip(self.names, self._columns, self._weights, strict=True)
         ):
-            if name.startswith("forcing") and forcing is not None:
-                found[:, column] = _amplitude(forcing, name) * _cosines(forcing, parameters, times)
+            if name.startswith("forcing"):
+                found[:, column] = _forces_at(forces, name, parameters, times)
                 continue
             terms = values[:, [own[part] for part in parts]]
             found[:, column] = _sums(terms * weights if len(weights) else terms)
@@ -151,12 +156,25 @@ def few_samples_message(durations: NDArray[np.float64], rate: float, *, has_peak
     )
 
 
+def _only(forces: Sequence[Force]) -> Forcing | None:
+    """Return the only force, a sine; None without forces, and for forces that the FMU of a structure has."""
+    return cast(Forcing, forces[0]) if forces and is_one_sine(forces) else None
+
+
+def _forces_at(
+    forces: Sequence[Force], name: str, parameters: Mapping[str, float], times: NDArray[np.float64]
+) -> NDArray[np.float64] | float:
+    """Return the sampled variable `forcing` or `forcing[i]`: a force, or under one force that on a mass."""
+    number, forcing = number_of_force(name), _only(forces)
+    if forcing is not None:
+        return _amplitude(forcing, number) * _cosines(forcing, parameters, times)
+    return Forces(forces, parameters).values(number, times) if forces and number else 0.0
+
+
 def _cosines(
     forcing: Forcing, parameters: Mapping[str, float], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the cosine of the forcing phase at instants, one by one: numpy's last bits depend on the machine."""
-    angles = forcing.angular_frequency * times + parameters["forcing.phase"]
-    return np.array([math.cos(angle) for angle in angles.tolist()])
+    return cosines(forcing.angular_frequency, parameters["forcing.phase"], times)
 
 
 def _sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,10 +184,7 @@ def _sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([math.fsum(row) for row in values.tolist()])
 
 
-def _amplitude(forcing: Forcing | None, name: str) -> float:
-    if forcing is None:
-        return 0.0
-    mass = forced_mass(name)
+def _amplitude(forcing: Forcing, mass: int | None) -> float:
     if mass is not None and isinstance(forcing.amplitude, tuple):
         return forcing.amplitude[mass - 1]
     return forcing.scalar_amplitude
@@ -196,8 +211,8 @@ def fmu_variables(name: str, stops: int) -> tuple[str, ...]:
     return (name,)
 
 
-def forced_mass(name: str) -> int | None:
-    """Return the mass (1-based) that `forcing[i]` acts on; None for any other name."""
+def number_of_force(name: str) -> int | None:
+    """Return the number i of `forcing[i]`, of a mass or of a force; None for any other name."""
     match = _ELEMENT.fullmatch(name)
     return int(match[2]) if match and match[1] == "forcing" else None
 

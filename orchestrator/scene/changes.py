@@ -12,6 +12,7 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.safe_toml import MOST_PARTS, parse_toml
 from vibroimpact.orchestrator.scene.keys import ALTERNATIVES, OVERRIDDEN_BY, Key, numeric_key
 from vibroimpact.orchestrator.scene.problems import CHANGES, KeyPath, Problem, key_path, quoted
+from vibroimpact.orchestrator.scene.several_forces import with_one_force
 
 _PART = re.compile(
     r"""\s*(?P<name>[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')\s*(?P<places>(?:\[[1-9][0-9]{0,8}\]\s*)*)"""
@@ -97,11 +98,12 @@ def _changed(
     document: Mapping[str, Any], changes: Sequence[Change], problems: list[Problem], source: str
 ) -> dict[str, Any]:
     """Return a copy with all changes; raise SceneError with all problems."""
-    changed, made = deepcopy(dict(document)), []
+    changed, made = with_one_force(deepcopy(dict(document))), []
     for change in changes:
         try:
-            _make(changed, change)
-            made.append(change)
+            placed = _of_force(changed, change)
+            _make(changed, placed)
+            made.append(placed)
         except _NoChange as refused:
             problems.append(refused.problem)
     _leave_out_alternatives(changed, made)
@@ -145,6 +147,19 @@ def _value(key: str, text: str) -> Any:
             return text
         raise _NoChange(Problem(key, _VALUE, quoted(text), _VALUE_HINT)) from None
     return value
+
+
+def _of_force(document: Mapping[str, Any], change: Change) -> Change:
+    """Return a change of a force with the number of the force where there are several, and else without."""
+    table, *rest = change.path
+    if table != "forcing" or not rest:
+        return change
+    is_list, first = isinstance(document.get("forcing"), list), rest[0]
+    if is_list and isinstance(first, str):
+        return Change((table, 0, *rest), change.value)
+    if not is_list and first == 0 and len(rest) > 1:
+        return Change((table, *rest[1:]), change.value)
+    return change
 
 
 def _make(document: dict[str, Any], change: Change) -> None:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, LinkTable, StructureBody
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, BodyAlone, LinkTable, StructureBody
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
+from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sines_of, sweeps_frequencies
+from vibroimpact.orchestrator.scene.forcing_models import (
+    FORCING_MODELS,
+    Force,
+    Forcing,
+    forcing_keys,
+    is_one_sine,
+)
 from vibroimpact.orchestrator.scene.keys import MODES, Key, number_of, numeric_key
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
 from vibroimpact.orchestrator.scene.models import (
@@ -18,7 +26,6 @@ from vibroimpact.orchestrator.scene.models import (
     STOP_MODELS,
     Contact,
     Execution,
-    Forcing,
     OwnStop,
     Record,
     SceneHeader,
@@ -120,7 +127,7 @@ class Draft(DraftTables):
         self.meetings: tuple[Contact | None, ...] = ()
         self.record = _sampling_observed(self.table(Record, "record", {}))
         self.body: Body | None = self._structure() if self.is_structure else self._body()
-        self.forcing = self.table(Forcing, "forcing")
+        self.forces = self._forces()
         self.stops: tuple[OwnStop | None, ...] = tuple(
             self.variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
         )
@@ -138,6 +145,47 @@ class Draft(DraftTables):
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
         return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
+
+    def _forces(self) -> tuple[Force | None, ...]:
+        raw = self.document.get("forcing")
+        if raw is None:
+            return ()
+        entries = self.entries("forcing") if isinstance(raw, list) else [(raw, ("forcing",))]
+        return tuple(self.variant(FORCING_MODELS, "signal", "sine", *entry) for entry in entries)
+
+    @property
+    def forcing(self) -> Forcing | None:
+        """The only force, a sine; None where it is invalid, and for other forces."""
+        alone = self.forces[0] if len(self.forces) == 1 else None
+        return alone if isinstance(alone, Forcing) else None
+
+    def written_forces(self) -> Iterator[tuple[str, Force | None, Mapping[str, Any]]]:
+        """Yield the key of each force, its table, and the table as written."""
+        raw = self.document.get("forcing")
+        tables = raw if isinstance(raw, list) else [raw]
+        for key, force, table in zip(forcing_keys(self.forces), self.forces, tables, strict=False):
+            yield key, force, table if isinstance(table, dict) else {}
+
+    @property
+    def has_several_forces(self) -> bool:
+        """Whether the forces are several, or one that is no sine: the body then runs as a structure."""
+        return not is_one_sine(self.forces)
+
+    @property
+    def simulated_body(self) -> Body | None:
+        """The body in the form that runs: a structure under several forces; None where it is invalid."""
+        body = self.body
+        if body is None or isinstance(body, StructureBody) or not self.has_several_forces:
+            return body
+        return BodyAlone.model_construct(names=("body",), parts=(body,), links=(), observed=())
+
+    @property
+    def clock(self) -> Clock | None:
+        """The clock of valid forces; None without one, and where a frequency is missing, 0 or infinite."""
+        sines = sines_of(self.forces)
+        if any(not 0.0 < sine.angular_frequency < math.inf for sine in sines):
+            return None
+        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.axes))
 
     @property
     def is_structure(self) -> bool:
@@ -183,6 +231,11 @@ class Draft(DraftTables):
         swept = any(axis.key.startswith(tables) for axis in self.axes)
         return " (the worst of the swept values)" if swept else ""
 
+    @property
+    def swept_counts(self) -> str:
+        """A note for a message on keys that exclude each other."""
+        return "; a swept key counts as given" if self.axes else ""
+
     def span(self, text: str) -> tuple[float, float] | None:
         """Return the lowest and highest value of a key over all points; None if its table is invalid."""
         for axis in self.axes:
@@ -194,6 +247,8 @@ class Draft(DraftTables):
 
     def _owner(self, key: Key) -> object:
         """Return the table of a key; None if it is invalid."""
+        if key.table == "forcing":
+            return self.forces[key.place or 0]
         if key.place is None:
             return getattr(self, key.table)
         arrays: dict[str, Sequence[object]] = {
@@ -223,14 +278,26 @@ class Draft(DraftTables):
         return None if series is None or series.rate is None else (series.rate, series.rate)
 
     def angular_frequency_span(self) -> tuple[float, float] | None:
-        """Return the lowest and highest angular frequency, rad/s: 0 without forcing, None if it is invalid."""
-        if "forcing" not in self.document:
-            return 0.0, 0.0
-        if self.forcing is None or not FREQUENCY_KEYS & self.written("forcing").keys():
+        """Return the lowest and highest angular frequency of the clock, rad/s: 0 without one, None if it is invalid."""
+        if None in self.forces:
             return None
-        if self.forcing.frequency is None:
-            return self.span("forcing.angular_frequency")
-        span = self.span("forcing.frequency")
+        spans = [
+            self.frequency_span(key) for key, force, _ in self.written_forces() if isinstance(force, Forcing)
+        ]
+        if not spans:
+            return 0.0, 0.0
+        clock = self.clock
+        periods = 1 if clock is None else clock.periods
+        return spans[0] and (spans[0][0] / periods, spans[0][1] / periods)
+
+    def frequency_span(self, key: str) -> tuple[float, float] | None:
+        """Return the lowest and highest angular frequency of the sine of a key, rad/s; None if it is not given."""
+        force, written = next((force, written) for own, force, written in self.written_forces() if own == key)
+        if not isinstance(force, Forcing) or not FREQUENCY_KEYS & written.keys():
+            return None
+        if force.frequency is None:
+            return self.span(f"{key}.angular_frequency")
+        span = self.span(f"{key}.frequency")
         return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
 
 

@@ -12,12 +12,13 @@ from pydantic import BaseModel
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
 from vibroimpact.orchestrator.scene.fields import field_name, field_of, is_whole, known_keys, numeric_keys
+from vibroimpact.orchestrator.scene.forcing_models import FORCING_MODELS
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
-from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS, Execution, Forcing
+from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS, Execution
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),
-    "forcing": (Forcing,),
+    "forcing": tuple(FORCING_MODELS.values()),
     "sensor": (Sensor,),
     "load_cell": (LoadCell,),
     "exciter": (Exciter,),
@@ -31,8 +32,8 @@ _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
 CHAIN_TABLES = ("load_cell", "exciter", "noise", "daq")
 """Tables of a measuring chain, except `sensor`, which other scenes have, too."""
 SINGLE_TABLES = ("body", "forcing", "sensor", *CHAIN_TABLES)
-"""Tables with numbers that a scene has at most once; it has several of `body` only as `[[body]]`."""
-ARRAY_TABLES = ("body", "stop", "link", "contact")
+"""Tables with numbers that a scene has at most once, unless it lists them: `[[body]]`, `[[forcing]]`."""
+ARRAY_TABLES = ("body", "forcing", "stop", "link", "contact")
 """Tables with numbers of which a scene may have several: `[[body]]`, `[[stop]]`."""
 SWEEPABLE: dict[str, tuple[str, ...]] = {
     table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
@@ -66,8 +67,24 @@ class Key(NamedTuple):
         return self.table if self.place is None else f"{self.table}[{self.place + 1}]"
 
     def owner_in(self, document: Mapping[str, Any]) -> Any:
-        """Return the table of the key in a document."""
-        return document[self.table] if self.place is None else document[self.table][self.place]
+        """Return the table of the key in a document; `forcing` is the first of several forces."""
+        tables = document[self.table]
+        if self.table == "forcing":
+            key = self.among(len(tables) if isinstance(tables, list) else 1)
+            return tables if key.place is None else tables[key.place]
+        return tables if self.place is None else tables[self.place]
+
+    def among(self, forces: int) -> Key:
+        """Return the key as a scene with a number of forces has it: `forcing[1]` for `forcing` of several.
+
+        Examples
+        --------
+        >>> numeric_key("forcing.amplitude").among(2).owner, numeric_key("forcing[1].amplitude").among(1).owner
+        ('forcing[1]', 'forcing')
+        """
+        if self.table != "forcing" or (self.place or 0) > 0:
+            return self
+        return self._replace(place=0 if forces > 1 else None)
 
     def typed(self, value: float) -> float:
         """Return a number in the type of its field: int for whole numbers."""

@@ -8,7 +8,6 @@ The tables of a measuring chain, a replay and a sweep are in `measuring_models`,
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal, get_args
 
@@ -92,88 +91,6 @@ def location_rule(doc: str, default: str) -> Rule:
     """Return the rule of a point of a beam."""
     hint = "It is a fraction of the length: 0 is the clamped end, 1 the far end."
     return Rule(hint=hint, doc=doc, default=default)
-
-
-_CONSTANT = "Use 0 for a constant force."
-
-
-class Forcing(SceneTable):
-    """`[forcing]`: amplitude cos(angular_frequency t + phase), a force or an acceleration of the base."""
-
-    kind: Annotated[
-        Literal["force", "base_acceleration", "uniform", "mode"],
-        Rule(
-            doc='`"force"`; `"base_acceleration"`: the amplitude is the acceleration of the base, displacements are '
-            'relative to it; for beams also `"uniform"`: a force per length, and `"mode"`: a load in the shape of a '
-            "mode"
-        ),
-    ] = "force"
-    amplitude: Annotated[
-        FiniteNumbers,
-        Rule(
-            "a finite number, or an array of them for a chain",
-            unit="N (m/s^2 for base_acceleration, N/m for uniform, V beside `[exciter]`)",
-            doc='a chain under `"force"` has one for each mass; a number is enough for a single mass',
-        ),
-    ]
-    angular_frequency_given: Annotated[
-        NotNegative | None,
-        Rule(
-            unit="rad/s",
-            hint=_CONSTANT,
-            fmu="forcing.angular_frequency",
-            doc="0 is a constant force, amplitude cos(phase), for example a weight",
-            default="this or `frequency`",
-        ),
-    ] = Field(None, alias="angular_frequency")
-    frequency: Annotated[
-        NotNegative | None,
-        Rule(unit="Hz", hint=_CONSTANT, doc="SI scenes only", default="this or `angular_frequency`"),
-    ] = None
-    phase: Annotated[
-        Finite,
-        Rule(
-            unit="rad",
-            fmu="forcing.phase",
-            doc="phase of the force at time 0. A recording begins and ends at forcing phase 0. With another phase at "
-            "time 0 it begins up to one period later, even if `transient_periods = 0`",
-        ),
-    ] = 0.0
-    location: Annotated[
-        Fraction | None,
-        location_rule(
-            'point of a beam where a `"force"` acts; not a supported end', "the free tip, or the middle"
-        ),
-    ] = None
-    at: Annotated[
-        Point | None,
-        replace(
-            POINT_RULE,
-            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`',
-            default="required there",
-        ),
-    ] = None
-    mode: Annotated[
-        ModeNumber | None,
-        Rule(
-            doc="the load has the shape of this mode, and drives no other mode",
-            default='required for `"mode"`',
-        ),
-    ] = None
-
-    @property
-    def scalar_amplitude(self) -> float:
-        """Amplitude of a load with a single amplitude; forces on the masses of a chain have an array."""
-        assert not isinstance(self.amplitude, tuple)
-        return self.amplitude
-
-    @property
-    def angular_frequency(self) -> float:
-        """Angular frequency, rad/s: as given, or 2 pi frequency; 0 for a constant force."""
-        if self.frequency is not None:
-            return 2.0 * math.pi * self.frequency
-        given = self.angular_frequency_given
-        return 0.0 if given is None else given + 0.0  # -0 becomes 0
 
 
 class StopTable(SceneTable):

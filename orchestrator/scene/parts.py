@@ -6,11 +6,9 @@ for each FMU, connections between them, and contacts of any two.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from itertools import chain
-from operator import is_
 from pathlib import Path
 from typing import Any, Literal, Self, cast
 
@@ -25,11 +23,19 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.scene.body_models import Body, LinkTable, OneBody, StructureBody
+from vibroimpact.orchestrator.scene.body_models import Body, StructureBody
 from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, is_step
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
+from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sweeps_frequencies
+from vibroimpact.orchestrator.scene.forcing_models import (
+    Force,
+    Forcing,
+    forces_in_words,
+    forcing_keys,
+    is_one_sine,
+)
 from vibroimpact.orchestrator.scene.keys import (
-    SINGLE_TABLES,
+    CHAIN_TABLES,
     Key,
     number_of,
     numbers_of,
@@ -43,14 +49,7 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import (
-    ContactTable,
-    Execution,
-    Forcing,
-    Record,
-    SceneTable,
-    Stop,
-)
+from vibroimpact.orchestrator.scene.models import ContactTable, Execution, Record, SceneTable, Stop
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
@@ -58,6 +57,8 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
 _NAMED_BY_FORM = ("bodies", "contacts", "connections", "events", "declared_units", "doubts", "remarks")
 """Parts with different names, or no name, in the documents of the two forms."""
+_OWN_TABLES = ("sensor", *CHAIN_TABLES)
+"""Tables with numbers besides those of bodies, forces, stops and contacts."""
 
 
 class Parts(SceneTable):
@@ -70,7 +71,7 @@ class Parts(SceneTable):
     contacts: tuple[Stop | StopContactSpec | PairSpec, ...] = ()
     connections: tuple[ConnectionSpec, ...] = ()
     events: tuple[EventSpec, ...] = ()
-    forcing: Forcing | None = None
+    forces: tuple[Force, ...] = ()
     sensor: Sensor | None = None
     load_cell: LoadCell | None = None
     exciter: Exciter | None = None
@@ -91,10 +92,14 @@ class Parts(SceneTable):
         parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
         if not self.record.observed:
             del document["record"]["observed"]
+        forces = document.pop("forces")
+        document["forcing"] = forces if len(forces) > 1 else next(iter(forces), None)
         if self.is_one_body:
-            for table in (document["forcing"], *parts["contacts"]):
-                if table and table.get("at", "") is None:
+            for table in (*forces, *parts["contacts"]):
+                if table.get("at", "") is None:
                     del table["at"]  # so that campaigns of versions without it go on
+                if table.get("signal") == "sine":
+                    del table["signal"]
             return document | {"body": parts["bodies"][0], "stops": parts["contacts"], "general": None}
         document["record"]["time_series"] = None
         return document | {"body": None, "stops": [], "general": self._components_document()}
@@ -181,11 +186,40 @@ class Parts(SceneTable):
         return tuple(contact for contact in self.contacts if isinstance(contact, PairSpec))
 
     @property
+    def has_several_forces(self) -> bool:
+        """Whether the forces are several, or one that is no sine: the component Structure then has the body."""
+        return not is_one_sine(self.forces)
+
+    @property
+    def forcing(self) -> Forcing | None:
+        """The only force, a sine; None without forces.
+
+        Raises
+        ------
+        UsageError
+            The scene has several forces, or one of another signal.
+        """
+        if self.has_several_forces:
+            raise UsageError(
+                f"{self.source}: forcing: expected one sine, got {forces_in_words(self.forces)}."
+            )
+        return cast(Forcing, self.forces[0]) if self.forces else None
+
+    @property
+    def forcing_keys(self) -> tuple[str, ...]:
+        """The key of the table of each of `forces`: `forcing`, or `forcing[1]` and `forcing[2]`."""
+        return forcing_keys(self.forces)
+
+    @property
+    def clock(self) -> Clock | None:
+        """The clock of the forces, whose periods records count; None without a sine, and under a constant force."""
+        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.sweep))
+
+    @property
     def period(self) -> float | None:
-        """Forcing period 2 pi / angular_frequency, s; None without forcing and under a constant force."""
-        if self.forcing is None or self.forcing.angular_frequency == 0.0:
-            return None
-        return 2.0 * math.pi / self.forcing.angular_frequency
+        """Period of the clock, s: the forcing period 2 pi / angular_frequency under one sine; None without a clock."""
+        clock = self.clock
+        return None if clock is None else clock.period
 
     @property
     def macro_step(self) -> float:
@@ -249,7 +283,7 @@ class Parts(SceneTable):
         """
         if not self.is_one_body:
             return self._component_numbers().value(key)
-        parts = numeric_key(key)
+        parts = self._key(key)
         return self._number(key, parts, self._numbered_tables().get(parts.owner))
 
     def field(self, key: str) -> FieldInfo:
@@ -260,11 +294,14 @@ class Parts(SceneTable):
         UsageError
             The scene has no such key.
         """
-        parts = numeric_key(key)
+        parts = self._key(key)
         owner = self._numbered_tables().get(parts.owner)
         if owner is None or parts.name not in known_keys(type(owner)):
             raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent one.")
         return field_of(type(owner), parts.name)
+
+    def _key(self, text: str) -> Key:
+        return numeric_key(text).among(len(self.forces))
 
     def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
         number = number_of(owner, parts)
@@ -295,27 +332,30 @@ class Parts(SceneTable):
         for key, value in values.items():
             if key == RECORDING_KEY:  # the number of the recording is in no table
                 continue
-            parts = numeric_key(key)
+            parts = self._key(key)
             owner = tables.get(parts.owner)
             if owner is None:
                 raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
             if parts.element is not None:
                 self._number(key, parts, owner)
             tables[parts.owner] = owner.model_copy(update=replacement(owner, parts, value))
-        others = {name: tables.pop(name) for name in (*SINGLE_TABLES[1:], "execution")}
-        contacts = tuple(tables[name] for name in self.stop_keys)
-        return self.model_copy(update={**others, "bodies": (self._body_of(tables),), "contacts": contacts})
+        others = {name: tables.pop(name) for name in (*_OWN_TABLES, "execution")}
+        lists = {
+            "bodies": (self._body_of(tables),),
+            "contacts": tuple(tables[name] for name in self.stop_keys),
+            "forces": tuple(tables[name] for name in self.forcing_keys),
+        }
+        return self.model_copy(update={**others, **lists})
 
     def _body_of(self, tables: Mapping[str, BaseModel | None]) -> Body:
         """Return the body whose numbers are in tables by their names in keys."""
         body = self.body
         if not isinstance(body, StructureBody):
             return cast(Body, tables["body"])
-        parts = [cast(OneBody, tables[f"body[{n}]"]) for n in range(1, len(body.parts) + 1)]
-        links = [cast(LinkTable, tables[f"link[{n}]"]) for n in range(1, len(body.links) + 1)]
-        if all(map(is_, (*parts, *links), (*body.parts, *body.links))):
+        own = body.tables()
+        if all(tables[name] is table for name, table in own.items()):
             return body  # with the modes that it has found
-        return body.with_numbers(parts, links)
+        return body.with_tables({name: cast(SceneTable, tables[name]) for name in own})
 
     def _of_components_at(self, values: Mapping[str, float]) -> Self:
         new = self._component_numbers().at(values)
@@ -347,10 +387,8 @@ class Parts(SceneTable):
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables with numbers, by their name in keys."""
         found: dict[str, BaseModel | None] = dict(zip(self.stop_keys, self.stops, strict=True))
-        if self.is_one_body and isinstance(self.body, StructureBody):
-            found |= {f"body[{n}]": part for n, part in enumerate(self.body.parts, start=1)}
-            found |= {f"link[{n}]": link for n, link in enumerate(self.body.links, start=1)}
-        elif self.is_one_body:
-            found["body"] = self.body
-        found |= {name: getattr(self, name) for name in SINGLE_TABLES if name != "body"}
+        if self.is_one_body:
+            found |= self.body.tables() if isinstance(self.body, StructureBody) else {"body": self.body}
+        found |= dict(zip(self.forcing_keys, self.forces, strict=True))
+        found |= {name: getattr(self, name) for name in _OWN_TABLES}
         return {**found, "execution": self.execution}

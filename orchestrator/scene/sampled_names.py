@@ -6,8 +6,8 @@ from collections.abc import Container, Iterable, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+from vibroimpact.orchestrator.scene.forcing_models import Force, is_one_sine
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
-from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.problems import nearest
 
 if TYPE_CHECKING:
@@ -46,13 +46,14 @@ def table_of(channel: str) -> str:
     return "exciter" if channel == DRIVE else channel.partition(".")[0]
 
 
-def sampled_names(body: BodyTable, stops: int, forcing: Forcing | None) -> tuple[str, ...]:
+def sampled_names(body: BodyTable, stops: int, forces: Sequence[Force | None]) -> tuple[str, ...]:
     """Return the possible names in the time series of a scene with a number of stops, besides `channel_names`.
 
-    An array of amplitudes gives one forcing for each mass.
+    An array of amplitudes gives one forcing for each mass. Several forces have one name each.
     """
-    forces = len(forcing.amplitude) if forcing and isinstance(forcing.amplitude, tuple) else 0
-    names = [*_PLAIN, *(each_of("forcing", forces) if forces else ["forcing"])]
+    only = forces[0].amplitude if len(forces) == 1 and forces[0] is not None else 0.0
+    count = len(forces) if not is_one_sine(forces) else len(only) if isinstance(only, tuple) else 0
+    names = [*_PLAIN, *(each_of("forcing", count) if count else ["forcing"])]
     for name in AT_CONTACT:
         names += each_of(name, stops)
     return (*names, *CONSERVATIVE, *body.own_variables, *(INTEGRATED if body.IS_STRUCTURE else ()))

@@ -34,6 +34,7 @@ from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.several_bodies import with_one_body, with_one_body_in_text
+from vibroimpact.orchestrator.scene.several_forces import with_one_force, with_one_force_in_text
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.tables import read_tables
 from vibroimpact.orchestrator.scene.views import ViewedScene
@@ -62,8 +63,8 @@ class Scene(ViewedScene, Parts):
         Connections from outputs to inputs of components.
     events : tuple of EventSpec
         Crossings in components, located by step revision.
-    forcing : Forcing or None
-        Forcing of the body; None without a `[forcing]` table.
+    forces : tuple of Forcing or ConstantForcing
+        The forces, in the order of the file; empty without a `[forcing]` table.
     sensor : Sensor or None
         Observed point of a beam, and the reading of a sensor there; None without a `[sensor]` table.
     load_cell, exciter, noise, daq : LoadCell, Exciter, Noise, Daq, or None
@@ -305,12 +306,14 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     changed: tuple[str, ...] = ()
     if changes:
         written, changed = changed_document(written, changes)
-    document = with_one_body(with_resting_start(written) if for_orbits else written)
+    one_body = with_one_body(with_resting_start(written) if for_orbits else written)
+    document = with_one_force(one_body)
     fields, problems = read_tables(document, Path(source).parent)
     if problems:
         raise SceneError(lines_of(problems, source, changed))
     if changed:
         text = tomli_w.dumps(document)
-    elif document != written:
-        text = edited_text(text, with_one_body_in_text, document)
+    else:
+        text = text if one_body == written else edited_text(text, with_one_body_in_text, one_body)
+        text = text if document == one_body else edited_text(text, with_one_force_in_text, document)
     return Scene(source=source, text=text, **fields)

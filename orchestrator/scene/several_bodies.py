@@ -88,7 +88,8 @@ def _leave_out_names(document: MutableMapping[str, Any]) -> None:
     """Take the name from the table `[body]`, and the points with this name from the other tables."""
     body = document["body"]
     name = body.pop("name", None)
-    for table in (document.get("forcing"), *_tables(document.get("stop"))):
+    forcing = document.get("forcing")
+    for table in (forcing, *_tables(forcing), *_tables(document.get("stop"))):
         if isinstance(table, dict) and isinstance(table.get("at"), str):
             _place(table, name, body)
 

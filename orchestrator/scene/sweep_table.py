@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.scene.fields import (
     known_keys,
     rule_of,
 )
+from vibroimpact.orchestrator.scene.forcing_models import FORCING_MODELS
 from vibroimpact.orchestrator.scene.keys import (
     ARRAY_TABLES,
     SINGLE_TABLES,
@@ -124,6 +125,8 @@ def _model_of(name: str, table: Any) -> type[BaseModel] | None:
     table = name.partition("[")[0]
     if table == "body":
         return BODY_MODELS.get(str(written.get("kind", "oscillator")))
+    if table == "forcing":
+        return FORCING_MODELS.get(str(written.get("signal", "sine")))
     if table in ("stop", "contact"):
         models: Mapping[str, type[BaseModel]] = STOP_MODELS if table == "stop" else CONTACT_MODELS
         return models.get(str(written.get("law", "restitution")))
@@ -145,7 +148,7 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
             example = f"{table}[1].{SWEEPABLE[table][0]}"
             return f'Indices start at 1 and this scene has {count} [[{table}]]: for example "{example}".'
     if table in SWEEPABLE and table not in (*document, "execution"):
-        return f"This scene has no {f'[[{table}]]' if table in ARRAY_TABLES[1:] else f'[{table}]'}."
+        return f"This scene has no {f'[[{table}]]' if table not in SINGLE_TABLES else f'[{table}]'}."
     return _element_hint(text, document, known) or _nearest_key(text, known)
 
 

@@ -58,13 +58,11 @@ def _read_body(document: Mapping[str, Any]) -> Reading:
 def _parts(draft: Draft) -> dict[str, Any]:
     assert draft.record is not None
     return {
-        "bodies": (draft.body,),
+        "bodies": (draft.simulated_body,),
         "contacts": (*draft.stops, *draft.meetings),
         "record": _applicable(draft.record),
         "sweep": draft.axes + (draft.replay.axes if draft.replay else ()),
-        **{
-            name: getattr(draft, name) for name in ("forcing", "sensor", *CHAIN_TABLES, "execution", "replay")
-        },
+        **{name: getattr(draft, name) for name in ("forces", "sensor", *CHAIN_TABLES, "execution", "replay")},
     }
 
 

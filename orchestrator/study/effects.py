@@ -226,12 +226,27 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
         effect = rule_of(scene.field(key)).effect
         if effect and value != 0.0:
             called.setdefault(effect, []).append(key)
-    if scene.forcing is not None and np.any(scene.forcing.amplitude):
+    if len(scene.forces) == 1 and np.any(scene.forces[0].amplitude):
         called["forcing"] = ["forcing.amplitude"]
     if getattr(scene.body, "rayleigh", None) is not None:
         called.setdefault(DAMPING, []).append("body.rayleigh")
     for name, keys in called.items():
         yield _without(scene, name, ", ".join(keys), _zeros(keys))
+    if len(scene.forces) > 1:
+        yield from _of_forces(scene)
+
+
+def _of_forces(scene: Scene) -> Iterator[Effect | None]:
+    """Yield each of several forces as an effect; a force that sets the clock has the amplitude 0, others are absent."""
+    for place, (key, force) in enumerate(zip(scene.forcing_keys, scene.forces, strict=True)):
+        if not np.any(force.amplitude):
+            continue
+        name, asked_by = f"force {place + 1}, {force.signal}", f"{key}.amplitude"
+        without = _without(scene, name, asked_by, _removes("forcing", place))
+        if without is not None and without.without.clock == without.base.clock:
+            yield without
+        else:
+            yield _without(scene, name, asked_by, _zeros([asked_by]))
 
 
 def _without(

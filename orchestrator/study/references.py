@@ -224,7 +224,7 @@ def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
 
 def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Observation | None:
     """Return the observation with impacts from the closed form of P(1,1); None where the motion is another one."""
-    if scene.period is None or len(observation.impacts) < 2 or scene.forcing is None:
+    if scene.period is None or len(observation.impacts) < 2 or scene.has_several_forces:
         return None
     if not all_rigid(scene.stops):
         return None
@@ -232,10 +232,11 @@ def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Obse
         oscillator = ImpactOscillator.from_scene(scene.text)
     except DatasetError:
         return None
-    if scene.stops[0].side != "upper" or scene.forcing.scalar_amplitude < 0.0:
+    forcing = scene.forcing
+    if forcing is None or scene.stops[0].side != "upper" or forcing.scalar_amplitude < 0.0:
         return None
     begin, period = scales.window[0], scene.period
-    for velocity, phase in oscillator.single_impact_motions(scene.forcing.angular_frequency):
+    for velocity, phase in oscillator.single_impact_motions(forcing.angular_frequency):
         turns = phase / (2.0 * math.pi)
         periods = np.round((observation.impacts[:, 0] - begin) / period - turns)
         times: Floats = begin + (periods + turns) * period

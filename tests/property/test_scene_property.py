@@ -17,7 +17,8 @@ from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.fields import known_keys
-from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, RestitutionStop, SceneHeader
+from vibroimpact.orchestrator.scene.forcing_models import Forcing
+from vibroimpact.orchestrator.scene.models import Execution, Record, RestitutionStop, SceneHeader
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MODELS: dict[str, type[BaseModel]] = {

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from vibroimpact.orchestrator.scene import component_models, measuring_models, models, sweep_models
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, numeric_keys, rule_of
+from vibroimpact.orchestrator.scene.forcing_models import FORCING_MODELS
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE
 from vibroimpact.orchestrator.scene.replay_models import Replay
 
@@ -25,7 +26,7 @@ BOTH: Tables = {
 }
 SHORT: Tables = {
     **{f"[body] kind = {kind}": model for kind, model in BODY_MODELS.items()},
-    "[forcing]": models.Forcing,
+    **{f"[[forcing]] signal = {signal}": model for signal, model in FORCING_MODELS.items()},
     **{f"[[stop]] law = {law}": model for law, model in models.STOP_MODELS.items()},
     "[[link]]": LinkTable,
     **{f"[[contact]] of [[body]], law = {law}": model for law, model in models.CONTACT_MODELS.items()},

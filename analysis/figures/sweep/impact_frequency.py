@@ -67,7 +67,7 @@ def _shifted(dataset: xr.Dataset, swept: str, positions: Floats) -> tuple[Floats
     body = table(scene, "body")
     is_free = (
         isinstance(scene.get("body"), dict)
-        and not table(scene, "forcing")
+        and not scene.get("forcing")
         and len(stops) == 1
         and stops[0].get("side", "upper") == "upper"
     )

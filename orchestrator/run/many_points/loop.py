@@ -225,7 +225,7 @@ class PointLoop:
 
         The points of a beam are grouped by body: see `TAKES_ARRAYS` of bodies.
         """
-        own = [key for key in points.values if key.startswith(("body", "link"))]
+        own = [key for key in points.values if self.scene.body.is_shaping(key)]
         if not own or self.scene.body.TAKES_ARRAYS:
             yield slice(None), points.values
             return

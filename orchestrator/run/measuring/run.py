@@ -218,7 +218,7 @@ class MeasuredRun:
         found = dict(values)
         if "acceleration" in found:
             found["acceleration"] = found["acceleration"] + self._plan.base(
-                self._scene.forcing, self._parameters, times
+                self._scene.forces, self._parameters, times
             )
         return found
 
@@ -247,7 +247,7 @@ class MeasuredRun:
     def _row_table(self, nominal: Floats, edges: Floats, seen: _Seen) -> Floats:
         """Return the samples at edges of the clock, each channel with its skew, shape (sample, 1 + variable)."""
         at = np.searchsorted(seen.times, edges)
-        plain = self._plan.rows(seen.rows[at], self._variables, self._scene.forcing, self._parameters, edges)
+        plain = self._plan.rows(seen.rows[at], self._variables, self._scene.forces, self._parameters, edges)
         columns, place = [nominal], 0
         for name in self._plan.all_names:
             if name in CHANNELS:

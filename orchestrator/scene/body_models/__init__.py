@@ -4,7 +4,7 @@ from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
-from vibroimpact.orchestrator.scene.body_models.structure import LinkTable, StructureBody
+from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone, LinkTable, StructureBody
 
 Body = OscillatorBody | ChainBody | BeamBody | StructureBody
 
@@ -15,6 +15,7 @@ __all__ = [
     "BODY_MODELS",
     "BeamBody",
     "Body",
+    "BodyAlone",
     "ChainBody",
     "LinkTable",
     "OneBody",

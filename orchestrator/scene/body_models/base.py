@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
 from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.forcing_models import Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import AMPLITUDE, Forcing, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import AMPLITUDE, SceneTable, Stop
 
 Stops = Sequence[Stop]
 
@@ -140,6 +141,10 @@ class BodyTable(SceneTable):
     @abstractmethod
     def own_variables(self) -> tuple[str, ...]:
         """Variables of a time series that only this kind of body has, or has in this number."""
+
+    def is_shaping(self, key: str) -> bool:
+        """Return whether a number of a key changes the modes of the body, or its rows over them."""
+        return key.startswith(("body", "link"))
 
     def weights_of(self, name: str) -> dict[str, float]:
         """Return the weights of variables of the FMU whose sum is a sampled variable; none for the FMU's own."""

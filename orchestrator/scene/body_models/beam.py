@@ -19,13 +19,13 @@ from vibroimpact.orchestrator.scene.body_models.base import (
     of_amplitude,
 )
 from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
+from vibroimpact.orchestrator.scene.forcing_models import Force
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
     MOST_MODES,
     Finite,
     FiniteNumbers,
-    Forcing,
     ModeCount,
     NotNegative,
     NotNegativeNumbers,
@@ -212,7 +212,7 @@ class BeamBody(BodyTable):
             return TIP
         return self.place_of(stops[0]) if stops else MIDDLE
 
-    def forced_place(self, forcing: Forcing | None) -> float:
+    def forced_place(self, forcing: Force | None) -> float:
         """Return the place of the force: as given, the free tip, or the middle."""
         if forcing is not None and forcing.location is not None:
             return forcing.location
@@ -260,7 +260,15 @@ class BeamBody(BodyTable):
         numbers = named_numbers(self, self.size) | self.fmu_floats(None, (), None)
         return BeamPart(numbers, self.fmu_integers(None, ()))
 
-    def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
+    def load_of(self, force: Force) -> tuple[float, ...]:
+        """Return the force on each mode under a force with the amplitude 1, not on the base."""
+        from vibroimpact.fmus.bodies.beam import BeamPoints  # imports the core, which few scenes need
+
+        numbers = named_numbers(self, self.size) | self.fmu_floats(force, (), None)
+        found = BeamPoints(numbers, self.fmu_integers(force, ()), 0).structure_of(numbers)
+        return tuple((found.load[:, 0] * found.mass).tolist())
+
+    def fmu_floats(self, forcing: Force | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return rigidity, Rayleigh damping, places and amplitude as parameters of the FMU, SI."""
         found: dict[str, float] = {}
         if self.frequency is not None:
@@ -281,7 +289,7 @@ class BeamBody(BodyTable):
             found["forcing.amplitude"] = forcing.scalar_amplitude
         return found
 
-    def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
+    def fmu_integers(self, forcing: Force | None, stops: Stops) -> dict[str, int]:
         """Return modes, residual vectors, boundary, projection and kind of load as numbers of the FMU."""
         found = {
             "modes": self.size,

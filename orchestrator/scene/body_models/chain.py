@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from vibroimpact.orchestrator.scene.body_models.base import BODY_KINDS, BodyTable, NoPoint, Stops
 from vibroimpact.orchestrator.scene.fields import Rule, named_numbers
+from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
 from vibroimpact.orchestrator.scene.models import (
     DAMPING,
     MOST_MODES,
-    Forcing,
     ModeCount,
     ModeNumber,
     NotNegative,
@@ -174,6 +174,10 @@ class ChainBody(BodyTable):
         rows[1].append(self.far_stiffness)
         rows[2].append(self.far_damping)
         return MassesPart(*rows)
+
+    def load_of(self, force: Force) -> tuple[float, ...]:
+        """Return the force on each mass under a force: its amplitudes, or 1 for a force with one amplitude."""
+        return force.amplitude if isinstance(force.amplitude, tuple) else (1.0,) * self.size
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the amplitude of the force on each mass, N."""

@@ -18,15 +18,9 @@ from vibroimpact.orchestrator.scene.body_models.base import (
     of_amplitude,
 )
 from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import (
-    DAMPING,
-    FEEDS_ENERGY,
-    Finite,
-    Forcing,
-    NotNegative,
-    Positive,
-)
+from vibroimpact.orchestrator.scene.models import DAMPING, FEEDS_ENERGY, Finite, NotNegative, Positive
 
 if TYPE_CHECKING:
     from vibroimpact.fmus.bodies.assembly import Part
@@ -92,6 +86,10 @@ class OscillatorBody(BodyTable):
 
         one = [self.mass], [self.stiffness, 0.0], [self.damping, 0.0]
         return MassesPart(*one, [self.displacement_start], [self.velocity_start])
+
+    def load_of(self, force: Force) -> tuple[float, ...]:
+        """Return the force on the mass under a force with the amplitude 1."""
+        return (1.0,)
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the amplitude of the force, N."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, Stops
+from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.points import (
     GROUND,
     OneBody,
@@ -19,15 +20,9 @@ from vibroimpact.orchestrator.scene.body_models.points import (
     find_point,
 )
 from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import (
-    DAMPING,
-    FEEDS_ENERGY,
-    Forcing,
-    NotNegative,
-    SceneTable,
-    Stop,
-)
+from vibroimpact.orchestrator.scene.models import DAMPING, FEEDS_ENERGY, NotNegative, SceneTable, Stop
 from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
@@ -98,10 +93,19 @@ class StructureBody(BodyTable):
             *(one for name in names for one in each_of(name, self.size)),
         )
 
-    def with_numbers(self, parts: Sequence[OneBody], links: Sequence[LinkTable]) -> StructureBody:
-        """Return these bodies with other numbers, which are known to be valid."""
-        return StructureBody.model_construct(
-            names=self.names, parts=tuple(parts), links=tuple(links), observed=self.observed
+    def tables(self) -> dict[str, SceneTable]:
+        """Return the tables of the scene that have the numbers of the bodies, by their name in keys."""
+        bodies = {f"body[{n}]": part for n, part in enumerate(self.parts, start=1)}
+        return bodies | {f"link[{n}]": link for n, link in enumerate(self.links, start=1)}
+
+    def with_tables(self, tables: Mapping[str, SceneTable]) -> Self:
+        """Return these bodies with other numbers, which are known to be valid, from tables as by `tables`."""
+        new = list(tables.values())
+        return self.model_construct(
+            names=self.names,
+            parts=tuple(new[: len(self.parts)]),
+            links=tuple(new[len(self.parts) :]),
+            observed=self.observed,
         )
 
     # ---- points ----
@@ -112,13 +116,17 @@ class StructureBody(BodyTable):
         assert not isinstance(found, NoPoint), "the rules of scenes refuse it"
         return found
 
-    def first_observed(self, stops: Stops) -> Observed:
+    def first_observed(self, stops: Stops) -> Observed | PointOfBody:
         """Return the point or the pair whose displacement has extremes: as given, or `limited_point`."""
         return self.observed[0] if self.observed else self.limited_point(stops)
 
-    def limited_point(self, stops: Stops) -> str:
+    def limited_point(self, stops: Stops) -> str | PointOfBody:
         """Return the point of the first stop, else of the first contact, else the last body."""
         return stops[0].at or stops[0].between[0] if stops else self.names[-1]
+
+    def limited_by(self, stop: Stop) -> Observed | PointOfBody:
+        """Return the point that a stop limits, or the two points of a contact."""
+        return stop.at or stop.between
 
     def place_of(self, stop: Stop) -> float:
         """Return a number of the point of a stop, which differs between points; NaN for a contact of two points."""
@@ -146,9 +154,9 @@ class StructureBody(BodyTable):
         """The observed points besides the first, in words."""
         return tuple(map(_words, self.observed[1:]))
 
-    def observing_one(self) -> StructureBody:
+    def observing_one(self) -> Self:
         """Return these bodies without the observed points that only a record needs."""
-        return StructureBody.model_construct(
+        return self.model_construct(
             names=self.names, parts=self.parts, links=self.links, observed=self.observed[:1]
         )
 
@@ -171,8 +179,10 @@ class StructureBody(BodyTable):
         """Whether the damping couples the modes."""
         return self.assembly.is_coupled
 
-    def _shape_of(self, observed: Observed) -> NDArray[np.float64]:
+    def _shape_of(self, observed: Observed | PointOfBody) -> NDArray[np.float64]:
         """Return the row of a point over the coordinates, or of the first point of a pair minus the second."""
+        if isinstance(observed, PointOfBody):
+            return self.assembly.point(observed)
         if isinstance(observed, str):
             return self.assembly.point(self.point(observed))
         first, second = (self.assembly.point(self.point(end)) for end in observed)
@@ -193,6 +203,17 @@ class StructureBody(BodyTable):
                     return dict(zip(each_of(f"modal_{motion}", self.size), row, strict=True))
         return {}
 
+    def load(self, force: Force) -> NDArray[np.float64]:
+        """Return the force on each mode, kg^(-1/2) N, under a force with the amplitude 1, shape (mode,)."""
+        if force.kind == "base_acceleration":
+            participation = np.concatenate([part.participation for part in self.assembly.parts])
+            return np.asarray(-self.assembly.modal(participation))
+        return self._load_at_point(force)
+
+    def _load_at_point(self, force: Force) -> NDArray[np.float64]:
+        assert force.at is not None, "the rules of scenes refuse it"
+        return self.assembly.in_modes(self._shape_of(force.at))
+
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the modes, their start, their shapes at contacts, and their loads, mass-normalised, SI."""
         assembly = self.assembly
@@ -212,7 +233,7 @@ class StructureBody(BodyTable):
             ),
             "velocity_start": assembly.modal(np.concatenate([part.velocities for part in assembly.parts])),
         }
-        points = (*(stop.at or stop.between for stop in stops), *self.observed[1:])
+        points = (*map(self.limited_by, stops), *self.observed[1:])
         tables = {"contact_shape": [assembly.in_modes(self._shape_of(each)) for each in points]}
         if assembly.is_coupled:
             tables["damping"] = list(assembly.damping)
@@ -237,6 +258,75 @@ class StructureBody(BodyTable):
         """Return the number of modes and of further observed points, and whether the damping couples the modes."""
         further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
         return {"modes": self.size, "coupled": self.is_coupled, **further}
+
+
+class BodyAlone(StructureBody):
+    """One `[body]` as a structure, under forces that the FMU of its own kind does not have.
+
+    Its stops, forces and numbers have the keys of a scene of one body.
+    """
+
+    @property
+    def body(self) -> OneBody:
+        """The body as its table describes it."""
+        return self.parts[0]
+
+    def tables(self) -> dict[str, SceneTable]:
+        """Return the table `[body]`."""
+        return {"body": self.body}
+
+    def is_shaping(self, key: str) -> bool:
+        """Return whether a number of a key changes rows over the modes."""
+        return super().is_shaping(key) or key.endswith((".location", "]"))
+
+    @property
+    def own_variables(self) -> tuple[str, ...]:
+        """The motion of each mass of a chain, and the motion and the energy of each mode."""
+        masses = [one for name in MOTIONS for one in each_of(name, len(self._masses))]
+        return (*masses, *super().own_variables)
+
+    @property
+    def _masses(self) -> tuple[float, ...]:
+        return self.body.masses if isinstance(self.body, ChainBody) else ()
+
+    def _at(self, place: float) -> PointOfBody:
+        return PointOfBody(0, place or self.body.size)  # an oscillator has no places
+
+    def first_observed(self, stops: Stops) -> PointOfBody:
+        """Return the point that a scene of one body observes."""
+        return self._at(self.body.observed_place(stops, None))
+
+    def limited_point(self, stops: Stops) -> PointOfBody:
+        """Return the observed point."""
+        return self.first_observed(stops)
+
+    def limited_by(self, stop: Stop) -> PointOfBody:
+        """Return the point that a stop limits."""
+        return self._at(self.place_of(stop))
+
+    def place_of(self, stop: Stop) -> float:
+        """Return the place of a stop on the body."""
+        return self.body.place_of(stop)
+
+    def observed_place(self, stops: Stops, sensor: Sensor | None) -> float:
+        """Return the place of the recorded displacement on the body."""
+        return self.body.observed_place(stops, sensor)
+
+    def long_names(self, stops: Stops) -> dict[str, str]:
+        """Return no names: stops have those of a scene of one body."""
+        return {}
+
+    def weights_of(self, name: str) -> dict[str, float]:
+        """Return the weights of the modes in the motion of a mass of a chain; none for other variables."""
+        for motion in MOTIONS:
+            names = each_of(motion, len(self._masses))
+            if name in names:
+                row = self.assembly.in_modes(self._shape_of(self._at(names.index(name) + 1))).tolist()
+                return dict(zip(each_of(f"modal_{motion}", self.size), row, strict=True))
+        return {}
+
+    def _load_at_point(self, force: Force) -> NDArray[np.float64]:
+        return self.assembly.in_modes(np.array(self.body.load_of(force)))
 
 
 def label_of(observed: Observed) -> str:

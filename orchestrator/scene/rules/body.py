@@ -1,4 +1,4 @@
-"""Rules of a body and its forcing: arrays of one size, points on the body, known variable names."""
+"""Rules of a body: arrays of one size, points on the body, known variable names."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
-from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.sampled_names import (
     channel_names,
@@ -34,18 +33,19 @@ def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
         where, value = f"body.{variable.key}", getattr(body, variable.attribute)
         is_start = is_array_only(field_of(type(body), variable.key))
         if not body.KEEPS_MODES:
-            yield from _size_problem(where, value, body.size, body.ELEMENT)
+            yield from size_problem(where, value, body.size, body.ELEMENT)
         elif isinstance(value, tuple) and value and draft.sweeps_modes and not is_start:
             expected = "one number for all modes where it is not yet known how many there are"
             yield Problem(where, expected, f"an array of {len(value)}", "Write the number alone.")
         elif not is_start:
-            yield from _size_problem(where, value, body.size, body.ELEMENT)
+            yield from size_problem(where, value, body.size, body.ELEMENT)
         elif len(value) > body.size:
             expected = f"at most {body.size} numbers, one for each mode"
             yield Problem(where, expected, f"an array of {len(value)}", "Those left out are 0.")
 
 
-def _size_problem(key: str, value: object, size: int, of: str) -> Iterator[Problem]:
+def size_problem(key: str, value: object, size: int, of: str) -> Iterator[Problem]:
+    """Yield the problem of an array that has not one number for each element of a body."""
     if isinstance(value, tuple) and len(value) not in (size, 0):
         hint = f"This scene has {size} {of}{'' if size == 1 else 'es' if of == 'mass' else 's'}."
         expected = f"an array of {size}, one number for each {of}"
@@ -109,66 +109,14 @@ def fixed_point_problems(key: str, body: Body, span: tuple[float, float] | None)
             yield Problem(key, expected, quoted(location), f"{quoted(location)} is the {end}.")
 
 
-def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
-    """The kind of forcing, and its number of amplitudes, are possible for the body."""
-    body, forcing = draft.body, draft.forcing
-    if body is None or forcing is None:
-        return
-    if forcing.kind not in body.FORCINGS:
-        expected = f'"force" or "base_acceleration" for {body.NAME}'
-        yield Problem("forcing.kind", expected, quoted(forcing.kind), "It is a load of a beam.")
-        return
-    if forcing.at is not None:
-        hint = f"{body.PLACE_HINT or 'Remove at.'}".replace(
-            "Say which mass by mass.", "Give amplitude an array."
-        )
-        yield Problem("forcing.at", "at for several bodies", f"it beside {body.NAME}", hint)
-    yield from _amplitude_problems(body, forcing)
-    yield from _place_problems(draft, body, forcing)
-
-
-def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
-    array = isinstance(forcing.amplitude, tuple)
-    if forcing.kind in body.AMPLITUDES:
-        if array:
-            yield from _size_problem("forcing.amplitude", forcing.amplitude, body.size, "mass")
-        elif body.size > 1:
-            expected = f"an array of {body.size}, one amplitude for each mass"
-            hint = f"A force on the last mass alone: amplitude = {[0] * (body.size - 1) + [1]}."
-            hint = hint if body.size <= 4 else "Write 0 for each mass that is not forced."
-            yield Problem("forcing.amplitude", expected, quoted(forcing.amplitude), hint)
-    elif array:
-        assert isinstance(forcing.amplitude, tuple)
-        what = f"{body.NAME} under {forcing.kind}"
-        got = f"an array of {len(forcing.amplitude)}"
-        yield Problem("forcing.amplitude", f"one number for {what}", got, "Write the number alone.")
-
-
-def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Problem]:
-    """Yield the problems of `location` and `mode`, each of which belongs to one kind of load of a beam."""
-    for key, kind in (("location", "force"), ("mode", "mode")):
-        belongs = body.FORCING_KEYS.get(key) == forcing.kind
-        if key in draft.written("forcing") and not belongs:
-            got = f"it beside {body.NAME} under {forcing.kind}"
-            yield Problem(f"forcing.{key}", f'{key} for a beam with kind = "{kind}"', got, f"Remove {key}.")
-    if not body.FORCING_KEYS:
-        return
-    if forcing.kind == "force":
-        yield from fixed_point_problems("forcing.location", body, draft.span("forcing.location"))
-    elif forcing.kind == "mode" and not 1 <= (forcing.mode or 0) <= body.size:
-        hint = "The load has the shape of this mode."
-        hint = hint if forcing.mode else f"Add mode = ... to [forcing]. {hint}"
-        expected = f"a mode of the beam, 1 to {body.size}"
-        yield Problem("forcing.mode", expected, quoted(forcing.mode), hint)
-
-
 def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
     """A time series names variables of this body, each once."""
     series = draft.record.time_series if draft.record else None
-    if series is None or draft.body is None:
+    body = draft.simulated_body
+    if series is None or body is None:
         return
     known = (
-        *sampled_names(draft.body, len(draft.stops) + len(draft.meetings), draft.forcing),
+        *sampled_names(body, len(draft.stops) + len(draft.meetings), draft.forces),
         *channel_names(draft.document),
     )
     for place, name in enumerate(series.variables, start=1):
@@ -190,6 +138,5 @@ BODY_RULES = (
     arrays_have_one_size,
     beam_is_given_once,
     observed_point_is_there,
-    forcing_suits_the_body,
     sampled_variables_are_known,
 )

@@ -57,7 +57,7 @@ def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
     if draft.body is None:
         return
     assert draft.replay is not None
-    known = sampled_names(draft.body, len(draft.stops), draft.forcing)
+    known = sampled_names(draft.body, len(draft.stops), draft.forces)
     seen: set[tuple[str, str]] = set()
     for place, compared in enumerate(draft.replay.compare, start=1):
         variable, is_reading = plain_variable(compared.simulated)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
+from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
@@ -21,6 +21,7 @@ from vibroimpact.orchestrator.scene.rules.body import (
     beam_is_given_once,
     sampled_variables_are_known,
 )
+from vibroimpact.orchestrator.scene.rules.forcing import FORCING_RULES
 from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
@@ -35,8 +36,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
     """Return all problems between the tables of a scene."""
     rules = (
         *(_several_bodies(draft) if draft.is_structure else _of_one_body()),
-        _frequency_is_given_once,
-        _units_agree,
+        *FORCING_RULES,
         *_recording_rules(draft),
         _record_counts_what_there_is,
         _samples_fit,
@@ -90,9 +90,7 @@ def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
 def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
     body = draft.written("body")
     if body.get("kind", "oscillator") == "oscillator" and {"damping", "damping_ratio"} <= body.keys():
-        yield Problem(
-            "body.damping", "damping or damping_ratio", "both", f"Remove one{_swept_counts(draft)}."
-        )
+        yield Problem("body.damping", "damping or damping_ratio", "both", f"Remove one{draft.swept_counts}.")
 
 
 def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
@@ -114,28 +112,6 @@ def _several_points_are_observed(draft: Draft) -> Iterator[Problem]:
 _DAMPING_RULES: tuple[DraftRule, ...] = (_damping_is_given_once, _damping_ratio_has_a_spring)
 
 
-def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
-    if "forcing" not in draft.document:
-        return
-    given = FREQUENCY_KEYS & draft.written("forcing").keys()
-    if len(given) == 2:
-        expected = "angular_frequency (rad/s) or frequency (Hz)"
-        yield Problem("forcing.frequency", expected, "both", f"Remove one{_swept_counts(draft)}.")
-    if not given and isinstance(draft.document["forcing"], dict):
-        hint = "Add angular_frequency = ... to [forcing], in rad/s; 0 makes a constant force."
-        yield Problem("forcing.angular_frequency", "a number >= 0", "nothing", hint)
-
-
-def _swept_counts(draft: Draft) -> str:
-    return "; a swept key counts as given" if draft.axes else ""
-
-
-def _units_agree(draft: Draft) -> Iterator[Problem]:
-    if draft.header and draft.header.units == "nondimensional" and "frequency" in draft.written("forcing"):
-        hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
-        yield Problem("forcing.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
-
-
 def _time_series_has_a_rate(draft: Draft) -> Iterator[Problem]:
     series = draft.record.time_series if draft.record else None
     if series is not None and series.rate is None and not draft.samples_channels:
@@ -147,13 +123,13 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
     span = draft.angular_frequency_span()
     if span is None:
         return
-    if span[0] == 0.0 < span[1]:
+    if span[0] == 0.0 < span[1] and not draft.has_several_forces:
         hint = "A constant force has no period to count; run it as a scene of its own."
         yield Problem("sweep", "frequencies that are all > 0, or all 0", "0 among others", hint)
         return
     if "replay" in draft.document:
         return  # the recording gives the duration: see rules.replay
-    forced = span[0] > 0.0
+    forced = span[1] > 0.0
     right, wrong = (PERIOD_KEYS, TIME_KEYS) if forced else (TIME_KEYS, PERIOD_KEYS)
     yield from _wrong_durations(draft, right, wrong, forced)
     yield from _missing_duration(draft, right[1], wrong[1])
@@ -202,7 +178,12 @@ def _adaptive_axes_can_tell_motions(draft: Draft) -> Iterator[Problem]:
         return
     record, beside = draft.record, "beside an adaptive axis"
     of_periods = bool(record.recorded_periods) and (record.extrema or record.strobe)
-    if not (record.impacts or of_periods):
+    clock = draft.clock
+    if clock is not None and not clock.is_common:
+        hint = "Motions are told by how they repeat from period to period."
+        got = "sines without one"
+        yield Problem("sweep", "a common period of all sines beside an adaptive axis", got, hint)
+    elif not (record.impacts or of_periods):
         hint = "Without them nothing but outcomes is compared."
         yield Problem(
             "record", f"impacts, or the extrema or strobe of periods, {beside}", "none of them", hint

@@ -25,9 +25,9 @@ from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
+from vibroimpact.orchestrator.scene.rules.forcing import ALONE
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
-_ALONE = "beside one body alone"
 Span = tuple[float, float]
 
 
@@ -42,7 +42,6 @@ def structure_problems(draft: Draft) -> Iterator[Problem]:
     points = _Points(draft, draft.body)
     problems = list(points.problems())
     yield from problems
-    yield from _forcing_has_a_point(draft)
     if not problems:
         yield from list(_contacts_leave_room(draft, points)) or _start_is_on_the_free_side(draft, points)
 
@@ -53,7 +52,7 @@ def structure_problems(draft: Draft) -> Iterator[Problem]:
 def _tables_of_one_body(draft: Draft) -> Iterator[Problem]:
     for name in ("sensor", *CHAIN_TABLES, "replay"):
         if name in draft.document:
-            yield Problem(name, f"[{name}] {_ALONE}", "one beside [[body]]", "Remove it, or run one [body].")
+            yield Problem(name, f"[{name}] {ALONE}", "one beside [[body]]", "Remove it, or run one [body].")
     if draft.written("execution").get("how") == "coupled":
         hint = "Several bodies are one FMU, with all of their contacts inside."
         yield Problem("execution.how", '"auto" or "fused" beside [[body]]', '"coupled"', hint)
@@ -62,11 +61,7 @@ def _tables_of_one_body(draft: Draft) -> Iterator[Problem]:
 def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
     for number, part in enumerate(draft.parts, start=1):
         keeps_modes = part.body is not None and part.body.KEEPS_MODES and part.body.IS_STRUCTURE
-        for key in part.written("body"):
-            if key not in NOT_IN_STRUCTURES or key == "poisson_ratio":
-                continue
-            if key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes)):
-                continue
+        for key in keys_left_out(part):
             where = f"body[{number}].{key}"
             if key == "modes" and keeps_modes:
                 yield Problem(
@@ -76,12 +71,21 @@ def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
                     "It is found for one body alone.",
                 )
             else:
-                yield Problem(where, f"{key} {_ALONE}", "it beside [[body]]", f"Remove {key}.")
+                yield Problem(where, f"{key} {ALONE}", "it beside [[body]]", f"Remove {key}.")
     for number, stop in enumerate(draft.stops, start=1):
         for key in ("mass", "location"):
             if stop is not None and getattr(stop, key) is not None:
                 hint = 'Say which point by at, such as at = "chain.2" or at = "beam.tip".'
-                yield Problem(f"stop[{number}].{key}", f"{key} {_ALONE}", "it beside [[body]]", hint)
+                yield Problem(f"stop[{number}].{key}", f"{key} {ALONE}", "it beside [[body]]", hint)
+
+
+def keys_left_out(part: Draft) -> Iterator[str]:
+    """Yield the written keys of a body that it cannot have in a structure."""
+    keeps_modes = part.body is not None and part.body.KEEPS_MODES and part.body.IS_STRUCTURE
+    for key in part.written("body"):
+        has_modes = key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes))
+        if key in NOT_IN_STRUCTURES and key != "poisson_ratio" and not has_modes:
+            yield key
 
 
 def _counts_are_few(draft: Draft) -> Iterator[Problem]:
@@ -147,8 +151,9 @@ class _Points:
             elif stop is not None:
                 hint = f'For example at = "{self._body.names[-1]}".'
                 yield Problem(f"stop[{number}].at", "the point that it limits", "nothing", hint)
-        if draft.forcing is not None and draft.forcing.at is not None:
-            yield from self._problem("forcing.at", draft.forcing.at)
+        for key, force, _ in draft.written_forces():
+            if force is not None and force.at is not None:
+                yield from self._problem(f"{key}.at", force.at)
         yield from self._observed()
 
     def _observed(self) -> Iterator[Problem]:
@@ -209,30 +214,6 @@ class _Points:
         if not part.PLACE:
             return self._draft.span(key)
         return self._draft.span(f"{key}[{point.place}]") if part.displacement_start else (0.0, 0.0)
-
-
-def _forcing_has_a_point(draft: Draft) -> Iterator[Problem]:
-    forcing = draft.forcing
-    if forcing is None:
-        return
-    if forcing.kind not in ("force", "base_acceleration"):
-        hint = "It is a load of one beam."
-        yield Problem(
-            "forcing.kind", '"force" or "base_acceleration" beside [[body]]', quoted(forcing.kind), hint
-        )
-    elif forcing.kind == "force" and forcing.at is None:
-        hint = f'For example at = "{draft.names[0]}".'
-        yield Problem("forcing.at", "the point where the force acts", "nothing", hint)
-    elif forcing.kind == "base_acceleration" and forcing.at is not None:
-        yield Problem(
-            "forcing.at", 'it with kind = "force"', "it with base_acceleration", "The base moves all bodies."
-        )
-    if isinstance(forcing.amplitude, tuple):
-        got = f"an array of {len(forcing.amplitude)}"
-        yield Problem("forcing.amplitude", "one number beside [[body]]", got, "Write the number alone.")
-    for key in ("location", "mode"):
-        if key in draft.written("forcing"):
-            yield Problem(f"forcing.{key}", f"{key} {_ALONE}", "it beside [[body]]", f"Remove {key}.")
 
 
 # ---- room and start ----

@@ -136,6 +136,8 @@ def _no_transient(scene: Scene) -> Mapping[str, Any]:
 
 def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
     """Return a scene that starts with a state at forcing phase 0; None where such a scene is invalid."""
+    if scene.has_several_forces:
+        return None  # its state is of modes, which the table of the body does not have
     changes: dict[str, Any] = dict(_no_transient(scene))
     free = free_state(scene, state)
     half = len(free) // 2
@@ -143,7 +145,7 @@ def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
     changes |= {
         f"body.{name}_start": value for name, value in zip(("displacement", "velocity"), start, strict=True)
     }
-    if scene.forcing is not None and scene.period is not None:
+    if scene.period is not None:
         changes["forcing.phase"] = 0.0
     try:
         return scene.with_values(changes)

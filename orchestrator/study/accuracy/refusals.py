@@ -10,6 +10,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
 from vibroimpact.orchestrator.study.errors import QUANTITIES
@@ -61,7 +62,12 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
 
 
 def refuse_several_bodies(scene: Scene) -> None:
-    """Raise UsageError for several bodies, which no other way simulates."""
+    """Raise UsageError for several bodies or forces, which no other way simulates."""
+    if scene.has_several_forces:
+        raise UsageError(
+            f"{scene.source}: forcing: expected one sine, under which a body has other ways to be simulated, got "
+            f"{forces_in_words(scene.forces)}. They run fused, and are exact between impacts."
+        )
     if scene.is_one_body and isinstance(scene.body, StructureBody):
         raise UsageError(
             f"{scene.source}: body: expected one body, which has other ways to be simulated, got several. "

@@ -56,7 +56,7 @@ def scene_of(
         tables["forcing"] = {**tables["forcing"], **where}  # type: ignore[dict-item]
     record = {"transient_periods": 3, "recorded_periods": periods, "extrema": True}
     plain = Scene.from_dict({**tables, "record": record}, "scene.toml")
-    names = list(sampled_names(plain.body, len(stops), plain.forcing))
+    names = list(sampled_names(plain.body, len(stops), plain.forces))
     series = {"rate": rate, "variables": names}
     return Scene.from_dict({**tables, "record": {**record, "time_series": series}}, "scene.toml")
 
