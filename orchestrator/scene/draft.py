@@ -8,7 +8,14 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, BodyAlone, LinkTable, StructureBody
+from vibroimpact.orchestrator.scene.body_models import (
+    BODY_MODELS,
+    PART_MODELS,
+    Body,
+    BodyAlone,
+    LinkTable,
+    StructureBody,
+)
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sines_of, sweeps_frequencies
@@ -118,9 +125,11 @@ class Draft(DraftTables):
     Among several bodies each is a draft of its own in `parts`; `names`, `links` and `meetings` are of their tables.
     """
 
-    def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
+    def __init__(
+        self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...], *, is_part: bool = False
+    ) -> None:
         super().__init__(with_swept_keys(document, axes))
-        self.axes = axes
+        self.axes, self._is_part = axes, is_part
         self.names: tuple[str | None, ...] = ()
         self.parts: tuple[Draft, ...] = ()
         self.links: tuple[LinkTable | None, ...] = ()
@@ -144,7 +153,8 @@ class Draft(DraftTables):
             hint = "Add [body] with mass, stiffness and damping."
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
-        return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
+        models = PART_MODELS if self._is_part else BODY_MODELS
+        return self.variant(models, "kind", "oscillator", self.document["body"], ("body",))
 
     def _forces(self) -> tuple[Force | None, ...]:
         raw = self.document.get("forcing")
@@ -195,7 +205,8 @@ class Draft(DraftTables):
     def _structure(self) -> StructureBody | None:
         documents = part_documents(self.document, self.problems)
         self.parts = tuple(
-            Draft(part, axes_of_part(number, self.axes)) for number, part in enumerate(documents, start=1)
+            Draft(part, axes_of_part(number, self.axes), is_part=True)
+            for number, part in enumerate(documents, start=1)
         )
         for number, draft in enumerate(self.parts, start=1):
             self.problems += [of_part(number, problem) for problem in draft.problems]
