@@ -19,6 +19,7 @@ from vibroimpact.orchestrator.run.forces import further_forces
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.record import OBSERVED
 from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models.growing import GROWING_KEYS
 from vibroimpact.orchestrator.scene.forcing_clock import signals_of
 from vibroimpact.orchestrator.scene.forcing_models import Forcing, forces_in_words
 from vibroimpact.orchestrator.scene.keys import MODES
@@ -66,6 +67,7 @@ LIMITS = {
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
     "dragged": Limit(orbits="no damping of bodies that no spring ties to the ground"),
+    "growing": Limit(lanes=True, orbits="springs and dashpots that are not negative"),
     "held": Limit(orbits="a point that moves"),
     "force": Limit(
         pushed="a body with one force takes it where it is forced, and its stops are not all there"
@@ -103,12 +105,21 @@ def seen(scene: Scene) -> Iterator[Seen]:
     if not scene.is_one_body:
         return
     body = scene.body
+    if isinstance(body, StructureBody) and _may_grow(scene, body):
+        yield Seen("growing", "body", "a negative one")
     if not body.finds_modes and body.kept_modes < body.size:
         yield Seen("reduced", "body.modes", f"{body.kept_modes}")
     if body.projection != "variational":
         yield Seen("projection", "body.impact_projection", f'"{body.projection}"')
     if body.PLACE == "location" and len({body.place_of(stop) for stop in scene.stops}) > MOST_SENSORS:
         yield Seen("places", "stop", f"{len(scene.stops)}")
+
+
+def _may_grow(scene: Scene, body: StructureBody) -> bool:
+    """Return whether a spring or a dashpot is negative at a point of the sweep."""
+    names = ((axis.key.rpartition(".")[2].partition("[")[0], axis.lowest) for axis in scene.sweep)
+    owned = any(name in GROWING_KEYS and lowest < 0.0 for name, lowest in names)
+    return owned or body.has_negative
 
 
 def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
