@@ -212,6 +212,14 @@ def test_an_exported_file_has_signals_and_tables(tmp_path: Path, version: str) -
         (signal(SignalKind.half_sine), {}, "signal[1].duration: expected a finite number > 0, got 0"),
         ({"signal[3].kind": 9}, {}, "signal[3].kind: expected 0 to 8, got 9"),
         (signal(SignalKind.table, table_count=2), {}, "ascend, got 0 as number 2"),
+        (
+            {
+                **signal(SignalKind.table_cubic, table_count=3),
+                **signal(SignalKind.table_cubic, 2, table_count=2, table_start=2),
+            },
+            {"table.time": [0.0, 1.0, 2.0]},
+            "signal[2].table_start: expected all rows of signal[1], or none of them",
+        ),
         (signal(SignalKind.table, table_count=3, table_start=8191), {}, "expected rows 1 to 8192"),
         (
             signal(SignalKind.random, table_count=2, end_angular_frequency=4.0),
