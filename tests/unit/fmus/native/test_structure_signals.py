@@ -19,7 +19,7 @@ from vibroimpact.fmus.packaging.structure_file import structure_file
 
 NATURAL, RATIO = 3.0, 0.05
 #: One mode on which signal 1 acts with its amplitude, and a free mass.
-MODE = {
+MODE: dict[str, Any] = {
     "mode.angular_frequency": [NATURAL],
     "mode.damping_ratio": [RATIO],
     "mode.contact_shape": [[1.0]],
@@ -27,11 +27,10 @@ MODE = {
     "mode.base": [-1.0],
     "mode.signal": [[1.0]],
 }
-FREE = {**MODE, "mode.angular_frequency": [0.0], "mode.damping_ratio": [0.0]}
-KINDS = {kind.name: kind for kind in SignalKind}
+FREE: dict[str, Any] = {**MODE, "mode.angular_frequency": [0.0], "mode.damping_ratio": [0.0]}
 
 
-def signal(kind: SignalKind, k: int = 1, **more: float) -> dict[str, float]:
+def signal(kind: SignalKind, k: int = 1, **more: Any) -> dict[str, float]:
     return {f"signal[{k}].{name}": value for name, value in {"kind": int(kind), **more}.items()}
 
 
@@ -39,7 +38,7 @@ def energy_error(fmu: ComponentFmu) -> float:
     """Return the energy that the balance misses, relative to the work of the forces."""
     terms = [("kinetic", 1), ("potential", 1), ("forcing_work", -1), ("damping_loss", 1), ("contact_loss", 1)]
     sizes = [sign * fmu.get(f"energy.{name}") for name, sign in terms]
-    return abs(sum(sizes)) / sum(map(abs, sizes))
+    return float(abs(sum(sizes)) / sum(map(abs, sizes)))
 
 
 @pytest.mark.parametrize("kind", [SignalKind.chirp_linear, SignalKind.chirp_logarithmic])
