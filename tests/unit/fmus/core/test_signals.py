@@ -135,7 +135,7 @@ def random_signal(seed: int = 7, low: float = 0.0, **density: Any) -> Signal:
     return Signal(SignalKind.random, seed=seed, angular_frequency=low, end_angular_frequency=HIGH, **density)
 
 
-def densities(signal: Signal, count: int, size: int) -> tuple[Array, Array]:
+def densities(signal: Signal, count: int, size: int) -> tuple[NDArray[np.floating[Any]], Array]:
     """Return the bins of size `size`, rad/s, and estimates of the one-sided density from `count` separate blocks."""
     values = signal.values(np.arange(count * size) * INTERVAL).reshape(count, size)
     window = np.hanning(size)

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import mpmath
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def energy_error(fmu: ComponentFmu) -> float:
 @pytest.mark.parametrize("kind", [SignalKind.chirp_linear, SignalKind.chirp_logarithmic])
 def test_a_chirp_moves_a_mode_as_a_quadrature_of_thirty_digits(kind: SignalKind) -> None:
     start, duration, first, last = 0.5, 4.0, 1.0, 20.0
-    band = {"angular_frequency": first, "end_angular_frequency": last}
+    band: dict[str, Any] = {"angular_frequency": first, "end_angular_frequency": last}
     chirp = signal(kind, amplitude=2.0, start=start, duration=duration, phase=0.25, **band)
     with structure_fmu(MODE, {**chirp, "record.energies": True}) as fmu:
         for step in (0.25, 2.0, 4.25):
@@ -203,6 +204,29 @@ def test_an_exported_file_has_signals_and_tables(tmp_path: Path, version: str) -
             fmu.step(4.0)
         assert own.state() == exported.state()
         assert own.state() != (0.0, 0.0)
+
+
+@pytest.mark.parametrize("version", ["3.0", "2.0"])
+def test_model_exchange_has_the_same_signals(tmp_path: Path, version: str) -> None:
+    arrays = {**MODE, "mode.signal": [[1.0], [1.0]]}
+    loads = {
+        **signal(SignalKind.chirp_linear, amplitude=2.0, duration=5.0, end_angular_frequency=6.0),
+        **signal(SignalKind.random, 2, amplitude=1.0, end_angular_frequency=6.0, seed=5),
+        **stop(0.2, 0.7),
+    }
+    content = structure_file(arrays)
+    path = export_fmu(
+        "Structure", tmp_path / "one.fmu", modes=1, fmi=version, starts=loads, structure=content
+    )
+    ends = []
+    for kind in ("ModelExchange", "CoSimulation"):
+        result = fmpy.simulate_fmu(
+            str(path), fmi_type=kind, stop_time=4.0, output_interval=0.1, solver="CVode",
+            relative_tolerance=1e-9, output=["displacement", "contact[1].count"],
+        )  # fmt: skip
+        ends.append((result["displacement"][-1], result["contact[1].count"][-1]))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-5)
+    assert ends[0][1] > 0
 
 
 @pytest.mark.parametrize(
