@@ -97,8 +97,8 @@ static int size_for(const vi_density *density)
 
 /* ---- the filter ---- */
 
-/* The response of a filter of any length at frequency j of a transform: sqrt(S pi / interval) over the response of the
- * spline, sinc(w interval / 2)^4. */
+/* The response of a filter of any length at frequency j of a transform: sqrt(S pi / interval) over that of the spline,
+ * sinc(w interval / 2)^4. */
 static double response_at(const vi_random *r, const vi_transform *transform, const vi_density *density, int j,
                           int *place)
 {
