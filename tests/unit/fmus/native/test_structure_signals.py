@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from support.component_fmu import ComponentFmu, stop
+from support.component_fmu import LOWER, ComponentFmu, stop
 from support.modal_fmu import structure_fmu
 
 from vibroimpact.fmus.core.signals import Signal, SignalKind
@@ -123,6 +123,35 @@ def test_a_random_force_moves_a_mode_as_exact_steps_over_its_pieces() -> None:
     pieces = pieces._replace(coefficient=2.0 * pieces.coefficient)
     assert np.allclose(state, exact_steps(pieces, 12.0), rtol=1e-12, atol=1e-13)
     assert error < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flights_over_many_intervals_meet_what_single_segments_meet(seed: int) -> None:
+    force = signal(SignalKind.random, amplitude=2.0, end_angular_frequency=100.0, seed=seed)
+    place = 0.04 * (seed + 1)
+    scene = {**force, **stop(place, 0.7), **stop(-2.0 * place, 0.6, k=2, side=LOWER)}
+    arrays = {
+        "mode.angular_frequency": [2.0, NATURAL],
+        "mode.damping_ratio": [0.0, RATIO],
+        "mode.contact_shape": [[0.5, 1.0]] * 2,
+        "mode.observed_shape": [0.5, 1.0],
+        "mode.signal": [[0.3, 1.0]],
+    }
+    with (
+        structure_fmu(arrays, {**scene, "record.energies": True, "record.extrema": True}) as single,
+        structure_fmu(arrays, {**scene, "record.extrema": True}) as many,
+        structure_fmu(arrays, scene) as unrecorded,
+    ):
+        for _ in range(8):
+            for fmu in (single, many, unrecorded):
+                fmu.step(1.0)
+            assert many.state() == pytest.approx(single.state(), abs=1e-11)
+            assert unrecorded.state() == pytest.approx(single.state(), abs=1e-11)
+            for name in ("record.displacement_max", "record.displacement_min"):
+                assert many.get(name) == pytest.approx(single.get(name), abs=1e-11)
+        counts = [[fmu.get(f"contact[{k}].count") for k in (1, 2)] for fmu in (single, many, unrecorded)]
+        assert counts[0] == counts[1] == counts[2]
+        assert counts[0][0] > 0
 
 
 def test_many_signals_at_once_keep_the_balance_of_energy_through_impacts() -> None:
