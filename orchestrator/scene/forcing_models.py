@@ -409,7 +409,7 @@ def is_one_sine(forces: Sequence[Force | None]) -> bool:
     >>> is_one_sine([]), is_one_sine([sine]), is_one_sine([sine, sine])
     (True, True, False)
     """
-    return not forces or (len(forces) == 1 and isinstance(forces[0], Forcing | None))
+    return not forces or (len(forces) == 1 and (forces[0] is None or forces[0].signal == "sine"))
 
 
 def forcing_keys(forces: Sequence[Any]) -> tuple[str, ...]:
