@@ -70,7 +70,8 @@ class ForcingTable(SceneTable):
         Point | None,
         replace(
             POINT_RULE,
-            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`',
+            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`; `"all"`: '
+            "each mass, with the same amplitude",
             default="required there",
         ),
     ] = None

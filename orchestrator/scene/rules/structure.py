@@ -10,6 +10,7 @@ from typing import NamedTuple
 from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.body_models.base import NoPoint
 from vibroimpact.orchestrator.scene.body_models.points import (
+    ALL,
     GROUND,
     OneBody,
     PointOfBody,
@@ -152,9 +153,24 @@ class _Points:
                 hint = f'For example at = "{self._body.names[-1]}".'
                 yield Problem(f"stop[{number}].at", "the point that it limits", "nothing", hint)
         for key, force, _ in draft.written_forces():
-            if force is not None and force.at is not None:
+            if force is not None and force.at == ALL and ALL not in self._body.names:
+                yield from self._all_masses(f"{key}.at")
+            elif force is not None and force.at is not None:
                 yield from self._problem(f"{key}.at", force.at)
         yield from self._observed()
+
+    def _all_masses(self, where: str) -> Iterator[Problem]:
+        """Yield the problem of a force on all masses where a body has none of its own."""
+        beams = [
+            name
+            for name, part in zip(self._body.names, self._body.parts, strict=True)
+            if part.PLACE == "location"
+        ]
+        if beams:
+            hint = 'A base that moves loads all points: kind = "base_acceleration".'
+            yield Problem(
+                where, '"all" for oscillators and chains', f"it beside the beam {quoted(beams[0])}", hint
+            )
 
     def _observed(self) -> Iterator[Problem]:
         """Yield the problems of observed points: not there, the same twice in a pair, or listed twice."""
