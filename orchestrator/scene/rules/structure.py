@@ -18,7 +18,6 @@ from vibroimpact.orchestrator.scene.body_models.points import (
 )
 from vibroimpact.orchestrator.scene.body_models.structure import (
     MOST_LINKS,
-    NOT_IN_STRUCTURES,
     label_of,
 )
 from vibroimpact.orchestrator.scene.draft import Draft
@@ -26,7 +25,7 @@ from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
-from vibroimpact.orchestrator.scene.rules.forcing import ALONE
+from vibroimpact.orchestrator.scene.rules.body import ALONE, keys_left_out
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 Span = tuple[float, float]
@@ -78,15 +77,6 @@ def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
             if stop is not None and getattr(stop, key) is not None:
                 hint = 'Say which point by at, such as at = "chain.2" or at = "beam.tip".'
                 yield Problem(f"stop[{number}].{key}", f"{key} {ALONE}", "it beside [[body]]", hint)
-
-
-def keys_left_out(part: Draft) -> Iterator[str]:
-    """Yield the written keys of a body that it cannot have in a structure."""
-    keeps_modes = part.body is not None and part.body.KEEPS_MODES and part.body.IS_STRUCTURE
-    for key in part.written("body"):
-        has_modes = key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes))
-        if key in NOT_IN_STRUCTURES and key != "poisson_ratio" and not has_modes:
-            yield key
 
 
 def _counts_are_few(draft: Draft) -> Iterator[Problem]:
