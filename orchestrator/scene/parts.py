@@ -6,6 +6,7 @@ for each FMU, connections between them, and contacts of any two.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from itertools import chain
@@ -219,6 +220,11 @@ class Parts(SceneTable):
     @property
     def period(self) -> float | None:
         """Period of the clock, s: the forcing period 2 pi / angular_frequency under one sine; None without a clock."""
+        if len(self.forces) == 1 and isinstance(
+            self.forces[0], Forcing
+        ):  # it is asked for at each point of a sweep
+            frequency = self.forces[0].angular_frequency
+            return None if frequency == 0.0 else 2.0 * math.pi / frequency
         clock = self.clock
         return None if clock is None else clock.period
 

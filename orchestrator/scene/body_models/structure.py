@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, 
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.growing import has_negative
 from vibroimpact.orchestrator.scene.body_models.points import (
+    ALL,
     GROUND,
     OneBody,
     PointOfBody,
@@ -220,16 +221,20 @@ class StructureBody(BodyTable):
 
     def _load_at_point(self, force: Force) -> NDArray[np.float64]:
         assert force.at is not None, "the rules of scenes refuse it"
+        if force.at == ALL and ALL not in self.names:
+            return self.assembly.in_modes(np.ones(self.size))
         return self.assembly.in_modes(self._shape_of(force.at))
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the modes, their start, their shapes at contacts, and their loads, mass-normalised, SI."""
         assembly = self.assembly
         observed = self._shape_of(self.first_observed(stops))
-        forced = self._shape_of((forcing and forcing.at) or self.limited_point(stops))
         participation = np.concatenate([part.participation for part in assembly.parts])
         base = -assembly.modal(participation)
-        force = assembly.in_modes(forced)
+        if forcing is not None and forcing.at is not None:
+            force = self._load_at_point(forcing)
+        else:
+            force = assembly.in_modes(self._shape_of(self.limited_point(stops)))
         rows = {
             "angular_frequency": assembly.frequencies,
             "observed_shape": assembly.in_modes(observed),
