@@ -49,6 +49,7 @@ LIMITS = {
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
     "forces": Limit(lanes=True, orbits="one sine, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
+    "motion": Limit(lanes=True, orbits="stops that stand still"),
     "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
     "distance": Limit(lanes=True, orbits=_NONE),
@@ -88,6 +89,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("forces", "forcing", forces_in_words(scene.forces))
     if not scene.stops:
         yield Seen("stop", "stop", "none")
+    if scene.moving_stop:
+        yield Seen("motion", scene.moving_stop, "a stop that moves")
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')
