@@ -85,6 +85,9 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
             f"sine[{number}].phase": phase - turned * frequency,
             **_row("mode.sine", f"{number},", body.load(force)),
         }
+    for number, stop in enumerate(scene.stops, start=1):
+        if isinstance(stop, StopTable) and stop.moves:
+            found[f"stop[{number}].phase"] = stop.motion_phase - turned * stop.motion_angular_frequency
     return found | _signal_floats(scene, body) | _table_floats(scene)
 
 

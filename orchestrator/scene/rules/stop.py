@@ -151,14 +151,12 @@ def motions_are_whole(draft: Draft) -> Iterator[Problem]:
         if stop is not None and stop.moves:
             yield from _sine_problems(draft, stop, f"stop[{number}]")
             yield from _table_problems(stop, f"stop[{number}]")
-    moving = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.moves), 0)
-    if not moving:
-        return
+    drifting = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.drifts), 0)
     for axis in draft.axes:
-        if axis.continuation:
-            hint = "A stop moves from time 0 on, so that the end of a run is no start of the next."
+        if drifting and axis.continuation:
+            hint = "It moves on from time 0, so that the end of a run is no start of the next."
             key = key_path(("sweep", axis.key, "path"))
-            yield Problem(key, f'"independent" beside the moving stop[{moving}]', "a continuation", hint)
+            yield Problem(key, f'"independent" beside a stop[{drifting}] that drifts', "a continuation", hint)
 
 
 def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]:
