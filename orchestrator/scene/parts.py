@@ -50,7 +50,14 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import MOTION_KEYS, ContactTable, Execution, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import (
+    MOTION_KEYS,
+    ContactTable,
+    Execution,
+    Record,
+    SceneTable,
+    Stop,
+)
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out

@@ -19,7 +19,10 @@ def test_a_ball_that_chatters_rests_and_takes_off_is_the_exact_one(
 ) -> None:
     table = Table(amplitude, phase=phase, restitution=restitution)
     start = amplitude * math.cos(phase) + 0.01
-    with mp.workdps(DIGITS), ball_on_table(amplitude, start, 0.4, phase=phase, restitution=restitution) as fmu:
+    with (
+        mp.workdps(DIGITS),
+        ball_on_table(amplitude, start, 0.4, phase=phase, restitution=restitution) as fmu,
+    ):
         checked = 0
         for event in islice(events(table, start, 0.4), 160):
             late = float(event.time) + 1e-9

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from support.component_fmu import HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT, LOWER, RESTITUTION, UPPER, ComponentFmu, stop
+from support.component_fmu import (
+    HERTZ,
+    HUNT_CROSSLEY,
+    KELVIN_VOIGT,
+    LOWER,
+    RESTITUTION,
+    UPPER,
+    ComponentFmu,
+    stop,
+)
 from support.modal_fmu import structure_fmu
 
 TABLE_ROOM = 8192
@@ -40,7 +49,7 @@ def ball(height: float, speed: float) -> dict[str, Any]:
 
 
 def ball_on_table(
-    amplitude: float, height: float, speed: float, *, w: float = 1.0, phase: float = 0.0, **law: float
+    amplitude: float, height: float, speed: float, *, w: float = 1.0, phase: float = 0.0, **law: Any
 ) -> ComponentFmu:
     """Return a ball under gravity 1 above a table at amplitude cos(w t + phase)."""
     table = moving(amplitude=amplitude, angular_frequency=w, phase=phase)
@@ -49,7 +58,7 @@ def ball_on_table(
 
 
 def ball_in_frame(
-    amplitude: float, height: float, speed: float, *, w: float = 1.0, phase: float = 0.0, **law: float
+    amplitude: float, height: float, speed: float, *, w: float = 1.0, phase: float = 0.0, **law: Any
 ) -> ComponentFmu:
     """Return the same ball in the frame of the table: the base accelerates, and the stop stands still."""
     start = ball(height - amplitude * math.cos(phase), speed + amplitude * w * math.sin(phase))

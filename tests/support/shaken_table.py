@@ -1,4 +1,4 @@
-"""A ball on a shaken table in 40 digits: gravity 1, table at amplitude cos(w t + phase), bounces followed one by one."""
+"""A ball on a shaken table in 40 digits: gravity 1, table at amplitude cos(w t + phase), bounce by bounce."""
 
 from __future__ import annotations
 

@@ -164,9 +164,7 @@ def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]
     frequency = draft.span(f"{where}.motion_angular_frequency") or (0.0, 0.0)
     if any(amplitude) and frequency[0] == 0.0:
         hint = "The stop moves by motion_amplitude cos(motion_angular_frequency time + motion_phase)."
-        yield Problem(
-            f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint
-        )
+        yield Problem(f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint)
 
 
 def _table_problems(stop: OwnStop, where: str) -> Iterator[Problem]:

@@ -116,7 +116,9 @@ def test_a_body_on_a_table_follows_its_natural_spline(count: int, seed: int) -> 
     times, values = np.cumsum(draw.uniform(0.5, 2.0, count)), 0.05 * draw.normal(size=count)
     spline = CubicSpline(times, values, bc_type="natural")
     motion = moving(table_start=1, table_count=count)
-    fmu = structure_fmu(ball(1.0, 0.0), {"force": -50.0, **stop(-1.0, 0.0, side=LOWER), **motion}, initialize=False)
+    fmu = structure_fmu(
+        ball(1.0, 0.0), {"force": -50.0, **stop(-1.0, 0.0, side=LOWER), **motion}, initialize=False
+    )
     set_table(fmu, times, values)
     fmu.initialize()
     with fmu:
@@ -135,15 +137,15 @@ def test_kinks_of_the_jerk_are_ends_of_segments() -> None:
     times, values = [0.0, 0.5, 0.51, 0.52, 2.0], [0.0, 0.0, 0.2, 0.0, 0.0]
     spline = CubicSpline(times, values, bc_type="natural")
     fmu = structure_fmu(
-        ball(0.1, 0.0), {**stop(0.0, 1.0, side=LOWER), **moving(table_start=1, table_count=5)}, initialize=False
+        ball(0.1, 0.0),
+        {**stop(0.0, 1.0, side=LOWER), **moving(table_start=1, table_count=5)},
+        initialize=False,
     )
     set_table(fmu, times, values)
     fmu.initialize()
     with fmu:
         fmu.step(0.51)
-        hit = next(
-            root for root in spline.solve(0.1, extrapolate=False) if 0.5 <= root <= 0.51
-        )
+        hit = next(root for root in spline.solve(0.1, extrapolate=False) if 0.5 <= root <= 0.51)
         assert fmu.get("contact[1].count") == 1
         assert fmu.get("contact[1].last_time") == pytest.approx(hit, rel=1e-14)
         assert fmu.get("contact[1].last_velocity") == pytest.approx(float(spline(hit, 1)), rel=1e-11)
@@ -169,13 +171,16 @@ def test_jaws_that_close_end_the_run_by_name(restitution: float) -> None:
         fmu.step(3.9)
         with pytest.raises(FMICallException):
             fmu.step(0.2)
-    assert "contact[1] and contact[2]: expected room between their stops, of which one moves, got none at 4" in (
-        messages[-1].replace("got none at 3.99999", "got none at 4")
+    assert (
+        "contact[1] and contact[2]: expected room between their stops, of which one moves, got none at 4"
+        in (messages[-1].replace("got none at 3.99999", "got none at 4"))
     )
 
 
 def test_a_tuned_motion_goes_on_from_its_place() -> None:
-    with structure_fmu(ball(5.0, 0.0), {"force": -1.0, **stop(0.0, 0.0, side=LOWER), **moving(velocity=0.2)}) as fmu:
+    with structure_fmu(
+        ball(5.0, 0.0), {"force": -1.0, **stop(0.0, 0.0, side=LOWER), **moving(velocity=0.2)}
+    ) as fmu:
         fmu.step(5.0)
         assert fmu.get("contact[1].stuck")
         fmu.set("stop[1].velocity", -0.1)  # the table stops short: the ball flies on, and lands again
@@ -199,7 +204,9 @@ def test_a_tuned_stop_may_not_cut_a_body() -> None:
         fmu.set("stop[1].amplitude", 2.0)
         with pytest.raises(FMICallException):
             fmu.step(1.0)
-        assert "stop[1]: expected a motion that leaves the point on the free side of contact[1]" in messages[-1]
+        assert (
+            "stop[1]: expected a motion that leaves the point on the free side of contact[1]" in messages[-1]
+        )
         fmu.set("stop[1].amplitude", 0.5)
         fmu.step(1.0)
 
@@ -212,7 +219,10 @@ def test_a_tuned_stop_may_not_cut_a_body() -> None:
         ({"table_count": 1}, "stop[1].table_count: expected 0, or 2 and more numbers"),
         ({"table_start": 8192, "table_count": 2}, "stop[1].table_count: expected 0, or 2 and more numbers"),
         ({"table_count": 3}, "table.time[2]: expected more than the time before, 0, got 0"),
-        ({"amplitude": 9.0, "angular_frequency": 1.0}, "expected a start on the free side of contact[1] (>= 8)"),
+        (
+            {"amplitude": 9.0, "angular_frequency": 1.0},
+            "expected a start on the free side of contact[1] (>= 8)",
+        ),
     ],
 )
 def test_a_wrong_motion_is_refused_by_one_line(motion: dict[str, float], message: str) -> None:

@@ -59,9 +59,7 @@ def test_a_stop_that_drifts_has_no_period(line: str, is_common: bool) -> None:
 
 
 def test_a_sine_of_a_force_is_the_clock_before_that_of_a_stop() -> None:
-    ball = scene(
-        "[[forcing]]", "amplitude = 0.1", "angular_frequency = 3.0", without=("forcing =",)
-    )
+    ball = scene("[[forcing]]", "amplitude = 0.1", "angular_frequency = 3.0", without=("forcing =",))
     assert ball.clock is not None
     assert ball.clock.angular_frequency == 1.0  # 3 and 2: common period of 3 and 2 turns
     assert ball.clock.periods == 3
@@ -69,7 +67,13 @@ def test_a_sine_of_a_force_is_the_clock_before_that_of_a_stop() -> None:
 
 def test_tables_of_stops_lie_behind_each_other() -> None:
     lines = ("motion_times = [0.0, 1.0, 4.0]", "motion_values = [0.0, 0.1, 0.0]")
-    upper = ("[[stop]]", "position = 9.0", "restitution = 0.1", "motion_times = [0.0, 2.0]", "motion_values = [0.0, 1.0]")
+    upper = (
+        "[[stop]]",
+        "position = 9.0",
+        "restitution = 0.1",
+        "motion_times = [0.0, 2.0]",
+        "motion_values = [0.0, 1.0]",
+    )
     both = scene(*lines, *upper)
     integers, floats = integer_parameters(both), float_parameters(both, None)
     assert [integers[f"stop[{k}].table_start"] for k in (1, 2)] == [1, 4]
@@ -80,11 +84,27 @@ def test_tables_of_stops_lie_behind_each_other() -> None:
 @pytest.mark.parametrize(
     ("lines", "without", "message"),
     [
-        ((), ("motion_angular",), "stop[1].motion_angular_frequency: expected a number > 0 with a motion_amplitude"),
+        (
+            (),
+            ("motion_angular",),
+            "stop[1].motion_angular_frequency: expected a number > 0 with a motion_amplitude",
+        ),
         (("motion_times = [0.0, 1.0]",), (), "stop[1].motion_values: expected an array of 2 numbers or more"),
-        (("motion_times = [0, 1]", "motion_values = [0, 1, 2]"), (), "stop[1].motion_values: expected as many numbers"),
-        (("motion_times = [0, 0]", "motion_values = [0, 1]"), (), "stop[1].motion_times[2]: expected more than the"),
-        (("motion_times = [0]", "motion_values = [0]"), (), "stop[1].motion_times: expected an array of 2 ascending"),
+        (
+            ("motion_times = [0, 1]", "motion_values = [0, 1, 2]"),
+            (),
+            "stop[1].motion_values: expected as many numbers",
+        ),
+        (
+            ("motion_times = [0, 0]", "motion_values = [0, 1]"),
+            (),
+            "stop[1].motion_times[2]: expected more than the",
+        ),
+        (
+            ("motion_times = [0]", "motion_values = [0]"),
+            (),
+            "stop[1].motion_times: expected an array of 2 ascending",
+        ),
         (("[execution]", 'how = "coupled"'), (), "execution.how: expected"),
         (
             ("velocity = 0.1", "[sweep]", '"stop[1].motion_amplitude" = { values = [1, 2], path = "up" }'),
