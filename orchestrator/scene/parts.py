@@ -51,7 +51,14 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import ContactTable, Execution, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import (
+    MOTION_KEYS,
+    ContactTable,
+    Execution,
+    Record,
+    SceneTable,
+    Stop,
+)
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
@@ -102,6 +109,9 @@ class Parts(SceneTable):
                     del table["at"]  # so that campaigns of versions without it go on
                 if table.get("signal") == "sine":
                     del table["signal"]
+            for table, stop in zip(parts["contacts"], self.stops, strict=True):
+                for key in () if stop.moves else MOTION_KEYS:
+                    table.pop(key, None)
             return document | {"body": parts["bodies"][0], "stops": parts["contacts"], "general": None}
         document["record"]["time_series"] = None
         return document | {"body": None, "stops": [], "general": self._components_document()}
@@ -193,6 +203,17 @@ class Parts(SceneTable):
         return not is_one_sine(self.forces)
 
     @property
+    def moving_stop(self) -> str:
+        """The key of the first stop that moves; empty where none does."""
+        moving = (key for key, stop in zip(self.stop_keys, self.stops, strict=True) if stop.moves)
+        return next(moving, "")
+
+    @property
+    def lists_forces(self) -> bool:
+        """Whether the component Structure has the body with a list of forces: several, or beside a moving stop."""
+        return self.has_several_forces or bool(self.moving_stop)
+
+    @property
     def forcing(self) -> Forcing | None:
         """The only force, a sine; None without forces.
 
@@ -215,7 +236,7 @@ class Parts(SceneTable):
     @property
     def clock(self) -> Clock | None:
         """The clock of the forces, whose periods records count; None without a sine, and under a constant force."""
-        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.sweep))
+        return clock_of(self.forces, self.stops, sweeps_frequencies=sweeps_frequencies(self.sweep))
 
     @property
     def period(self) -> float | None:
@@ -393,7 +414,13 @@ class Parts(SceneTable):
             return self._component_numbers().numbers()
         tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
         found = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
-        return ((key, number) for key, number in found if not is_left_out(key))
+        standing = {
+            f"{key}.{motion}"
+            for key, stop in zip(self.stop_keys, self.stops, strict=True)
+            if not stop.moves
+            for motion in MOTION_KEYS
+        }
+        return ((key, number) for key, number in found if not (is_left_out(key) or key in standing))
 
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables with numbers, by their name in keys."""
