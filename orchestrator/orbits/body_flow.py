@@ -64,6 +64,11 @@ class BodyFlow:
         by_lanes = self.scene.execution.how == "auto" and may_go_by_lanes(scene)
         self._runners.append(PointRunner(scene, execution="lanes" if by_lanes else "fused"))
         loop = self._runners[-1].loop
+        if loop is None and not scene.is_measured:
+            raise UsageError(
+                f"{self.scene.source}: basins: expected bodies and forces that run in lanes "
+                "(docs/scene/execution.md), got others."
+            )
         if loop is None:
             raise UsageError(
                 f"{self.scene.source}: basins: expected a body without a measuring chain, got one with it."
