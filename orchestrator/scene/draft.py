@@ -6,16 +6,24 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, BodyAlone, LinkTable, StructureBody
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
-from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sines_of, sweeps_frequencies
+from vibroimpact.orchestrator.scene.forcing_clock import (
+    Clock,
+    clock_of,
+    sines_of,
+    sines_of_stops,
+    sweeps_frequencies,
+)
 from vibroimpact.orchestrator.scene.forcing_models import (
     FORCING_MODELS,
     Force,
     Forcing,
+    TableForcing,
     forcing_keys,
     is_one_sine,
 )
@@ -118,9 +126,11 @@ class Draft(DraftTables):
     Among several bodies each is a draft of its own in `parts`; `names`, `links` and `meetings` are of their tables.
     """
 
-    def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
+    def __init__(
+        self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...], folder: Path = Path()
+    ) -> None:
         super().__init__(with_swept_keys(document, axes))
-        self.axes = axes
+        self.axes, self._folder = axes, folder
         self.names: tuple[str | None, ...] = ()
         self.parts: tuple[Draft, ...] = ()
         self.links: tuple[LinkTable | None, ...] = ()
@@ -151,7 +161,20 @@ class Draft(DraftTables):
         if raw is None:
             return ()
         entries = self.entries("forcing") if isinstance(raw, list) else [(raw, ("forcing",))]
-        return tuple(self.variant(FORCING_MODELS, "signal", "sine", *entry) for entry in entries)
+        read = [(self.variant(FORCING_MODELS, "signal", "sine", *entry), entry[1]) for entry in entries]
+        return tuple(self._with_rows(force, path) for force, path in read)
+
+    def _with_rows(self, force: Force | None, path: KeyPath) -> Force | None:
+        """Return a force with the rows of its file, if it names one; None with the problem of a wrong file."""
+        if not isinstance(force, TableForcing) or force.file is None:
+            return force
+        from vibroimpact.orchestrator.scene.forcing_files import rows_of_file  # few scenes need it
+
+        found = rows_of_file(self._folder / force.file, key_path((*path, "file")))
+        if isinstance(found, Problem):
+            self.problems.append(found)
+            return None
+        return force.model_copy(update=dict(zip(("times", "values"), found, strict=True)))
 
     @property
     def forcing(self) -> Forcing | None:
@@ -172,20 +195,26 @@ class Draft(DraftTables):
         return not is_one_sine(self.forces)
 
     @property
+    def has_moving_stops(self) -> bool:
+        """Whether a stop moves: the body then runs as a structure."""
+        return any(stop is not None and stop.moves for stop in self.stops)
+
+    @property
     def simulated_body(self) -> Body | None:
         """The body in the form that runs: a structure under several forces; None where it is invalid."""
         body = self.body
-        if body is None or isinstance(body, StructureBody) or not self.has_several_forces:
+        alone = not self.has_several_forces and not self.has_moving_stops
+        if body is None or isinstance(body, StructureBody) or alone:
             return body
         return BodyAlone.model_construct(names=("body",), parts=(body,), links=(), observed=())
 
     @property
     def clock(self) -> Clock | None:
         """The clock of valid forces; None without one, and where a frequency is missing, 0 or infinite."""
-        sines = sines_of(self.forces)
+        sines = [*sines_of(self.forces), *sines_of_stops(self.stops)]
         if any(not 0.0 < sine.angular_frequency < math.inf for sine in sines):
             return None
-        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.axes))
+        return clock_of(self.forces, self.stops, sweeps_frequencies=sweeps_frequencies(self.axes))
 
     @property
     def is_structure(self) -> bool:
@@ -284,6 +313,12 @@ class Draft(DraftTables):
         spans = [
             self.frequency_span(key) for key, force, _ in self.written_forces() if isinstance(force, Forcing)
         ]
+        moved = (
+            self.span(f"stop[{number}].motion_angular_frequency")
+            for number, stop in enumerate(self.stops, start=1)
+            if stop is not None and stop.motion_angular_frequency > 0.0
+        )
+        spans += [span for span in moved if span is not None]
         if not spans:
             return 0.0, 0.0
         clock = self.clock

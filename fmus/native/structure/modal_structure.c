@@ -84,6 +84,12 @@ static void attach(void *self, const void *resources)
     for (int k = 0; k < file->sines; ++k) {
         next = take(next, n, s->sine_shape[k]);
     }
+    memset(s->signals.force, 0, sizeof s->signals.force);
+    for (int k = 0; k < file->signals; ++k) {
+        next = take(next, n, s->signals.force[k]);
+    }
+    next = take(next, file->rows, s->signals.time);
+    (void)take(next, file->rows, s->signals.value);
 }
 
 /* ---- validation ---- */

@@ -218,7 +218,7 @@ static void make(vi_random *r, const vi_transform *transform, uint64_t seed, int
 }
 
 /* Coefficient n of the block in memory. */
-static double coefficient(const vi_random *r, int64_t n)
+static double coefficient_at(const vi_random *r, int64_t n)
 {
     const int64_t half = r->size / 2, quarter = r->size / 4;
     return n < half ? r->first[quarter + n] : r->second[quarter + n - half];
@@ -241,21 +241,44 @@ static int64_t interval_at(const vi_random *r, vi_twofold since, double resoluti
     return (int64_t)fmax(number, 0.0);
 }
 
-void vi_random_piece(vi_random *r, const vi_transform *transform, uint64_t seed, vi_twofold since, double resolution,
-                     vi_piece *piece)
+bool vi_random_is_knot(const vi_random *r, vi_twofold since, double resolution, int64_t *interval)
 {
     double passed;
-    const int64_t interval = interval_at(r, since, resolution, &passed), block = interval / advance(r);
+    *interval = interval_at(r, since, resolution, &passed);
+    return passed <= resolution;
+}
+
+int vi_random_coefficients(vi_random *r, const vi_transform *transform, uint64_t seed, int64_t interval, int most,
+                           double coefficient[])
+{
+    const int64_t block = interval / advance(r), n = interval - block * advance(r);
+    const int64_t left = advance(r) - n, count = left < most ? left : most;
     if (!r->known || r->block != block) {
         make(r, transform, seed, block);
     }
-    const int64_t n = interval - block * advance(r);
-    const double a = coefficient(r, n + 1), b = coefficient(r, n + 2), c = coefficient(r, n + 3), d = coefficient(r, n + 4);
+    for (int64_t i = 0; i < count + VI_SPLINE_ORDER - 1; ++i) {
+        coefficient[i] = coefficient_at(r, n + 1 + i);
+    }
+    return (int)count;
+}
+
+void vi_random_polynomial(const vi_random *r, const double coefficient[VI_SPLINE_ORDER], double power[VI_SPLINE_ORDER])
+{
+    const double a = coefficient[0], b = coefficient[1], c = coefficient[2], d = coefficient[3];
     const double each = 1.0 / r->interval;
-    *piece = (vi_piece){.degree = 3, .length = r->interval - passed};
-    piece->coefficient[0] = (a + 4.0 * b + c) / 6.0;
-    piece->coefficient[1] = 0.5 * (c - a) * each;
-    piece->coefficient[2] = 0.5 * ((a - 2.0 * b) + c) * each * each;
-    piece->coefficient[3] = (d - a + 3.0 * (b - c)) / 6.0 * each * each * each;
+    power[0] = (a + 4.0 * b + c) / 6.0;
+    power[1] = 0.5 * (c - a) * each;
+    power[2] = 0.5 * ((a - 2.0 * b) + c) * each * each;
+    power[3] = (d - a + 3.0 * (b - c)) / 6.0 * each * each * each;
+}
+
+void vi_random_piece(vi_random *r, const vi_transform *transform, uint64_t seed, vi_twofold since, double resolution,
+                     vi_piece *piece)
+{
+    double passed, coefficient[VI_SPLINE_ORDER];
+    const int64_t interval = interval_at(r, since, resolution, &passed);
+    (void)vi_random_coefficients(r, transform, seed, interval, 1, coefficient);
+    *piece = (vi_piece){.degree = VI_SPLINE_ORDER - 1, .length = r->interval - passed};
+    vi_random_polynomial(r, coefficient, piece->coefficient);
     vi_piece_shift(piece, passed);
 }

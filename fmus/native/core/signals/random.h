@@ -17,6 +17,9 @@
 /* Smallest size of a block; the largest is that of a transform. */
 enum { VI_RANDOM_LEAST = 4096 };
 
+/* Coefficients of the spline that act in an interval. */
+enum { VI_SPLINE_ORDER = 4 };
+
 /* A density over angular frequency, linear between its places and 0 outside of the band. */
 typedef struct {
     double low, high;  /* band, rad/s, 0 <= low < high */
@@ -44,6 +47,19 @@ double vi_density_variance(const vi_density *density);
 
 /* Prepare the filter. The density must be valid. */
 void vi_random_shape(vi_random *random, vi_transform *transform, const vi_density *density);
+
+/* Does an interval of the spline start `since` >= 0 seconds after the start, within the resolution? *interval: its
+ * number. */
+bool vi_random_is_knot(const vi_random *random, vi_twofold since, double resolution, int64_t *interval);
+
+/* Coefficients of the spline in up to `most` intervals from one on: those of interval i are coefficient[i] to
+ * coefficient[i + VI_SPLINE_ORDER - 1]. Returns the number of intervals, 1 at least: they are in one block. */
+int vi_random_coefficients(vi_random *random, const vi_transform *transform, uint64_t seed, int64_t interval, int most,
+                           double coefficient[]);
+
+/* The polynomial of an interval for its coefficients, in powers of the seconds since its start. */
+void vi_random_polynomial(const vi_random *random, const double coefficient[VI_SPLINE_ORDER],
+                          double power[VI_SPLINE_ORDER]);
 
 /* The piece `since` >= 0 seconds after the start. resolution: as for tables. */
 void vi_random_piece(vi_random *random, const vi_transform *transform, uint64_t seed, vi_twofold since,

@@ -266,6 +266,7 @@ def test_a_file_holds_the_largest_structure(tmp_path: Path, version: str) -> Non
 
 
 HEAD = structure_file({"mode.angular_frequency": [1.0, 2.0], "mode.contact_shape": [[1.0, 1.0]]})
+SIZES = "2 modes, 1 contacts, 0 sines, 0 signals and 0 rows of tables"
 Members = dict[str, dict[str, bytes]]
 
 
@@ -284,15 +285,17 @@ def good_members(tmp_path_factory: pytest.TempPathFactory) -> Members:
 @pytest.mark.parametrize(
     ("content", "rule"),
     [
-        (b"", "a file that begins with VISTRUC2 and four sizes, got another"),
+        (b"", "a file that begins with VISTRUC2 and six sizes, got another"),
         (b"VISTRUC1" + HEAD[8:], "a file that begins with VISTRUC2"),
-        (HEAD[:-1], "216 bytes for 2 modes, 1 contacts and 0 sines, got fewer"),
-        (HEAD + b"\0", "216 bytes for 2 modes, 1 contacts and 0 sines, got more"),
+        (HEAD[:-1], f"232 bytes for {SIZES}, got fewer"),
+        (HEAD + b"\0", f"232 bytes for {SIZES}, got more"),
         (HEAD[:8] + bytes(8) + HEAD[16:], "1 to 64 modes, got 0"),
         (HEAD[:8] + b"\x41" + HEAD[9:], "1 to 64 modes, got 65"),
         (HEAD[:16] + b"\xff" * 8 + HEAD[24:], "0 to 32 contacts, got -1"),
         (HEAD[:24] + b"\x10" + HEAD[25:], "0 to 15 sines, got 16"),
-        (HEAD[:32] + b"\2" + HEAD[33:], "0 to 1 as mark of coupled damping, got 2"),
+        (HEAD[:32] + b"\x09" + HEAD[33:], "0 to 8 signals, got 9"),
+        (HEAD[:40] + b"\1\x20" + HEAD[42:], "0 to 8192 rows of tables, got 8193"),
+        (HEAD[:48] + b"\2" + HEAD[49:], "0 to 1 as mark of coupled damping, got 2"),
         (HEAD[:-8] + b"\xff" * 8, "finite numbers, got"),
     ],
 )
@@ -309,7 +312,7 @@ def test_a_damaged_file_is_refused_by_one_line(
 
 
 def test_a_damaged_file_is_not_exported(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 216 bytes"):
+    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 232 bytes"):
         export_fmu("Structure", tmp_path / "new.fmu", modes=2, contacts=1, structure=HEAD[:-1])
     assert not (tmp_path / "new.fmu").exists()
 

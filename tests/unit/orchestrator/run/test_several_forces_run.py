@@ -216,7 +216,7 @@ def test_sines_without_a_common_period_have_no_class() -> None:
     found = run(forcing=[SINE, TWO[1] | {"angular_frequency": math.sqrt(2.0)}])
     assert found.attrs["clock_periods"] == 0
     assert "quasi-periodic: 2 sines without a common period" in found.attrs["engine"]
-    with pytest.raises(DatasetError, match="classify: expected sines with a common period"):
+    with pytest.raises(DatasetError, match="classify: expected forces with a common period"):
         vi.classify(found)
 
 

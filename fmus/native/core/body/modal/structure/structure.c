@@ -14,6 +14,7 @@
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/drift.h"
 #include "body/modal/structure/extremes.h"
+#include "body/modal/structure/random_flight.h"
 #include "body/modal/structure/search.h"
 #include "body/modal/structure/settle.h"
 #include "motion/majorant.h"
@@ -176,6 +177,18 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     vi_flight_end(flight, u, clock->angular_frequency * target.rest, further, s->state->q, s->state->p);
     vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
     move(s, u, VI_ENDS_AT_TARGET, target);
+}
+
+/* Fly over intervals of a random load; false where they do not fit. */
+static bool fly_far(const vi_structure *s, vi_instant target)
+{
+    const double u = vi_random_flight(s, target);
+    if (!(u > 0.0)) {
+        return false;
+    }
+    forget_origins(s);
+    move(s, u, VI_ENDS_ANYWHERE, target);
+    return true;
 }
 
 /* Fly to the next contact, the segment's end, or the target, whichever is first; false when numbers overflow. */
@@ -397,7 +410,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     }
     if (coupled && loads_are_finite(s)) {
         drift(s, target, request);
-    } else if (coupled || !fly(s, target, request)) {
+    } else if (coupled || !(fly_far(s, target) || fly(s, target, request))) {
         return VI_STEP_NOT_FINITE;
     }
     int pair[2];
