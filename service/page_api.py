@@ -36,7 +36,7 @@ MOST_ROWS = 50_000
 """Largest number of rows in one slice."""
 MOST_FAILURES = 200
 """Number of failures on one page of their list."""
-FAILED = (Outcome.error, Outcome.crash, Outcome.timeout, Outcome.impact_limit)
+FAILED = (Outcome.error, Outcome.crash, Outcome.timeout, Outcome.impact_limit, Outcome.unbounded)
 MOST_RUN = 2**31 - 1
 
 Column = list[float | None]

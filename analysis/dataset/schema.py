@@ -29,7 +29,7 @@ UnitSystem = Literal["SI", "nondimensional"]
 
 
 class Outcome(IntEnum):
-    """End of a run; the first three are physics, the last three are failures of the run."""
+    """End of a run; `error`, `crash` and `timeout` are failures of the run, the others physics."""
 
     ok = 0
     stuck = 1
@@ -37,6 +37,7 @@ class Outcome(IntEnum):
     error = 3
     crash = 4
     timeout = 5
+    unbounded = 6
 
 
 class Direction(IntEnum):

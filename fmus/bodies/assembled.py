@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from vibroimpact.fmus.bodies.body_points import row_of
+from vibroimpact.fmus.bodies.body_points import ModalPoints, row_of
 from vibroimpact.fmus.bodies.impacting_body import Complexes, Floats, ImpactingBody, Numbers
 from vibroimpact.fmus.bodies.structure import Structure, StructurePoints, ratios_of
 from vibroimpact.fmus.errors import UsageError
@@ -51,6 +51,29 @@ class AssembledPoints(StructurePoints):
             same,
             same,
             coupling,
+        )
+
+    def in_state_coordinates(self) -> ModalPoints:
+        """Return the points as modes with their further sines; a sine of frequency 0 is a constant load."""
+        found, columns, count = super().in_state_coordinates(), self.floats, self.integers["modes"]
+        none = np.zeros(found.stiffness.shape[1])
+        held, sines = found.held, []
+        for number in sines_of(columns):
+            amplitude, frequency, phase = (
+                columns.get(f"sine[{number}].{name}", none)
+                for name in ("amplitude", "angular_frequency", "phase")
+            )
+            row = [columns.get(f"mode.sine[{number},{i}]", none) for i in range(1, count + 1)]
+            load = amplitude * np.stack(row)
+            if frequency.any():
+                sines.append((load, frequency, phase))
+            else:
+                held = held + load * np.cos(phase)
+        if not sines:
+            return replace(found, held=held)
+        force, frequency, phase = (np.stack(each) for each in zip(*sines, strict=True))
+        return replace(
+            found, held=held, further_force=force, further_frequency=frequency, further_phase=phase
         )
 
     def _coupling(self, numbers: Numbers) -> Floats | None:
@@ -134,6 +157,21 @@ class AssembledPoints(StructurePoints):
     def is_pushed(self) -> bool:
         """Return whether one force input can act at all contacts: nowhere but at the forced point."""
         return False
+
+
+def sines_of(names: Iterable[str]) -> list[int]:
+    """Return the numbers of the sines besides the first that have an amplitude, ascending.
+
+    Examples
+    --------
+    >>> sines_of(["sine[2].amplitude", "sine[1].amplitude", "sine[1].phase", "force"])
+    [1, 2]
+    """
+    return sorted(
+        int(name.removeprefix("sine[").partition("]")[0])
+        for name in names
+        if name.startswith("sine[") and name.endswith("].amplitude")
+    )
 
 
 def without_arrays(numbers: Numbers) -> tuple[dict[str, float], dict[str, Floats]]:

@@ -1,4 +1,4 @@
-"""Several bodies that springs and dashpots join, as one set of modes: equations.md 6.12."""
+"""Several bodies that springs and dashpots join, as one set of modes: equations.md 6.12, and 1.9 for negative ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from vibroimpact.fmus.bodies.beam import BeamPoints
 from vibroimpact.fmus.bodies.impacting_body import Floats, Integers, Numbers
 from vibroimpact.fmus.bodies.structure import couples, ratios_of
-from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes, spring_modes
+from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes, signed_modes, spring_modes
 from vibroimpact.fmus.errors import UsageError
 
 TAKES_PART = 1e-8
@@ -92,7 +92,7 @@ class MassesPart(Part):
         count = len(self.masses)
         beside = np.eye(count + 1, count) - np.eye(count + 1, count, -1)
         found = [Element(shape, *pair) for shape, pair in zip(beside, self._pairs, strict=True)]
-        return [each for each in found if each.stiffness > 0.0 or each.damping > 0.0]
+        return [each for each in found if each.stiffness != 0.0 or each.damping != 0.0]
 
     @property
     def participation(self) -> Floats:
@@ -160,7 +160,7 @@ class Assembly:
     masses : ndarray, shape (coordinate,)
         kg.
     frequencies : ndarray, shape (mode,)
-        rad/s, ascending; 0 for each group of masses that nothing ties to the ground.
+        rad/s, ascending; 0 for each group of masses that nothing ties to the ground, w < 0 for a stiffness of -w^2.
     shapes : ndarray, shape (coordinate, mode)
         kg^(-1/2).
     damping : ndarray, shape (mode, mode)
@@ -216,6 +216,8 @@ class Assembly:
         """Return the angular frequencies, ascending, and the shapes, shape (coordinate, mode)."""
         rigid = self._rigid()
         root = np.sqrt(self.masses)
+        if any(each.stiffness < 0.0 for each in self.elements):
+            return self._signed_modes(rigid, root)
         springs = [
             np.sqrt(each.stiffness) * each.shape / root for each in self.elements if each.stiffness > 0.0
         ]
@@ -229,9 +231,23 @@ class Assembly:
         shapes = np.concatenate([rigid, vectors / root]).T
         return np.concatenate([np.zeros(len(rigid)), frequencies]), shapes * self._signs(shapes, root)
 
+    def _signed_modes(self, rigid: Floats, root: Floats) -> tuple[Floats, Floats]:
+        """Return `_modes` where springs are negative: motions without a spring are moved above all others."""
+        elements = [each for each in self.elements if each.stiffness != 0.0]
+        rows = [np.sqrt(abs(each.stiffness)) * each.shape / root for each in elements]
+        signs = [1.0 if each.stiffness > 0.0 else -1.0 for each in elements]
+        above = 2.0 * np.sqrt(sum(float(row @ row) for row in rows))
+        springs = np.array([*rows, *(above * root * shape for shape in rigid)])
+        frequencies, vectors = signed_modes(springs, np.array([*signs, *np.ones(len(rigid))]))
+        kept, negative = len(root) - len(rigid), int((frequencies < 0.0).sum())
+        moves = vectors[:kept] / root
+        shapes = np.concatenate([moves[:negative], rigid, moves[negative:]]).T
+        found = np.concatenate([frequencies[:negative], np.zeros(len(rigid)), frequencies[negative:kept]])
+        return found, shapes * self._signs(shapes, root)
+
     def _rigid(self) -> Floats:
         """Return the shape of each group of masses that springs join but do not tie down, shape (group, mass)."""
-        springs = [each.shape for each in self.elements if each.stiffness > 0.0]
+        springs = [each.shape for each in self.elements if each.stiffness != 0.0]
         group = np.arange(len(self.masses))
         for shape in springs:
             joined = group[shape != 0.0]
@@ -255,7 +271,7 @@ class Assembly:
         count = len(self.masses)
         found = np.zeros((count, count))
         for each in self.elements:
-            if each.damping > 0.0:
+            if each.damping != 0.0:
                 elongation = self.in_modes(each.shape)
                 found = found + each.damping * elongation[:, None] * elongation
         return found

@@ -24,6 +24,10 @@ class ModalPoints:
 
     Attributes
     ----------
+    further_force : ndarray, shape (sine, mode, point), or None
+        Forces of sines besides the first; None without one.
+    further_frequency, further_phase : ndarray, shape (sine, point), or None
+        Their angular frequencies, rad/s, and phases at time 0, rad.
     coupling : ndarray, shape (mode, mode, point), or None
         Damping between the modes, 1/s, with 2 decay on the diagonal; None: no point has modes that damp each other.
     to_state : tuple of ndarray, shape (element, mode)
@@ -44,6 +48,9 @@ class ModalPoints:
     coupling: Floats | None = None
     to_state: tuple[Floats, ...] = ()
     kind: NDArray[np.int64] | None = None
+    further_force: Floats | None = None
+    further_frequency: Floats | None = None
+    further_phase: Floats | None = None
 
     def states(self, q: Floats, p: Floats, points: NDArray[np.int64]) -> Floats | None:
         """Return the states of chains and beams, shape (point, 2 element); None for an oscillator.

@@ -15,6 +15,7 @@ from vibroimpact.fmus.errors import VibroimpactError
 
 OF_THE_RUN = (
     *("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_"),
+    "displacement_limit",
     *("mode.displacement_start", "mode.velocity_start", "mode.sine", "sine["),
 )
 """Prefixes of parameter names that do not change the modes."""
@@ -55,7 +56,7 @@ class Structure:
     def decays(self) -> Floats:
         """Half the damping of each mode by itself, 1/s, shape (mode,)."""
         if self.coupling is None:
-            return self.frequencies * self.damping_ratios
+            return np.abs(self.frequencies) * self.damping_ratios
         return np.asarray(0.5 * self.coupling.diagonal())
 
     @property
@@ -79,8 +80,8 @@ def couples(damping: Floats) -> bool:
     >>> couples(np.diag([0.1, 0.0])), couples(np.array([[0.1, 0.01], [0.01, 0.1]]))
     (False, True)
     """
-    own = damping.diagonal()
-    off = np.abs(damping - np.diag(own))
+    own = np.abs(damping.diagonal())
+    off = np.abs(damping - np.diag(damping.diagonal()))
     return bool((off > DIAGONAL * (own[:, None] + own)).any())
 
 
@@ -90,8 +91,9 @@ def ratios_of(damping: Floats, frequencies: Floats) -> Floats:
     >>> ratios_of(np.diag([0.1, 0.4]), np.array([0.0, 2.0])).tolist()
     [0.0, 0.1]
     """
-    moves = frequencies > 0.0
-    return np.where(moves, damping.diagonal() / (2.0 * np.where(moves, frequencies, 1.0)), 0.0)
+    moves = frequencies != 0.0
+    sizes = np.where(moves, np.abs(frequencies), 1.0)
+    return np.where(moves, damping.diagonal() / (2.0 * sizes), 0.0)
 
 
 class StructurePoints(BodyPoints):

@@ -18,6 +18,7 @@ from vibroimpact.fmus.errors import UsageError
 
 MOST_MODES = 8
 MOST_CONTACTS = 4
+MOST_SINES = 8
 IMPACT_WIDTH = 8
 PERIOD_WIDTH = 5
 """Numbers of columns of an impact and of a period, see `lanes/lane_points.h`."""
@@ -61,7 +62,7 @@ class LanesPlan(Structure):
             (name, c_int32)
             for name in (
                 *("modes", "contacts", "impacts", "extrema", "periods", "each_period", "instructions"),
-                "coupled",
+                *("coupled", "further"),
             )
         ),
         ("impact_limit", c_int64),
@@ -75,7 +76,8 @@ class LanesPoints(Structure):
     """The points and their results; the fields are explained in `lanes/lanes.h`."""
 
     GIVEN = (
-        "stiffness", "decay", "force", "held", "angular_frequency", "phase", "shape", "impulse", "coupling", "observed",
+        "stiffness", "decay", "force", "held", "angular_frequency", "phase",
+        "further_force", "further_frequency", "further_phase", "shape", "impulse", "coupling", "observed",
         "position", "direction", "restitution", "yield_velocity", "contact_stiffness", "contact_damping",
         "start_q", "start_p", "begin", "end", "first",
     )  # fmt: skip

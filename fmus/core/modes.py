@@ -282,6 +282,44 @@ def spring_modes(springs: Array) -> tuple[Array, Array]:
     return values[:rank].copy(), vectors[:rank].copy()
 
 
+def signed_modes(springs: Array, signs: Array) -> tuple[Array, Array]:
+    """Return the angular frequencies, ascending, and the unit vectors of springs of which some are negative.
+
+    Parameters
+    ----------
+    springs : array, shape (spring, coordinate)
+        Row of each spring, as of `spring_modes`, from the modulus of its stiffness.
+    signs : array, shape (spring,)
+        1, or -1 for a negative spring.
+
+    Returns
+    -------
+    frequencies : array, shape (coordinate,)
+        rad/s; w < 0 for an eigenvalue -w^2.
+    vectors : array, shape (coordinate, coordinate)
+        A row for each frequency.
+
+    Raises
+    ------
+    UsageError
+        A number is not finite, there are more than 64 coordinates, or no vectors are found.
+
+    Examples
+    --------
+    >>> frequencies, vectors = signed_modes(np.array([[3.0, 0.0], [0.0, 2.0]]), np.array([-1.0, 1.0]))
+    >>> print(frequencies, abs(vectors).tolist())
+    [-3.  2.] [[1.0, 0.0], [0.0, 1.0]]
+    """
+    rows, of_rows = (np.ascontiguousarray(each, dtype=np.float64) for each in (springs, signs))
+    count, columns = rows.shape
+    values, vectors = np.empty(columns), np.empty((columns, columns))
+    if _library().vi_door_signed_modes(count, columns, rows, of_rows, values, vectors) != 0:
+        raise UsageError(
+            f"signed_modes: expected finite numbers of 1 to 64 coordinates, got {columns} of them, or others."
+        )
+    return values, vectors
+
+
 def _row(points: float | Numbers) -> Array:
     return np.array(np.atleast_1d(np.asarray(points, dtype=np.float64)).ravel())
 
@@ -296,6 +334,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_beam_residual.argtypes = [integer, integer, integer, numbers, numbers, numbers]
     library.vi_door_chain_modes.argtypes = [integer, *[numbers] * 7]
     library.vi_door_spring_modes.argtypes = [integer, integer, *[numbers] * 3]
+    library.vi_door_signed_modes.argtypes = [integer, integer, *[numbers] * 4]
     library.vi_door_beam_residual_shapes.argtypes = [
         integer,
         integer,

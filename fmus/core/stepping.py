@@ -19,6 +19,7 @@ class HoldEnd(IntEnum):
     limit = 2
     again = 3
     touches = 4
+    ends = 5
 
 
 class Magnet(Structure):

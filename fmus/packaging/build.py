@@ -219,6 +219,7 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     # the constants remove loops over modes from a body with only one, further loads and moving stops from bodies without
     constants = {f"VI_{block.upper()}S": blocks.get(block, 0) for block in ("sine", "signal")}
     constants["VI_ONLY_MODES"] = 0 if modes is not None else 1
+    constants["VI_GROWING"] = int(component.growing)
     constants["VI_STOPS_MOVE"] = int(any(v.name.startswith("stop[") for v in component.variables))
     return {**arrays, **constants, "VI_DEGREE": component.degree}
 

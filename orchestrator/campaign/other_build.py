@@ -30,7 +30,7 @@ MOST_POINTS = 8
 """Largest number of points that are computed again."""
 MOST_SECONDS = 60.0
 """Largest sum of the stored wall times of these points, s; the first point is always computed again."""
-COMPARABLE = (Outcome.ok, Outcome.stuck, Outcome.impact_limit)
+COMPARABLE = (Outcome.ok, Outcome.stuck, Outcome.impact_limit, Outcome.unbounded)
 """Outcomes that the same components always give; a crash or a timeout may depend on the machine."""
 OF_THE_MACHINE = ("point_seconds",)
 """Variables that differ between two computations of a point."""

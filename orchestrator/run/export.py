@@ -67,6 +67,7 @@ def export_scene(
     if isinstance(scene.body, StructureBody):
         scene = scene.model_copy(update={"bodies": (scene.body.observing_one(),)})
     integers = integer_parameters(scene)
+    integers.pop("ends_unbounded", None)  # other tools may push the bodies back
     starts, arrays = without_arrays(exported_floats(scene))
     structure = structure_file(arrays, coupled=bool(integers["coupled"])) if arrays else None
     return export_fmu(

@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.run.record import (
     DeadlineReached,
     ImpactLimitReached,
     RecordedBody,
+    UnboundedMotion,
 )
 
 
@@ -148,7 +149,10 @@ class BodyDriver(RecordedBody):
         instance = self.instance
         while instance.time < end:
             self._deadline.refuse_late()
-            if instance.step(instance.time, end - instance.time) == DISCARD:
+            status = instance.step(instance.time, end - instance.time)
+            if instance.wants_to_end:
+                raise UnboundedMotion(self._last_words())
+            if status == DISCARD:
                 raise ImpactLimitReached
             if instance.returned_early:
                 self.take_rows()
@@ -176,7 +180,7 @@ class BodyDriver(RecordedBody):
         step to a sample; the default is every step. `outputs` are variables of the body, read at each sample. With
         `recording` the body records as set by `record`; without it, it records nothing from the first call on.
 
-        ImpactLimitReached, DeadlineReached: the run ends early; the error has its samples. ComponentError: the body
+        ImpactLimitReached, UnboundedMotion, DeadlineReached: the run ends early; the error has its samples. ComponentError: the body
         fails, or touches the exciter.
         """
         if recording:
@@ -238,6 +242,8 @@ class BodyDriver(RecordedBody):
                 block.rows_used = 0
         if end == stepping.HoldEnd.limit:
             raise ImpactLimitReached(samples[: block.at])
+        if end == stepping.HoldEnd.ends:
+            raise UnboundedMotion(self._last_words(), samples[: block.at])
         if end == stepping.HoldEnd.touches:
             raise ComponentError(
                 f"exciter.distance: expected a body that stays away from its exciter, got one that touches it at time "
@@ -247,6 +253,10 @@ class BodyDriver(RecordedBody):
         if end == stepping.HoldEnd.refused:
             self.instance.fail("DoStep", f"refused the step to the sample at time {ends[block.at]:.17g}")
         return samples
+
+    def _last_words(self) -> str:
+        """Return the last message of the body, without the function that wrote it."""
+        return "".join(self.instance.log.take()[-1:]).partition("DoStep: ")[2]
 
     def _references_of(self, names: Sequence[str]) -> NDArray[np.uint32]:
         return np.array([self.references[name] for name in names], dtype=np.uint32)

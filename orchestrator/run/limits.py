@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from vibroimpact.fmus.core import lanes as core
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.called_effects import called_by_numbers
+from vibroimpact.orchestrator.run.forces import further_forces
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.record import OBSERVED
 from vibroimpact.orchestrator.scene.body_models import StructureBody
-from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
+from vibroimpact.orchestrator.scene.body_models.growing import GROWING_KEYS
+from vibroimpact.orchestrator.scene.forcing_clock import signals_of
+from vibroimpact.orchestrator.scene.forcing_models import Forcing, forces_in_words
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.scene import Scene
@@ -47,7 +50,7 @@ LIMITS = {
         lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
     ),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
-    "forces": Limit(lanes=True),
+    "forces": Limit(),
     "quasi-periodic": Limit(orbits="sines with a common period, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
     "motion": Limit(lanes=True, orbits="stops that stand still"),
@@ -65,6 +68,7 @@ LIMITS = {
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
     "dragged": Limit(orbits="no damping of bodies that no spring ties to the ground"),
+    "growing": Limit(lanes=True, orbits="springs and dashpots that are not negative"),
     "held": Limit(orbits="a point that moves"),
     "force": Limit(
         pushed="a body with one force takes it where it is forced, and its stops are not all there"
@@ -104,12 +108,21 @@ def seen(scene: Scene) -> Iterator[Seen]:
     if not scene.is_one_body:
         return
     body = scene.body
+    if isinstance(body, StructureBody) and _may_grow(scene, body):
+        yield Seen("growing", "body", "a negative one")
     if not body.finds_modes and body.kept_modes < body.size:
         yield Seen("reduced", "body.modes", f"{body.kept_modes}")
     if body.projection != "variational":
         yield Seen("projection", "body.impact_projection", f'"{body.projection}"')
     if body.PLACE == "location" and len({body.place_of(stop) for stop in scene.stops}) > MOST_SENSORS:
         yield Seen("places", "stop", f"{len(scene.stops)}")
+
+
+def _may_grow(scene: Scene, body: StructureBody) -> bool:
+    """Return whether a spring or a dashpot is negative at a point of the sweep."""
+    names = ((axis.key.rpartition(".")[2].partition("[")[0], axis.lowest) for axis in scene.sweep)
+    owned = any(name in GROWING_KEYS and lowest < 0.0 for name, lowest in names)
+    return owned or body.has_negative
 
 
 def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
@@ -120,6 +133,7 @@ def _kept_from_lanes(scene: Scene) -> dict[str, bool]:
         "laws": any(stop.law != "restitution" for stop in scene.stops) and not _yields_in_lanes(scene),
         "time series": scene.record.time_series is not None and not _samples_in_lanes(scene),
         "further points": len(scene.record.observed) > 1,
+        "forces": scene.has_several_forces and not _forces_in_lanes(scene),
         "many contacts": len(scene.stops) > core.MOST_CONTACTS,
         "many modes": body.kept_modes > core.MOST_MODES,
         "numbers of modes": body.finds_modes or any(axis.key == MODES for axis in scene.sweep),
@@ -136,6 +150,23 @@ def _samples_in_lanes(scene: Scene) -> bool:
         or name.startswith(("contact_displacement[", "contact_velocity["))
         or (rigid and name.startswith("contact_force"))
         for name in scene.sampled
+    )
+
+
+def _forces_in_lanes(scene: Scene) -> bool:
+    """Return whether lanes can take several forces: sines and constant loads, of rigid stops where sines are several.
+
+    Each sine besides the clock takes the place of two modes of a body of several modes.
+    """
+    further = [force for force in further_forces(scene) if isinstance(force, Forcing)]
+    body = cast(StructureBody, scene.body)
+    shaped = any(body.is_shaping(axis.key) for axis in scene.sweep)
+    modes = body.size * (2 if shaped or body.is_coupled else 1)
+    return (
+        not signals_of(scene.forces)
+        and len(further) < core.MOST_SINES
+        and (body.size == 1 or modes + 2 * len(further) <= 2 * core.MOST_MODES)
+        and (not further or all(stop.law == "restitution" for stop in scene.stops))
     )
 
 

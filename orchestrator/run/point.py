@@ -41,6 +41,7 @@ from vibroimpact.orchestrator.run.record import (
     ImpactLimitReached,
     RecordedBody,
     RunEnded,
+    UnboundedMotion,
 )
 from vibroimpact.orchestrator.run.runner import Rows, Runner
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan, few_samples_message
@@ -245,6 +246,8 @@ class _Run:
             driver.advance(self.end_time)
         except ImpactLimitReached:
             return Outcome.impact_limit, limit_message(execution.impact_limit, driver.time)
+        except UnboundedMotion as ended:
+            return Outcome.unbounded, ended.reason
         except DeadlineReached:
             return Outcome.timeout, late_message(execution.deadline, driver.time)
         return self._ended()
@@ -319,6 +322,8 @@ class _Run:
         if not self.scene.body.IS_STRUCTURE:
             return self._is_pressed(resting[0][0])
         slowest = self.driver.slowest() if self.scene.period is None else 0.0
+        if self.scene.body.size == 1:
+            slowest = abs(slowest)  # a spring that pushes
         long_enough = TWO_PI / slowest if slowest > 0.0 else self.end_time - self.begin_time
         return self.driver.time - min(start for _, start in resting) >= long_enough
 

@@ -45,6 +45,14 @@ class ImpactLimitReached(RunEnded):
     """A run met `impact_limit` impacts, touch-downs and rests."""
 
 
+class UnboundedMotion(RunEnded):
+    """A motion that grows can meet no stop any more, or has passed its limit; `reason` is in the words of the body."""
+
+    def __init__(self, reason: str, samples: NDArray[np.float64] | None = None) -> None:
+        super().__init__(samples)
+        self.reason = reason
+
+
 class DeadlineReached(RunEnded):
     """A run took longer than its deadline."""
 

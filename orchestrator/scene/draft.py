@@ -9,7 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, BodyAlone, LinkTable, StructureBody
+from vibroimpact.orchestrator.scene.body_models import (
+    BODY_MODELS,
+    PART_MODELS,
+    Body,
+    BodyAlone,
+    LinkTable,
+    StructureBody,
+)
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.forcing_clock import (
@@ -127,10 +134,15 @@ class Draft(DraftTables):
     """
 
     def __init__(
-        self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...], folder: Path = Path()
+        self,
+        document: Mapping[str, Any],
+        axes: tuple[SweepAxis, ...],
+        folder: Path = Path(),
+        *,
+        is_part: bool = False,
     ) -> None:
         super().__init__(with_swept_keys(document, axes))
-        self.axes, self._folder = axes, folder
+        self.axes, self._folder, self._is_part = axes, folder, is_part
         self.names: tuple[str | None, ...] = ()
         self.parts: tuple[Draft, ...] = ()
         self.links: tuple[LinkTable | None, ...] = ()
@@ -154,7 +166,8 @@ class Draft(DraftTables):
             hint = "Add [body] with mass, stiffness and damping."
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
-        return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
+        models = PART_MODELS if self._is_part else BODY_MODELS
+        return self.variant(models, "kind", "oscillator", self.document["body"], ("body",))
 
     def _forces(self) -> tuple[Force | None, ...]:
         raw = self.document.get("forcing")
@@ -224,7 +237,8 @@ class Draft(DraftTables):
     def _structure(self) -> StructureBody | None:
         documents = part_documents(self.document, self.problems)
         self.parts = tuple(
-            Draft(part, axes_of_part(number, self.axes)) for number, part in enumerate(documents, start=1)
+            Draft(part, axes_of_part(number, self.axes), is_part=True)
+            for number, part in enumerate(documents, start=1)
         )
         for number, draft in enumerate(self.parts, start=1):
             self.problems += [of_part(number, problem) for problem in draft.problems]

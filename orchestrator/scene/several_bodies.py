@@ -8,6 +8,7 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
+from vibroimpact.orchestrator.scene.body_models.growing import has_negative, sweeps_negative
 from vibroimpact.orchestrator.scene.body_models.points import BODY_NAME, GROUND
 from vibroimpact.orchestrator.scene.body_models.structure import NOT_IN_STRUCTURES
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
@@ -15,6 +16,8 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 JOINING_TABLES = ("link", "contact")
 """Tables that make a structure even of one `[[body]]`."""
+ONLY_BODY = "body"
+"""Name of a single `[body]` that runs as a structure."""
 _TABLE, _LIST = (re.compile(rf"^[ \t]*{re.escape(head)}", re.M) for head in ("[body]", "[[body]]"))
 _SWEPT, _SWEPT_OF_LIST = (re.compile(rf"^([ \t]*\"){re.escape(key)}", re.M) for key in ("body.", "body[1]."))
 
@@ -43,8 +46,8 @@ def is_left_out(key: str) -> bool:
 def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
     """Return a document in which a list of one body without links and contacts is a single table `[body]`.
 
-    Points of the body become the places that a scene of one body has. A single table beside links or contacts becomes
-    a list of one.
+    Points of the body become the places that a scene of one body has. A single table beside links or contacts, or with
+    a negative spring or dashpot, becomes a list of one.
 
     Examples
     --------
@@ -56,11 +59,34 @@ def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
         is_short = "body" in document and "component" not in document
         is_table = is_short and isinstance(bodies, dict)
         return _renamed({**document, "body": [bodies]}, "body.", "body[1].") if is_table else document
+    if isinstance(bodies, dict) and _may_grow(bodies, document, "body."):
+        return _with_named_body(document)
     if not isinstance(bodies, list) or len(bodies) != 1 or not isinstance(bodies[0], dict):
+        return document
+    if _may_grow(bodies[0], document, "body[1]."):
         return document
     found = _renamed(deepcopy(document), "body[1].", "body.")
     found["body"] = found["body"][0]
     _leave_out_names(found)
+    return found
+
+
+def _may_grow(body: dict[str, Any], document: Mapping[str, Any], owner: str) -> bool:
+    return has_negative(body) or sweeps_negative(document.get("sweep"), owner)
+
+
+def _with_named_body(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document of one body as a list of one, with the points of its stops and of its force."""
+    found = _renamed(deepcopy(document), "body.", "body[1].")
+    found["body"] = [{"name": ONLY_BODY, **found["body"]}]
+    for stop in _tables(found.get("stop")):
+        if isinstance(stop, dict) and "at" not in stop:
+            mass = stop.pop("mass", None)
+            stop["at"] = ONLY_BODY if mass is None else f"{ONLY_BODY}.{mass}"
+    forces = found.get("forcing")
+    for force in forces if isinstance(forces, list) else [forces]:
+        if isinstance(force, dict) and force.get("kind", "force") == "force":
+            force.setdefault("at", ONLY_BODY)
     return found
 
 

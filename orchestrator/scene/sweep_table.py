@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, PART_MODELS
 from vibroimpact.orchestrator.scene.fields import (
     bounds_of,
     field_of,
@@ -122,9 +122,9 @@ def _keys_in(name: str, table: Any) -> Iterator[str]:
 def _model_of(name: str, table: Any) -> type[BaseModel] | None:
     """Return the model of a table; None if its kind or law is unknown."""
     written = table if isinstance(table, dict) else {}
-    table = name.partition("[")[0]
+    table, _, place = name.partition("[")
     if table == "body":
-        return BODY_MODELS.get(str(written.get("kind", "oscillator")))
+        return (PART_MODELS if place else BODY_MODELS).get(str(written.get("kind", "oscillator")))
     if table == "forcing":
         return FORCING_MODELS.get(str(written.get("signal", "sine")))
     if table in ("stop", "contact"):

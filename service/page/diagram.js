@@ -12,7 +12,7 @@ const MOST = 12000; // largest number of drawn rows
 const DRAW = "draw"; // dimension of randomly drawn points
 const CLASS = "class"; // a variable for maps only: its values are names
 const MAP_ROOM = 0.25; // margin of requested data around the visible part of a map, relative
-const FAILED = ["impact_limit", "error", "crash", "timeout"];
+const FAILED = ["impact_limit", "error", "crash", "timeout", "unbounded"];
 const COLOURS = { up: "one", down: "two", independent: "one" };
 
 export class Diagram {

@@ -106,6 +106,17 @@ def periodic(periods: int, recorded: int = 1) -> Columns:
     return oscillators(periods, recorded, start_p=0.0, **body)
 
 
+def under_three_sines(points: Columns) -> Columns:
+    """Return points with two further sines of the same period: twice and three times the frequency."""
+    shape = (2, *points["force"].shape)
+    return {
+        **points,
+        "further_force": np.array([0.1, 0.05])[:, None, None] * np.ones(shape),
+        "further_frequency": np.array([[2.0], [3.0]]) * points["angular_frequency"],
+        "further_phase": np.array([[0.3], [1.0]]) * np.ones_like(points["angular_frequency"]),
+    }
+
+
 def counted(points: Columns, *recorded: str) -> Case:
     """Return the points that run in lanes, with their number of impacts."""
     whole = {**points, "begin": np.zeros_like(points["begin"])}
@@ -193,11 +204,15 @@ def cases(periods: int) -> dict[str, Case]:
             f"P(1,1), Kelvin-Voigt stop of stiffness {stiffness:g}": counted(yielding(periods, stiffness))
             for stiffness in STIFFNESSES
         },
+        "P(1,1) under three sines": counted(under_three_sines(periodic(periods))),
         "chaos": counted(oscillators(periods // 10, 1, start_p=0.1, **chaos)),
     }
     for modes, contacts in ((1, 1), (1, 2), (2, 1), (4, 1), (8, 1), (8, 2), (8, 4)):
         bodies = drawn(200, modes, contacts, seed=3, transient=60, recorded=1)
         found[f"random bodies: {modes} modes, {contacts} contacts"] = counted(bodies)
+    for modes in (2, 4, 8):
+        bodies = drawn(200, modes, 1, seed=3, transient=60, recorded=1)
+        found[f"random bodies: {modes} modes, 1 contacts, three sines"] = counted(under_three_sines(bodies))
     for modes in (2, 4, 8):
         bodies = drawn_coupled(200, modes, 1, seed=3, transient=60, recorded=1)
         found[f"random bodies: {modes} coupled modes, 1 contacts"] = counted(bodies)

@@ -19,6 +19,8 @@ typedef struct {
     double stiffness[STATES], decay[STATES], force[STATES], held[STATES], observed[STATES], start_q[STATES],
         start_p[STATES];
     double angular_frequency[POINTS], phase[POINTS], begin[POINTS], end[POINTS];
+    double further_force[VI_FURTHER_SINES * STATES];
+    double further_frequency[VI_FURTHER_SINES * POINTS], further_phase[VI_FURTHER_SINES * POINTS];
     double shape[VI_LANES_CONTACTS * STATES], impulse[VI_LANES_CONTACTS * STATES];
     double position[VI_LANES_CONTACTS * POINTS], direction[VI_LANES_CONTACTS * POINTS];
     double restitution[VI_LANES_CONTACTS * POINTS], yield_velocity[VI_LANES_CONTACTS * POINTS];
@@ -42,7 +44,20 @@ static const double TURN = 6.283185307179586;
  * change. */
 static const uint64_t BITS = 0xa2c39bb0fe7d6ec7u;
 static const uint64_t BITS_OF_YIELDING = 0xe2aa616ece9fd36cu; /* Kelvin-Voigt stops, time series */
+static const uint64_t BITS_OF_SINES = 0xc3fb6512f25cb87fu; /* further sines */
 static const uint64_t BITS_OF_SAMPLES = 0x9e95a2911ae6a1ceu; /* time series of several modes, and of one between three or four stops */
+
+static void draw_sines(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
+{
+    for (int k = 0; k < plan->further; ++k) {
+        const double ratio = choice(seed, 2) ? uniform(seed, 0.2, 4.0) : 1.0 + (double)choice(seed, 4);
+        s->further_frequency[k * POINTS + i] = ratio * (s->angular_frequency[i] > 0.0 ? s->angular_frequency[i] : 1.0);
+        s->further_phase[k * POINTS + i] = uniform(seed, -4.0, 4.0);
+        for (int j = 0; j < plan->modes; ++j) {
+            s->further_force[(k * plan->modes + j) * POINTS + i] = uniform(seed, -1.0, 1.0);
+        }
+    }
+}
 
 static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)
 {
@@ -82,6 +97,7 @@ static void draw_point(sample *s, int i, const vi_lanes_plan *plan, uint64_t *se
     s->begin[i] = isfinite(period) ? 2.0 * period : 3.0;
     s->end[i] = isfinite(period) ? 7.0 * period : 20.0;
     s->first[i] = 1;
+    draw_sines(s, i, plan, seed);
 }
 
 /* Put a number that no point can have somewhere. */
@@ -113,6 +129,9 @@ static vi_lanes_points points_of(const sample *s, results *r, double *rows, int6
                              .held = s->held,
                              .angular_frequency = s->angular_frequency,
                              .phase = s->phase,
+                             .further_force = s->further_force,
+                             .further_frequency = s->further_frequency,
+                             .further_phase = s->further_phase,
                              .shape = s->shape,
                              .impulse = s->impulse,
                              .observed = s->observed,
@@ -189,8 +208,8 @@ static const double *period_of(const results *r, int i, int column)
 }
 
 /* One row for all periods of a point: extremes, the last strobe and the mean number of impacts. A strobe that cuts the
- * record of a flight moves extremes by roundings. */
-static void compare_reduced(const results *whole, const results *reduced, int i)
+ * record of a flight moves extremes by some roundings, more where more sines add up. */
+static void compare_reduced(const results *whole, const results *reduced, int i, double roundings)
 {
     const int64_t count = whole->periods_of[i];
     double largest = -HUGE_VAL, smallest = HUGE_VAL, impacts = 0.0;
@@ -208,7 +227,7 @@ static void compare_reduced(const results *whole, const results *reduced, int i)
                                               impacts / (double)count};
     for (int column = 0; column < VI_PERIOD_WIDTH; ++column) {
         const double found = period_of(reduced, i, column)[0];
-        const double rounding = column <= VI_OF_SMALLEST ? 8.0 * DBL_EPSILON * fmax(fabs(largest), fabs(smallest)) : 0.0;
+        const double rounding = column <= VI_OF_SMALLEST ? roundings * DBL_EPSILON * fmax(fabs(largest), fabs(smallest)) : 0.0;
         CHECK(fabs(found - expected[column]) <= rounding, "column %d of all periods of %d to be %.17g, got %.17g", column, i,
               expected[column], found);
     }
@@ -269,12 +288,12 @@ static uint64_t hash_of(uint64_t hash, const results *r, int modes)
     return hash;
 }
 
-static void check_sizes(int modes, int contacts, int64_t yielding, double rate, uint64_t *seed, uint64_t *hash)
+static void check_sizes(int modes, int contacts, int further, int64_t yielding, double rate, uint64_t *seed, uint64_t *hash)
 {
     static sample good, bad;
     static results whole, other;
     const int64_t sampled = ((int64_t)1 << VI_LANES_CONTACTS) | (((int64_t)1 << contacts) - 1);
-    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 0, 200, yielding, sampled, rate};
+    vi_lanes_plan plan = {modes, contacts, 1, 1, 1, 1, VI_INSTRUCTIONS_BASELINE, 0, further, 200, yielding, sampled, rate};
     for (int i = 0; i < POINTS; ++i) {
         draw_point(&good, i, &plan, seed);
         good.first[i] = choice(seed, 3) != 0;
@@ -293,7 +312,7 @@ static void check_sizes(int modes, int contacts, int64_t yielding, double rate, 
     plan.each_period = 0;
     run(&good, &other, &plan, 1e9);
     for (int i = 0; i < POINTS; ++i) {
-        compare_reduced(&whole, &other, i);
+        compare_reduced(&whole, &other, i, further ? 64.0 : 8.0);
     }
     plan.each_period = 1;
     memset(good.first, 1, sizeof good.first);
@@ -340,7 +359,7 @@ static void check_functions(uint64_t *seed)
 
 int main(void)
 {
-    uint64_t seed = 18, hash = 14695981039346656037u, hash_of_yielding = hash, hash_of_samples = hash;
+    uint64_t seed = 18, hash = 14695981039346656037u, hash_of_yielding = hash, hash_of_samples = hash, hash_of_sines = hash;
     const vi_lanes_plan none[] = {{.modes = 0},
                                   {.modes = VI_LANES_MODES + 1},
                                   {.modes = 1, .contacts = -1},
@@ -355,30 +374,40 @@ int main(void)
                                   {.modes = 1, .rate = INFINITY},
                                   {.modes = 1, .coupled = 1},
                                   {.modes = 2, .coupled = 2},
+                                  {.modes = 1, .further = -1},
+                                  {.modes = 1, .further = VI_FURTHER_SINES + 1},
+                                  {.modes = 1, .contacts = 1, .yielding = 1, .further = 1},
+                                  {.modes = 4, .further = VI_FURTHER_SINES},
+                                  {.modes = VI_LANES_MODES, .coupled = 1, .further = 1},
                                   {.modes = 1, .instructions = 4}};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
         CHECK(vi_door_lanes_memory(&none[i]) == 0, "plan %zu to be refused", i);
     }
     for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
         for (int contacts = 0; contacts <= (modes == 1 ? VI_ONE_MODE_CONTACTS : VI_LANES_CONTACTS); ++contacts) {
-            check_sizes(modes, contacts, 0, 0.0, &seed, &hash);
+            check_sizes(modes, contacts, 0, 0, 0.0, &seed, &hash);
         }
     }
     for (int contacts = 1; contacts <= VI_ONE_MODE_CONTACTS; ++contacts) {
         for (int64_t yielding = 1; yielding < 1 << contacts; ++yielding) {
-            check_sizes(1, contacts, yielding, 1.7, &seed, &hash_of_yielding);
+            check_sizes(1, contacts, 0, yielding, 1.7, &seed, &hash_of_yielding);
         }
     }
     for (int contacts = VI_ONE_MODE_CONTACTS + 1; contacts <= VI_LANES_CONTACTS; ++contacts) {
-        check_sizes(1, contacts, 0, 1.7, &seed, &hash_of_samples);
+        check_sizes(1, contacts, 0, 0, 1.7, &seed, &hash_of_samples);
     }
     for (int modes = 2; modes <= VI_LANES_MODES; ++modes) {
-        check_sizes(modes, modes % (VI_LANES_CONTACTS + 1), 0, 1.7, &seed, &hash_of_samples);
+        check_sizes(modes, modes % (VI_LANES_CONTACTS + 1), 0, 0, 1.7, &seed, &hash_of_samples);
+    }
+    for (int modes = 1; modes <= VI_LANES_MODES; ++modes) {
+        check_sizes(modes, modes % (VI_LANES_CONTACTS + 1), modes > 4 ? 2 : VI_FURTHER_SINES - modes, 0, modes % 2 ? 1.7 : 0.0,
+                    &seed, &hash_of_sines);
     }
     check_functions(&seed);
     CHECK(hash == BITS, "the bits of every machine, got the hash %016" PRIx64, hash);
     CHECK(hash_of_yielding == BITS_OF_YIELDING, "the bits on stops that yield, got the hash %016" PRIx64,
           hash_of_yielding);
     CHECK(hash_of_samples == BITS_OF_SAMPLES, "the bits of time series, got the hash %016" PRIx64, hash_of_samples);
+    CHECK(hash_of_sines == BITS_OF_SINES, "the bits of further sines, got the hash %016" PRIx64, hash_of_sines);
     return 0;
 }

@@ -117,6 +117,7 @@ def run(
         each_period,
         instructions,
         coupled,
+        len(points.get("further_force", ())),
         impact_limit,
         yields,
         sampled,
@@ -281,9 +282,64 @@ def oscillators(count: int, transient: int, recorded: int, **values: object) -> 
     return {**points, "begin": transient * period, "end": (transient + recorded) * period}
 
 
+def with_sines(points: Columns, further: int, seed: int, *, one_period: bool = False) -> Columns:
+    """Return points with further sines, of any frequencies or of one common period."""
+    random = np.random.default_rng(seed)
+    modes, count = points["force"].shape
+    ratio = np.exp(random.uniform(-1.2, 1.2, (further, count)))
+    if one_period:
+        ratio = random.integers(1, 7, (further, count)) / random.integers(1, 4, count)
+    return {
+        **points,
+        "further_force": random.uniform(-1.2, 1.2, (further, modes, count)),
+        "further_frequency": ratio * points["angular_frequency"],
+        "further_phase": random.uniform(-4.0, 4.0, (further, count)),
+    }
+
+
+def with_undamped_modes(p: Columns) -> Columns:
+    """Return a point with two undamped modes for each of its further sines, which move as its steady response.
+
+    The modes are in ascending order. Impulses do not act on the added ones.
+    """
+    modes, frequency, phase = len(p["stiffness"]), p["further_frequency"], p["further_phase"]
+    coupling = p.get("coupling", np.diag(2.0 * p["decay"]))
+    steady = [
+        np.linalg.solve(np.diag(p["stiffness"] - w**2) + 1j * w * coupling, force.astype(complex))
+        for w, force in zip(frequency, p["further_force"], strict=True)
+    ]
+    start = {"start_q": p["start_q"], "start_p": p["start_p"]}
+    added: dict[str, list[float]] = {"start_q": [], "start_p": []}
+    for w, a, z in zip(frequency, phase, steady, strict=True):
+        start["start_q"] = start["start_q"] - (z * np.exp(1j * a)).real
+        start["start_p"] = start["start_p"] - (1j * w * z * np.exp(1j * a)).real
+        added["start_q"] += [math.cos(a), math.sin(a)]
+        added["start_p"] += [-w * math.sin(a), w * math.cos(a)]
+    none = np.zeros(2 * len(frequency))
+    stiffness = np.concatenate([p["stiffness"], np.repeat(frequency**2, 2)])
+    order = np.argsort(stiffness, kind="stable")
+
+    def shape(row: Array) -> Array:
+        own = [part for z in steady for part in (row @ z.real, -(row @ z.imag))]
+        return np.concatenate([row, own])[order]
+
+    found = {**p, "stiffness": stiffness[order], "observed": shape(p["observed"])}
+    found |= {name: np.concatenate([p[name], none])[order] for name in ("decay", "force", "held")}
+    found |= {name: np.concatenate([start[name], added[name]])[order] for name in start}
+    found["shape"] = np.array([shape(row) for row in p["shape"]])
+    found["impulse"] = np.array([np.concatenate([row, none])[order] for row in p["impulse"]])
+    if "coupling" in p:
+        whole = np.zeros((len(stiffness), len(stiffness)))
+        whole[:modes, :modes] = coupling
+        found["coupling"] = whole[np.ix_(order, order)]
+    return found
+
+
 def follow_alone(points: Columns, place: int, *, impact_limit: int = 0) -> Structure:
     """Run one of the points by the scalar engine of bodies of many modes, recorded from its start."""
     p = {name: array[..., place] for name, array in points.items()}
+    if "further_force" in p:
+        p = with_undamped_modes(p)
     natural = np.sqrt(p["stiffness"])
     moves = natural > 0.0
     ratio = np.where(moves, p["decay"] / np.where(moves, natural, 1.0), 0.0)

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 #: States of a contact, by the number in `Structure.statuses`.
 STATUSES = ("free", "touching", "held", "yielding", "receding")
 #: Results of `Structure.advance`.
-DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, UNFINISHED = 0, 2, 3, 4, 8
+DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, UNFINISHED, UNBOUNDED = 0, 2, 3, 4, 8, 9
 GIVEN_UP = (5, 6, 7)
 MESSAGE_LENGTH = 1024
 ROW_WIDTH, ROW_CAPACITY = 8, 512
@@ -86,7 +86,7 @@ class Modes:
     Attributes
     ----------
     natural : array_like, shape (modes,)
-        Natural angular frequencies, ascending, rad/s.
+        Natural angular frequencies, ascending, rad/s; w < 0 for a stiffness of -w^2.
     damping_ratio : array_like, shape (modes,), or float
         Damping ratios.
     force : array_like, shape (modes,), or float
@@ -127,6 +127,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_structure_free.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_by_series.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_at_once.argtypes = [ctypes.c_void_p]
+    library.vi_door_structure_limit.argtypes = [ctypes.c_void_p, number, integer]
     library.vi_door_structure_record.argtypes = [ctypes.c_void_p, numbers, integer, integer, integer, integer]
     library.vi_door_structure_advance.argtypes = [ctypes.c_void_p, number, numbers, numbers, number]
     library.vi_door_structure_state.argtypes = [
@@ -187,6 +188,10 @@ class Structure:
         Follow the extremes, write a row for each forcing period, integrate the energies.
     by_series : bool
         Follow long rests and contacts with power laws by series, in place of their exact flows.
+    displacement_limit : float
+        Displacement beyond which a motion that grows ends, m; 0: no limit.
+    ends_unbounded : bool
+        Whether a motion that grows ends where it can meet no stop any more.
     at_once : bool
         Take the steps of contacts with power laws from the first contact on.
 
@@ -217,11 +222,13 @@ class Structure:
         energies: bool = False,
         by_series: bool = False,
         at_once: bool = False,
+        displacement_limit: float = 0.0,
+        ends_unbounded: bool = False,
     ) -> None:
         self._library = _library()
         natural = np.atleast_1d(np.asarray(modes.natural, dtype=np.float64))
         self.modes = n = len(natural)
-        self._stiffness: Array = natural**2
+        self._stiffness: Array = natural * np.abs(natural)
         self._handle = None
         self.stops = tuple(stops)
         shapes = np.array([_vector(stop.shape, n) for stop in stops]).reshape(-1, n)
@@ -257,6 +264,7 @@ class Structure:
         )
         if by_series:
             self._library.vi_door_structure_by_series(self._handle)
+        self._library.vi_door_structure_limit(self._handle, displacement_limit, int(ends_unbounded))
         if at_once:
             self._library.vi_door_structure_at_once(self._handle)
         self._rows = Rows()
@@ -288,7 +296,7 @@ class Structure:
         held_rate: ArrayLike = 0.0,
         most_impacts: float = 0,
     ) -> int:
-        """Advance by `duration` s under further modal forces; return `DONE`, `IMPACT_LIMIT` or `REFUSED`.
+        """Advance by `duration` s under further modal forces; return `DONE`, `IMPACT_LIMIT`, `UNBOUNDED` or `REFUSED`.
 
         Parameters
         ----------

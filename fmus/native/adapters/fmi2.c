@@ -172,6 +172,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
         return status(vi_instance_fail(it, function, "impact_limit reached at %.17g s; expected fewer impacts",
                                        vi_instance_time(it)));
     }
+    it->wants_to_end = result == VI_STEP_UNBOUNDED;
+    if (it->wants_to_end) {
+        vi_instance_warn(it, function, "%s", it->message);
+        return fmi2Discard;
+    }
     if (result == VI_STEP_UNFINISHED) {
         return status(vi_instance_fail(it, function, "expected a step whose end can be computed in a minute or so, got as"
                                        " far as %.17g s. Ask for shorter steps", vi_instance_time(it)));
@@ -184,7 +189,7 @@ fmi2Status fmi2CancelStep(fmi2Component c)
     return unavailable(c, "fmi2CancelStep");
 }
 
-/* doStep is never asynchronous and never discarded, so only the time and the end can be queried. */
+/* doStep is never asynchronous, and discarded only at the end of the simulation: time and end can be queried. */
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
 {
     if (c == NULL || value == NULL || s != fmi2DoStepStatus) {
@@ -211,10 +216,11 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
 {
-    if (c == NULL || value == NULL || s != fmi2Terminated) {
+    const vi_instance *it = c;
+    if (it == NULL || value == NULL || s != fmi2Terminated) {
         return unavailable(c, "fmi2GetBooleanStatus");
     }
-    *value = fmi2False;
+    *value = it->wants_to_end ? fmi2True : fmi2False;
     return fmi2OK;
 }
 

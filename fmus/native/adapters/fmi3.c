@@ -244,6 +244,11 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");
         return fmi3Discard;
     }
+    if (result == VI_STEP_UNBOUNDED) {
+        *terminateSimulation = true;
+        vi_instance_warn(it, "fmi3DoStep", "%s", it->message);
+        return fmi3Discard;
+    }
     if (result == VI_STEP_UNFINISHED && !it->early_return_allowed) {
         log_message(it, fmi3Discard, "logStatusWarning",
                     "fmi3DoStep: expected a step whose end can be computed in a minute or so. Ask for shorter steps");

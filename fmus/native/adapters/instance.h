@@ -33,6 +33,7 @@ struct vi_instance {
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
     bool exchange;         /* made for model exchange: the importer integrates the component */
+    bool wants_to_end;     /* the last step asked for the end of the simulation */
     double start_time, stop_time; /* stop_time: infinite if the importer defines none */
     char *name;
     char message[VI_MESSAGE_LENGTH];

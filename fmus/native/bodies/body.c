@@ -6,6 +6,7 @@
 #include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body/modal/structure/unbounded.h"
 #include "body_check.h"
 #include "body_exchange.h"
 
@@ -208,9 +209,10 @@ static void update_energies(vi_body *c)
     c->energy_kinetic = c->energy_potential = 0.0;
     for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
         const double p = c->state.p[j], stretch = c->natural[j] * c->state.q[j];
+        const double elastic = copysign(stretch * stretch, c->natural[j]);
         c->energy_kinetic += 0.5 * p * p;
-        c->energy_potential += 0.5 * stretch * stretch;
-        c->modal_energy[j] = c->record_energies ? 0.5 * (p * p + stretch * stretch) : 0.0;
+        c->energy_potential += 0.5 * elastic;
+        c->modal_energy[j] = c->record_energies ? 0.5 * (p * p + elastic) : 0.0;
     }
 }
 
@@ -240,8 +242,8 @@ static void update_outputs(void *self)
 static double lowest_natural(const vi_body *c)
 {
     for (int j = 0; j < vi_structure_free_modes(&c->model); ++j) {
-        if (c->natural[j] > 0.0) {
-            return c->natural[j];
+        if (c->natural[j] != 0.0) {
+            return fabs(c->natural[j]);
         }
     }
     return 0.0;
@@ -368,6 +370,9 @@ static vi_step_result advance(vi_body *c, vi_instant target, const vi_step_reque
     const vi_step_result result = vi_structure_advance(&parts, target, request);
     if (result == VI_STEP_STANDSTILL) {
         vi_structure_complain(&parts, message);
+    }
+    if (result == VI_STEP_UNBOUNDED) {
+        vi_complain_of_growth(&parts, message, vi_clock_time(&c->model.clock, c->state.now));
     }
     vi_complain_of_end(message, result, vi_clock_time(&c->model.clock, c->state.now));
     return result;

@@ -14,6 +14,9 @@
 #ifndef VI_ONLY_MODES
 #define VI_ONLY_MODES 0 /* number of modes that all bodies have, known to the compiler; 0: any up to VI_MODES */
 #endif
+#ifndef VI_GROWING
+#define VI_GROWING 1 /* may modes have negative stiffness or damping? */
+#endif
 #ifndef VI_SINES
 #define VI_SINES 0 /* sines of the forcing besides the clock's */
 #endif

@@ -126,6 +126,8 @@ class ComponentDescription:
     ----------
     token : str
         Identifier of exactly this list of variables; instantiationToken of FMI 3.0, guid of FMI 2.0.
+    growing : bool
+        Whether modes may have negative stiffness or damping.
     repeats : mapping of str to int
         Number of copies of each repeated block, `{"contact": 2}`.
     start_of_export : mapping of str to float
@@ -143,6 +145,7 @@ class ComponentDescription:
     description: str
     event_mode: bool
     model_exchange: bool
+    growing: bool
     token: str
     source: Path
     repeats: Mapping[str, int]

@@ -72,6 +72,7 @@ def lane_points(points: PreparedPoints) -> LanePoints:
         each_period=record.each_period,
         instructions=core.instructions(),
         coupled=modal.coupling is not None,
+        further=0 if modal.further_force is None else len(modal.further_force),
         impact_limit=scene.execution.impact_limit,
         yielding=sum(2**number for number, stop in enumerate(stops) if not LAWS[stop.law].is_rigid),
         sampled=sampled_bits(scene.sampled),

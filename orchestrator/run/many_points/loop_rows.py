@@ -250,6 +250,8 @@ class LoopArrays:
             began = np.fmin.reduce(starts, axis=1)
             long_enough = points.end[:count] - points.begin[:count]
             slowest = arrays["finals"][:, -1]
+            if self._loop.scene.body.size == 1:
+                slowest = np.abs(slowest)  # a spring that pushes
             if not points.forced:
                 long_enough = np.where(
                     slowest > 0.0, TWO_PI / np.where(slowest > 0.0, slowest, 1.0), long_enough

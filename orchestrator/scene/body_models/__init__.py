@@ -2,6 +2,7 @@
 
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.growing import PART_MODELS
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
 from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone, LinkTable, StructureBody
@@ -20,6 +21,7 @@ __all__ = [
     "LinkTable",
     "OneBody",
     "OscillatorBody",
+    "PART_MODELS",
     "Rayleigh",
     "StructureBody",
 ]

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, Stops
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.growing import has_negative
 from vibroimpact.orchestrator.scene.body_models.points import (
     GROUND,
     OneBody,
@@ -22,7 +23,7 @@ from vibroimpact.orchestrator.scene.body_models.points import (
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import DAMPING, FEEDS_ENERGY, NotNegative, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import DAMPING, Finite, SceneTable, Stop
 from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from vibroimpact.fmus.bodies.assembly import Assembly
 
 MOST_LINKS = 256
+FARTHEST = 1e9
+"""Displacement of a motion that grows, over the largest length of its scene, at which a run ends as unbounded."""
 MOTIONS = ("displacement", "velocity")
 NOT_IN_STRUCTURES = (
     *("modes", "residual", "observed_mass", "impact_projection", "poisson_ratio"),
@@ -51,8 +54,8 @@ class LinkTable(SceneTable):
             doc=f'two points of bodies, or one and `"{GROUND}"`',
         ),
     ]
-    stiffness: Annotated[NotNegative, Rule(unit="N/m", hint="Use 0 for a dashpot alone.")] = 0.0
-    damping: Annotated[NotNegative, Rule(unit="N s/m", hint=FEEDS_ENERGY, effect=DAMPING)] = 0.0
+    stiffness: Annotated[Finite, Rule(unit="N/m", doc="0 for a dashpot alone; negative springs push")] = 0.0
+    damping: Annotated[Finite, Rule(unit="N s/m", effect=DAMPING, doc="negative dashpots give energy")] = 0.0
 
 
 class StructureBody(BodyTable):
@@ -162,6 +165,11 @@ class StructureBody(BodyTable):
 
     # ---- modes ----
 
+    @property
+    def has_negative(self) -> bool:
+        """Whether a spring or a dashpot of a body or a link is negative."""
+        return any(has_negative(each.model_dump(by_alias=True)) for each in (*self.parts, *self.links))
+
     @cached_property
     def assembly(self) -> Assembly:
         """The modes of the bodies with their links."""
@@ -252,12 +260,20 @@ class StructureBody(BodyTable):
         }
         if forcing is not None:
             found["forcing.amplitude"] = forcing.scalar_amplitude
-        return found
+        return found | {"displacement_limit": FARTHEST * self._largest_length(stops)}
+
+    def _largest_length(self, stops: Stops) -> float:
+        """Return the largest position, clearance or start displacement, m; 1 where all are 0."""
+        starts = [float(np.abs(part.displacements).max()) for part in self.assembly.parts]
+        return max([abs(stop.position) for stop in stops] + starts) or 1.0
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
-        """Return the number of modes and of further observed points, and whether the damping couples the modes."""
+        """Return the number of modes and of further observed points, and whether the damping couples the modes.
+
+        A motion that grows ends where it can meet no stop any more, since nothing else acts on the bodies of a scene.
+        """
         further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
-        return {"modes": self.size, "coupled": self.is_coupled, **further}
+        return {"modes": self.size, "coupled": self.is_coupled, "ends_unbounded": True, **further}
 
 
 class BodyAlone(StructureBody):

@@ -122,6 +122,12 @@ VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double
     structure->state.follow_energies = energies;
 }
 
+VI_DOOR void vi_door_structure_limit(vi_door_structure *structure, double displacement_limit, int ends_unbounded)
+{
+    structure->model.displacement_limit = displacement_limit;
+    structure->model.ends_unbounded = ends_unbounded;
+}
+
 VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double duration, const double held[],
                                       const double held_rate[], double most_impacts)
 {

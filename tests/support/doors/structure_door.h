@@ -32,6 +32,9 @@ VI_DOOR void vi_door_structure_at_once(vi_door_structure *structure);
 VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,
                                       int periods, int energies);
 
+/* End motions that grow beyond a displacement, m (0: none), and, where `ends_unbounded`, those that can meet no stop. */
+VI_DOOR void vi_door_structure_limit(vi_door_structure *structure, double displacement_limit, int ends_unbounded);
+
 /* Advance by up to `duration` s under constant modal forces; returns a vi_step_result. The time reached is in
  * vi_door_structure_state. */
 VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double duration, const double held[],

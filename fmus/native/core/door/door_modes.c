@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "door/door.h"
@@ -10,6 +11,7 @@
 #include "modes/beam_residual.h"
 #include "modes/chain_modes.h"
 #include "modes/singular.h"
+#include "modes/symmetric.h"
 
 static bool in_range(int boundary, int count)
 {
@@ -152,4 +154,55 @@ VI_DOOR int vi_door_spring_modes(int rows, int columns, const double spring[], d
         memcpy(vector + (ptrdiff_t)k * columns, singular.right[k], (size_t)columns * sizeof vector[0]);
     }
     return singular.rank;
+}
+
+typedef struct {
+    vi_complex matrix[VI_STATES][VI_STATES], vector[VI_STATES][VI_STATES];
+} symmetric_work;
+
+/* Entry of the sum of sign spring' spring, to twice the digits, rounded once. */
+static double signed_entry(int rows, int columns, const double spring[], const double sign[], int i, int j)
+{
+    double sum = 0.0, left = 0.0;
+    for (int k = 0; k < rows; ++k) {
+        const double a = sign[k] * spring[(ptrdiff_t)k * columns + i], b = spring[(ptrdiff_t)k * columns + j];
+        const double product = a * b, total = sum + product, part = total - sum;
+        left += fma(a, b, -product) + ((sum - (total - part)) + (product - part));
+        sum = total;
+    }
+    return sum + left;
+}
+
+VI_DOOR int vi_door_signed_modes(int rows, int columns, const double spring[], const double sign[], double value[],
+                                 double vector[])
+{
+    if (rows < 0 || columns < 1 || columns > VI_MODES) {
+        return -1;
+    }
+    symmetric_work *work = calloc(1, sizeof *work);
+    if (work == NULL) {
+        return 1;
+    }
+    bool good = true;
+    for (int i = 0; i < columns; ++i) {
+        for (int j = 0; j < columns; ++j) {
+            work->matrix[i][j].re = signed_entry(rows, columns, spring, sign, i < j ? i : j, i < j ? j : i);
+            good = good && isfinite(work->matrix[i][j].re);
+        }
+    }
+    const bool found = good && vi_symmetric_find(columns, work->matrix, work->vector);
+    bool taken[VI_MODES] = {false};
+    for (int k = 0; k < columns && found; ++k) {
+        int least = -1;
+        for (int i = 0; i < columns; ++i) {
+            least = !taken[i] && (least < 0 || work->matrix[i][i].re < work->matrix[least][least].re) ? i : least;
+        }
+        taken[least] = true;
+        value[k] = copysign(sqrt(fabs(work->matrix[least][least].re)), work->matrix[least][least].re);
+        for (int j = 0; j < columns; ++j) {
+            vector[(ptrdiff_t)k * columns + j] = work->vector[least][j].re;
+        }
+    }
+    free(work);
+    return !good ? -1 : found ? 0 : 1;
 }

@@ -31,4 +31,10 @@ int vi_door_chain_modes(int masses, const double mass[], const double stiffness[
  * above 0, ascending, and vector[k * columns + column] their unit vectors. Returns the rank, or -1 for a bad argument. */
 int vi_door_spring_modes(int rows, int columns, const double spring[], double value[], double vector[]);
 
+/* The same where spring k counts with sign[k], 1 or -1: all eigenvectors of the sum of sign spring' spring. value[] has
+ * their angular frequencies, ascending, negative where the eigenvalue is. Returns 0, or -1 for a bad argument, 1 where
+ * the eigenvectors are not found, or memory is out. */
+int vi_door_signed_modes(int rows, int columns, const double spring[], const double sign[], double value[],
+                         double vector[]);
+
 #endif

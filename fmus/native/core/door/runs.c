@@ -94,7 +94,7 @@ static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
     double reached = p->time;
     const int status =
         f->step(f->instance, p->time, end - p->time, false, &needs_event, &ends, &early, &reached);
-    if (status != STATUS_DISCARD && (!went_well(status) || needs_event || ends)) {
+    if (ends || (status != STATUS_DISCARD && (!went_well(status) || needs_event))) {
         return VI_RUNS_REFUSED;
     }
     if (status == STATUS_DISCARD) {

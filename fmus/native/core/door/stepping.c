@@ -69,7 +69,7 @@ static int advance(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block
         const int status = f->step(f->instance, b->time, end - b->time, false, &needs_event, &ends, &early, &reached);
         if (status == STATUS_DISCARD) {
             b->time = reached;
-            return VI_HOLD_LIMIT;
+            return ends ? VI_HOLD_ENDS : VI_HOLD_LIMIT;
         }
         if (!went_well(status) || needs_event || ends) {
             return VI_HOLD_REFUSED;

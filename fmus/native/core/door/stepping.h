@@ -17,7 +17,8 @@ enum {
     VI_HOLD_REFUSED = 1, /* the body failed in the step to sample `at` */
     VI_HOLD_LIMIT = 2,   /* the body reached its limit of impacts in this step */
     VI_HOLD_AGAIN = 3,   /* take the rows, handle signals, then call again to go on */
-    VI_HOLD_TOUCHES = 4  /* the body touches its exciter at the start of the step to sample `at` */
+    VI_HOLD_TOUCHES = 4, /* the body touches its exciter at the start of the step to sample `at` */
+    VI_HOLD_ENDS = 5     /* the body asked for the end of the simulation in this step */
 };
 
 typedef struct {

@@ -6,6 +6,7 @@
 #define VIBROIMPACT_LANE_CELLS_H
 
 #include "lanes/recording.h"
+#include "lanes/sines.h"
 
 /* Share of a pair about which its polynomial is. */
 #define MIDDLE 0.5
@@ -86,19 +87,32 @@ LANES_INLINE vector gathered(const vi_lane_array *table, int at, const int row[]
               + gather(table + VI_OF_ONE, VI_PARTS, at, row));
 }
 
-/* The state after some whole pairs of each lane; q[]: displacements after all numbers of pairs. */
-LANES_INLINE state after_pairs(const vi_lane_group *g, int at, const state *s, const vector q[], vector pairs)
+/* Turn the phases of the further sines by some whole pairs of each lane, and add their shares to the velocities then. */
+LANES_INLINE void turn_sines_by(const vi_lane_group *g, int at, int further, const int row[], phases *of, vector *speed)
 {
-    int row[VI_WIDTH];
-    vector here;
-#pragma GCC unroll 8
-    for (int i = 0; i < VI_WIDTH; ++i) {
-        row[i] = 2 * (int)pairs[i];
-        here[i] = q[row[i] / 2][i];
+    const int stride = VI_FURTHER_SINES * VI_SINE_PARTS;
+    for (int k = 0; k < further; ++k) {
+        const vi_lane_array *of_p = g->sines->end_p[0][k], *turn = g->sines->turned[0][k];
+        const vector c = of->cosine[k], s = of->sine[k];
+        *speed += gather(of_p + VI_OF_ITS_COSINE, stride, at, row) * c + gather(of_p + VI_OF_ITS_SINE, stride, at, row) * s;
+        const vector cosine = gather(turn + VI_OF_ITS_COSINE, stride, at, row);
+        const vector sine = gather(turn + VI_OF_ITS_SINE, stride, at, row);
+        of->cosine[k] = c * cosine - s * sine;
+        of->sine[k] = s * cosine + c * sine;
     }
-    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
-    return (state){here, gathered(g->one.end_p[0], at, row, s),
-                   s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
+}
+
+/* The same by `row` cells in all lanes. */
+LANES_INLINE void turn_sines(const vi_lane_group *g, int at, int further, int row, phases *of, vector *speed)
+{
+    for (int k = 0; k < further; ++k) {
+        const vi_lane_array *of_p = g->sines->end_p[row][k], *turn = g->sines->turned[row][k];
+        const vector c = of->cosine[k], s = of->sine[k];
+        *speed += load(of_p[VI_OF_ITS_COSINE] + at) * c + load(of_p[VI_OF_ITS_SINE] + at) * s;
+        const vector cosine = load(turn[VI_OF_ITS_COSINE] + at), sine = load(turn[VI_OF_ITS_SINE] + at);
+        of->cosine[k] = c * cosine - s * sine;
+        of->sine[k] = s * cosine + c * sine;
+    }
 }
 
 /* The state of this displacement and velocity some pairs later. */
@@ -108,30 +122,71 @@ LANES_INLINE state turned(const vi_lane_group *g, int at, int pairs, vector q, v
     return (state){q, p, s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
 }
 
-/* Half of the second derivative of q in a state, over a pair. */
-LANES_INLINE vector half_of(const vi_lane_group *g, int at, const state *s)
+/* The state after some whole pairs of each lane; q[]: displacements after all numbers of pairs. `of`: phases of the
+ * further sines, which turn too. Periodic motions pass the same number of pairs in all lanes: then no row is gathered. */
+LANES_INLINE state after_pairs(const vi_lane_group *g, int at, int further, const state *s, phases *of, const vector q[],
+                               vector pairs)
 {
-    return 4.0 * linear(g->one.taylor[2], at, s);
+    if (!any(pairs != all(pairs[0]))) {
+        const int row = 2 * (int)pairs[0];
+        vector p = linear(g->one.end_p[row], at, s);
+        turn_sines(g, at, further, row, of, &p);
+        return turned(g, at, row / 2, q[row / 2], p, s);
+    }
+    int row[VI_WIDTH];
+    vector here;
+#pragma GCC unroll 8
+    for (int i = 0; i < VI_WIDTH; ++i) {
+        row[i] = 2 * (int)pairs[i];
+        here[i] = q[row[i] / 2][i];
+    }
+    vector p = gathered(g->one.end_p[0], at, row, s);
+    turn_sines_by(g, at, further, row, of, &p);
+    const vector c = gather(g->one.turn_cosine, 1, at, row), n = gather(g->one.turn_sine, 1, at, row);
+    return (state){here, p, s->cosine * c - s->sine * n, s->sine * c + s->cosine * n};
+}
+
+/* Half of the second derivative of q in a state, over a pair. */
+LANES_INLINE vector half_of(const vi_lane_group *g, int at, int further, const state *s, const phases *of)
+{
+    vector half = linear(g->one.taylor[2], at, s);
+    if (further) {
+        add_sines(g->sines->taylor + 2, 1, 1, at, further, of, &half);
+    }
+    return 4.0 * half;
+}
+
+/* Order of the Taylor terms with some further sines. */
+LANES_INLINE int order_with(int further)
+{
+    return further ? VI_SINE_ORDER : VI_LANE_ORDER;
 }
 
 /* Taylor coefficients of q about the middle of the pair that begins in a state, in its share less MIDDLE. */
-LANES_INLINE void expand(const vi_lane_group *g, int at, const state *s, vector term[])
+LANES_INLINE void expand(const vi_lane_group *g, int at, int further, const state *s, const phases *of, vector term[])
 {
 #pragma GCC unroll 16
     for (int n = 0; n <= VI_LANE_ORDER; ++n) {
         term[n] = linear(g->one.middle[n], at, s);
     }
+    if (further) {
+#pragma GCC unroll 4
+        for (int n = VI_LANE_ORDER + 1; n <= VI_SINE_ORDER; ++n) {
+            term[n] = all(0.0);
+        }
+        add_sines(g->sines->middle, 1, VI_SINE_ORDER + 1, at, further, of, term);
+    }
 }
 
 /* Added value of a polynomial beyond its first term, and its slope. Odd and even powers are summed apart, which halves
  * the chain of operations. */
-LANES_INLINE void evaluate(const vector term[], vector share, vector *added, vector *slope)
+LANES_INLINE void evaluate(const vector term[], int order, vector share, vector *added, vector *slope)
 {
     const vector square = share * share;
-    vector odd = term[VI_LANE_ORDER - 1], odd_slope = (double)(VI_LANE_ORDER - 1) * odd;
-    vector even = term[VI_LANE_ORDER], even_slope = (double)VI_LANE_ORDER * even;
+    vector odd = term[order - 1], odd_slope = (double)(order - 1) * odd;
+    vector even = term[order], even_slope = (double)order * even;
 #pragma GCC unroll 16
-    for (int n = VI_LANE_ORDER - 3; n >= 1; n -= 2) {
+    for (int n = order - 3; n >= 1; n -= 2) {
         odd = odd * square + term[n];
         odd_slope = odd_slope * square + (double)n * term[n];
         even = even * square + term[n + 1];
@@ -142,9 +197,8 @@ LANES_INLINE void evaluate(const vector term[], vector share, vector *added, vec
 }
 
 /* Half the second derivative of a polynomial. */
-LANES_INLINE vector half_bend(const vector term[], vector share)
+LANES_INLINE vector half_bend(const vector term[], int last, vector share)
 {
-    const int last = VI_LANE_ORDER;
     const vector square = share * share;
     vector odd = (double)((last - 1) * (last - 2) / 2) * term[last - 1];
     vector even = (double)(last * (last - 1) / 2) * term[last];

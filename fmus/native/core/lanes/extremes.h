@@ -25,7 +25,8 @@ typedef struct {
     double most[SIDES];
 } range;
 
-/* Cells that may have a crest: their starts, lengths, sides (1, -1), bounds of the fourth derivative of q. */
+/* Cells that may have a crest: their starts, lengths, sides (1, -1), bounds of the fourth derivative of q. Their instants
+ * are set for further sines. */
 typedef struct {
     _Alignas(64) double q[VI_WIDTH];
     _Alignas(64) double p[VI_WIDTH];
@@ -34,6 +35,8 @@ typedef struct {
     _Alignas(64) double length[VI_WIDTH];
     _Alignas(64) double side[VI_WIDTH];
     _Alignas(64) double fourth[VI_WIDTH];
+    _Alignas(64) double periods[VI_WIDTH];
+    _Alignas(64) double rest[VI_WIDTH];
     int32_t period[VI_WIDTH];
     int count;
 } crests;
@@ -56,7 +59,7 @@ typedef struct {
 LANES_INLINE bounds bound_lane(const vi_lane_group *g, int lane, const state *s)
 {
     const double k = g->one.stiffness[lane], loads = g->one.load[lane], drag = g->one.drag[lane];
-    const double w = g->angular_frequency[lane], cell = g->cell[lane], square = cell * cell;
+    const double w = g->one.fastest_load[lane], cell = g->cell[lane], square = cell * cell;
     const vector norm = root(s->p * s->p + k * (s->q * s->q)) + loads * g->one.span[lane];
     const vector second = loads + g->one.root_rate[lane] * norm;
     const vector third = w * loads + (drag * second + k * norm);
@@ -78,17 +81,19 @@ static void compute_crests(extremes *e)
     crests *c = &e->waiting;
     const state start = {load(c->q), load(c->p), load(c->cosine), load(c->sine)};
     const vector length = load(c->length), side = load(c->side), bend = load(c->fourth) * (1.0 / 16.0) * (length * length);
-    vector term[VI_LANE_ORDER + 1], added, slope;
-    expand_of_lane(e->g, e->lane, &start, term);
-    evaluate(term, length, &added, &slope);
+    vector term[VI_SINE_ORDER + 1], added, slope;
+    phases of;
+    phases_of_lane(e->g, e->lane, vi_further_sines(e->g), load(c->periods), load(c->rest), &of);
+    expand_of_lane(e->g, e->lane, &start, &of, term);
+    evaluate_of_lane(e->g, term, length, &added, &slope);
     const vector first = -side * term[1], last = -side * slope;
-    const vector half = -side * term[2], end_half = -side * half_bend(term, length);
+    const vector half = -side * term[2], end_half = -side * half_bend_of_lane(e->g, term, length);
     const mask bent = (smaller(half, end_half) > bend) | (larger(half, end_half) < -bend);
     const mask turns = bent & (half > 0.0) & (first < 0.0) & (last >= 0.0);
     vector share = first_guess(first, 2.0 * half, last, 2.0 * end_half, length), value = share, step = share;
     for (int i = 0; i < 2; ++i) {
-        evaluate(term, share, &added, &slope);
-        step = -0.5 * slope / half_bend(term, share);
+        evaluate_of_lane(e->g, term, share, &added, &slope);
+        step = -0.5 * slope / half_bend_of_lane(e->g, term, share);
         value = term[0] + (added + 0.5 * (slope * step));
         share = smaller(larger(share + step, all(0.0)), length);
     }
@@ -98,8 +103,8 @@ static void compute_crests(extremes *e)
         if (sure[i]) {
             reach(e, c->period[i], of, value[i]);
         } else if (careful[i]) {
-            vi_lane_cell cell;
-            for (int n = 0; n <= VI_LANE_ORDER; ++n) {
+            vi_lane_cell cell = {.order = order_with(vi_further_sines(e->g))};
+            for (int n = 0; n <= cell.order; ++n) {
                 cell.term[n] = term[n][i];
             }
             reach(e, c->period[i], of, c->side[i] * vi_lane_cell_crest(&cell, c->side[i], c->length[i]));
@@ -112,11 +117,18 @@ static void compute_crests(extremes *e)
 typedef struct {
     int32_t period[VI_WIDTH];
     vector cells, whole, end_q;
+    vector periods, rest;                               /* of the clock at the starts */
     int segments;
     state segment[MOST_SEGMENTS];                       /* at its start */
     vector q[MOST_SEGMENTS * VI_CELLS + 1];             /* at the ends of cells */
     vector highest[MOST_SEGMENTS], lowest[MOST_SEGMENTS]; /* of a segment's ends of cells */
 } stretch;
+
+/* Seconds of the clock's period some cells after the starts of the flights. */
+LANES_INLINE vector rest_after(const vi_lane_group *g, int lane, const stretch *s, int cells)
+{
+    return s->rest + (double)cells * g->cell[lane];
+}
 
 /* Compute the displacements at the ends of the cells. */
 LANES_INLINE void pass_cells(const vi_lane_group *g, int lane, stretch *s)
@@ -126,10 +138,17 @@ LANES_INLINE void pass_cells(const vi_lane_group *g, int lane, stretch *s)
         const int segment = s->segments - 1, first = segment * VI_CELLS;
         const state *now = &s->segment[segment];
         const bool is_whole = !any(s->whole < (double)(first + VI_CELLS));
+        const int further = vi_further_sines(g);
+        phases of;
+        phases_of_lane(g, lane, further, s->periods, rest_after(g, lane, s, first), &of);
         vector highest = larger(s->q[first], s->end_q), lowest = smaller(s->q[first], s->end_q);
 #pragma GCC unroll 8
         for (int i = 1; i <= VI_CELLS; ++i) {
-            vector q = s->q[first + i] = row_of_lane(g->one.end_q[i], lane, now);
+            vector q = row_of_lane(g->one.end_q[i], lane, now);
+            if (further) {
+                add_sines_of_lane(g->sines->end_q + i, 1, lane, further, &of, &q);
+            }
+            s->q[first + i] = q;
             if (!is_whole) {
                 q = choose(s->whole >= (double)(first + i), q, s->end_q);
             }
@@ -141,14 +160,15 @@ LANES_INLINE void pass_cells(const vi_lane_group *g, int lane, stretch *s)
         if (s->segments == MOST_SEGMENTS || !any(s->cells > (double)(first + VI_CELLS))) {
             return;
         }
-        s->segment[s->segments] = after_all_cells(&g->one, lane, now);
+        s->segment[s->segments] = after_cells(g, lane, VI_CELLS, now, &of);
     }
 }
 
 /* Put the cells of some flights in line for their crests. */
-static inline void put_in_line(extremes *e, const state *start, const stretch *s, vector length, vector fourth, int side,
-                               mask where)
+static inline void put_in_line(extremes *e, const state *start, const stretch *s, int cell, vector length, vector fourth,
+                               int side, mask where)
 {
+    const vector rest = rest_after(e->g, e->lane, s, cell);
     crests *c = &e->waiting;
     for (int n = 0; n < VI_WIDTH; ++n) {
         if (where[n]) {
@@ -160,12 +180,27 @@ static inline void put_in_line(extremes *e, const state *start, const stretch *s
             c->length[to] = length[n];
             c->side[to] = side == UPPER ? 1.0 : -1.0;
             c->fourth[to] = fourth[n];
+            c->periods[to] = s->periods[n];
+            c->rest[to] = rest[n];
             c->period[to] = s->period[n];
             if (c->count == VI_WIDTH) {
                 compute_crests(e);
             }
         }
     }
+}
+
+/* Velocity some cells after the start of a segment. */
+LANES_INLINE vector speed_after(const extremes *e, const stretch *s, int segment, int cells)
+{
+    const int further = vi_further_sines(e->g);
+    vector p = row_of_lane(e->g->one.end_p[cells], e->lane, &s->segment[segment]);
+    if (further) {
+        phases of;
+        phases_of_lane(e->g, e->lane, further, s->periods, rest_after(e->g, e->lane, s, segment * VI_CELLS), &of);
+        add_sines_of_lane(e->g->sines->end_p + cells, 1, e->lane, further, &of, &p);
+    }
+    return p;
 }
 
 /* Look for crests in cell `i`, from 1, of a segment, for some flights of each side.
@@ -177,8 +212,8 @@ LANES_INLINE void look_into(extremes *e, const stretch *s, int segment, int i, c
     const vi_lane_group *g = e->g;
     const state *now = &s->segment[segment];
     const int cell = segment * VI_CELLS + i - 1;
-    state start = {s->q[cell], i == 1 ? now->p : row_of_lane(g->one.end_p[i - 1], e->lane, now), now->cosine, now->sine};
-    const vector end_p = row_of_lane(g->one.end_p[i], e->lane, now), third = b->third * g->cell_rate[e->lane];
+    state start = {s->q[cell], i == 1 ? now->p : speed_after(e, s, segment, i - 1), now->cosine, now->sine};
+    const vector end_p = speed_after(e, s, segment, i), third = b->third * g->cell_rate[e->lane];
     const mask steady = (smaller(start.p, end_p) > 0.125 * third) | (larger(start.p, end_p) < -0.125 * third);
     const mask bends = ~steady & ~(size_of(end_p - start.p) > 0.5 * third);
     const mask here[SIDES] = {may[UPPER] & (bends | ((start.p > 0.0) & (end_p < 0.0))),
@@ -190,7 +225,7 @@ LANES_INLINE void look_into(extremes *e, const stretch *s, int segment, int i, c
     turn_on(&g->one, e->lane, i - 1, now, &start.cosine, &start.sine);
     for (int side = 0; side < SIDES; ++side) {
         if (any(here[side])) {
-            put_in_line(e, &start, s, length, b->fourth, side, here[side]);
+            put_in_line(e, &start, s, cell, length, b->fourth, side, here[side]);
         }
     }
 }
@@ -258,6 +293,8 @@ LANES_INLINE void begin_stretch(extremes *e, const int32_t order[], stretch *s)
     s->cells = pick(w->cells, order);
     s->whole = whole_part(s->cells);
     s->end_q = pick(w->end_q, order);
+    s->periods = pick(w->periods, order);
+    s->rest = pick(w->rest, order);
     pass_cells(e->g, e->lane, s);
     vector highest = s->highest[0], lowest = s->lowest[0];
     for (int segment = 1; segment < s->segments; ++segment) {

@@ -11,8 +11,8 @@ enum { MOST_SEARCHED = 400 };
 
 void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacement, double *slope)
 {
-    double x = cell->term[VI_LANE_ORDER], v = (double)VI_LANE_ORDER * x;
-    for (int n = VI_LANE_ORDER - 1; n >= 1; --n) {
+    double x = cell->term[cell->order], v = (double)cell->order * x;
+    for (int n = cell->order - 1; n >= 1; --n) {
         x = x * share + cell->term[n];
         v = v * share + n * cell->term[n];
     }
@@ -24,7 +24,7 @@ void vi_lane_cell_at(const vi_lane_cell *cell, double share, double *displacemen
 static double bound_of(const vi_lane_cell *cell, int order)
 {
     double sum = 0.0;
-    for (int n = order; n <= VI_LANE_ORDER; ++n) {
+    for (int n = order; n <= cell->order; ++n) {
         double factor = fabs(cell->term[n]);
         for (int i = 0; i < order; ++i) {
             factor *= n - i;
@@ -37,8 +37,8 @@ static double bound_of(const vi_lane_cell *cell, int order)
 /* The motion towards a zero of sign * displacement, from below. */
 static vi_approach approach_at(const vi_lane_cell *cell, double sign, double share, double bound)
 {
-    double x = cell->term[VI_LANE_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
-    for (int n = VI_LANE_ORDER - 1; n >= 0; --n) {
+    double x = cell->term[cell->order], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    for (int n = cell->order - 1; n >= 0; --n) {
         j = j * share + a;
         a = a * share + v;
         v = v * share + x;
@@ -79,8 +79,8 @@ vi_cell_result vi_lane_cell_search(const vi_lane_cell *cell, double scale, doubl
 /* Largest sign * q over the cell up to `end`, if it may lie inside: visits the zeros of the velocity one by one. */
 static double crest(const vi_lane_cell *cell, double sign, double end)
 {
-    vi_lane_cell speed = {{0.0}}; /* slope of the cell as a polynomial */
-    for (int n = 1; n <= VI_LANE_ORDER; ++n) {
+    vi_lane_cell speed = {{0.0}, cell->order}; /* slope of the cell as a polynomial */
+    for (int n = 1; n <= cell->order; ++n) {
         speed.term[n - 1] = n * cell->term[n];
     }
     const double bound = bound_of(&speed, 4);
@@ -108,8 +108,8 @@ static double single_crest(const vi_lane_cell *cell, double sign, double end, do
 {
     double low = 0.0, high = end, at = end * first / (first - last), q = 0.0;
     for (int evaluation = 0; evaluation < 60; ++evaluation) {
-        double v = 0.0, a = 0.0, x = cell->term[VI_LANE_ORDER];
-        for (int n = VI_LANE_ORDER - 1; n >= 0; --n) {
+        double v = 0.0, a = 0.0, x = cell->term[cell->order];
+        for (int n = cell->order - 1; n >= 0; --n) {
             a = a * at + v;
             v = v * at + x;
             x = x * at + cell->term[n];

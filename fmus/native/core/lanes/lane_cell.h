@@ -6,7 +6,8 @@
 
 /* Taylor terms of a displacement over the share of the cell. */
 typedef struct {
-    double term[VI_LANE_ORDER + 1];
+    double term[VI_SINE_ORDER + 1];
+    int order; /* of the last term */
 } vi_lane_cell;
 
 /* Result of a careful search. */

@@ -8,13 +8,15 @@
 #ifndef VIBROIMPACT_LANE_GROUP_H
 #define VIBROIMPACT_LANE_GROUP_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "lanes/lane_points.h"
 
 /* VI_CELLS: of a round. VI_PAIRS: pairs of cells of a round of one mode between rigid stops; they reach over a period of
- * the fastest rate. VI_NEAR_PAIRS: first ones, with bounds of their own. VI_LANE_ORDER: of the Taylor series. */
-enum { VI_LANES = 8, VI_CELLS = 8, VI_PAIRS = 9, VI_NEAR_PAIRS = 4, VI_LANE_ORDER = 14 };
+ * the fastest rate. VI_NEAR_PAIRS: first ones, with bounds of their own. VI_LANE_ORDER: of the Taylor series.
+ * VI_SINE_ORDER: of those of further sines of one mode, whose frequencies may be higher. */
+enum { VI_LANES = 8, VI_CELLS = 8, VI_PAIRS = 9, VI_NEAR_PAIRS = 4, VI_LANE_ORDER = 14, VI_SINE_ORDER = 18 };
 
 /* Speed of a rebound, relative to the largest approach, below which a chatter may end, as in chatter.c. */
 #define VI_LANE_TAIL 1e-4
@@ -46,9 +48,30 @@ typedef struct {
     vi_lane_array end_q[2 * VI_PAIRS + 1][VI_PARTS], end_p[2 * VI_PAIRS + 1][VI_PARTS];
     vi_lane_array turn_cosine[2 * VI_PAIRS + 1], turn_sine[2 * VI_PAIRS + 1];
     vi_lane_array stiffness, drag, root_rate; /* 2 decay, 2 decay + natural */
-    vi_lane_array load;                       /* |force| + |held| */
+    vi_lane_array load, fastest_load;         /* |forces| + |held|; largest angular frequency of a force */
     vi_lane_array span;                       /* VI_CELLS cells, s */
 } vi_one_mode;
+
+/* Parts in which a motion is linear for each further sine. */
+enum { VI_OF_ITS_COSINE, VI_OF_ITS_SINE, VI_SINE_PARTS };
+
+/* Sines of the lanes besides the first: their phases from the clock, and their shares of the tables of a body. */
+typedef struct vi_lane_sines {
+    vi_lane_array angular_frequency[VI_FURTHER_SINES], rate[VI_FURTHER_SINES]; /* rad/s; turns in a second */
+    vi_lane_array turn[VI_FURTHER_SINES];     /* at the start of the clock's period 0 */
+    /* Turns in a period of the clock, less whole turns: multiples of 2^-27 and of 2^-54, and a rest. Products of the
+     * first two with a number of periods are exact. */
+    vi_lane_array turns[VI_FURTHER_SINES][3];
+    /* of one mode, as in vi_one_mode */
+    vi_lane_array taylor[VI_SINE_ORDER + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
+    vi_lane_array middle[VI_SINE_ORDER + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
+    vi_lane_array end_q[2 * VI_PAIRS + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
+    vi_lane_array end_p[2 * VI_PAIRS + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
+    vi_lane_array turned[2 * VI_PAIRS + 1][VI_FURTHER_SINES][VI_SINE_PARTS]; /* cosine and sine of its own turn */
+    /* of several modes: the steady response of each real mode */
+    vi_lane_array steady[VI_FURTHER_SINES][VI_REAL_MODES][VI_SINE_PARTS];
+    int64_t count;                            /* of further sines; the members before it are arrays over the lanes */
+} vi_lane_sines;
 
 /* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */
 typedef struct {
@@ -145,8 +168,10 @@ enum { VI_FLIGHTS = 64, VI_STROBES_OF_ROUND = 3 };
 typedef struct {
     double q[VI_FLIGHTS], p[VI_FLIGHTS], cosine[VI_FLIGHTS], sine[VI_FLIGHTS]; /* at the start */
     double cells[VI_FLIGHTS], end_q[VI_FLIGHTS];
+    double periods[VI_FLIGHTS], rest[VI_FLIGHTS]; /* of the clock at the start, for further sines */
     /* strobes: the start of the round, cells up to the strobe, whole periods of the clock, impacts before it */
     double from_q[VI_FLIGHTS], from_p[VI_FLIGHTS], from_cosine[VI_FLIGHTS], from_sine[VI_FLIGHTS];
+    double from_periods[VI_FLIGHTS], from_rest[VI_FLIGHTS];
     double strobe_cells[VI_FLIGHTS], turn[VI_FLIGHTS], impacts[VI_FLIGHTS];
     int32_t strobes_before[VI_FLIGHTS];       /* of each flight */
     int32_t flight_before[VI_FLIGHTS];        /* of each strobe; the next flight begins there */
@@ -189,12 +214,26 @@ typedef struct {
     vi_many_modes many;
     vi_waiting_flights waiting[VI_LANES];     /* the members before it are arrays over the lanes */
     struct vi_lane_coupling *coupling;        /* workspace of bodies whose damping couples their modes; else NULL */
+    vi_lane_sines *sines;                     /* further sines; NULL without one */
 } vi_lane_group;
 
-/* Number of real modes of a body. */
-static inline int vi_real_modes(const vi_lanes_plan *plan)
+/* Number of real modes of a body alone. */
+static inline int vi_own_modes(const vi_lanes_plan *plan)
 {
     return plan->coupled ? 2 * plan->modes : plan->modes;
+}
+
+/* Number of real modes in a lane. Beside several modes each further sine is two undamped modes: its cosine and its sine.
+ * Their shapes are the steady responses of the points. */
+static inline int vi_real_modes(const vi_lanes_plan *plan)
+{
+    return vi_own_modes(plan) + (plan->modes > 1 ? 2 * plan->further : 0);
+}
+
+/* Number of further sines. */
+static inline int vi_further_sines(const vi_lane_group *group)
+{
+    return group->sines == NULL ? 0 : (int)group->sines->count;
 }
 
 /* Most rounds in a row, each of which writes at most one impact of a lane. */

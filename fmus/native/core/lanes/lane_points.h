@@ -8,6 +8,11 @@
  * VI_REAL_MODES: real modes, two for each mode where damping couples the modes. */
 enum { VI_LANES_MODES = 8, VI_REAL_MODES = 2 * VI_LANES_MODES, VI_LANES_CONTACTS = 4, VI_ONE_MODE_CONTACTS = 2 };
 
+/* Most sines of a point besides the first, and most whole periods of its clock with further sines: their phases are then
+ * exact to rounding. */
+enum { VI_FURTHER_SINES = 7 };
+#define VI_MOST_TURNS 67108864.0
+
 /* Columns of a row of an impact: time (s), phase (rad), approach (m/s), impulse (N s), contact (from 1), restitution,
  * duration (s), largest force (N).
  *
@@ -38,6 +43,8 @@ typedef struct {
     int32_t each_period; /* 0: a single row stands for all periods of a point */
     int32_t instructions;
     int32_t coupled;      /* 1: `coupling` of the points is read, and damping may couple their modes */
+    int32_t further;      /* sines besides the first, 0 to VI_FURTHER_SINES; of several modes, two of them count as a mode
+                             each: see vi_real_modes */
     int64_t impact_limit; /* of a run; 0: no limit */
     int64_t yielding;     /* sum of 2^c over the contacts c that are stops that yield, of one mode; others are rigid */
     int64_t sampled;      /* sum of 2^c over the sampled contacts c, and 2^VI_LANES_CONTACTS for the observed point */
@@ -49,11 +56,14 @@ typedef struct {
  * A mode is q'' + 2 decay q' + stiffness q = force cos(phase) + held. A displacement is shape . q, and an impulse of 1
  * N s at a contact adds `impulse` to q'. So modes are mass-normalised; for a single mass q may be its displacement
  * (shape 1, impulse 1/mass). A force of angular frequency 0 is constant.
+ * Further sines add force cos(phase) each, with frequencies of their own; the first sine keeps the clock.
  */
 typedef struct {
     int64_t count;
     const double *stiffness, *decay, *force, *held; /* [mode][point] 1/s^2, 1/s; force and held load per unit modal mass */
     const double *angular_frequency, *phase;        /* of the force at time 0, rad/s, rad */
+    const double *further_force;                    /* [further][mode][point] forces of the further sines */
+    const double *further_frequency, *further_phase; /* [further][point] of them, rad/s, rad */
     const double *shape, *impulse;                  /* [contact][mode][point] */
     const double *coupling;                         /* [mode][mode][point] 1/s, of 2 decay on the diagonal; see `coupled` */
     const double *observed;                         /* [mode][point] shape of the observed point */

@@ -7,6 +7,7 @@
 #include "contact/contact_law.h"
 #include "door/runs.h"
 #include "lanes/lane_record.h"
+#include "lanes/lane_sines.h"
 #include "lanes/sampling.h"
 #include "lanes/yielding.h"
 #include "motion/majorant.h"
@@ -254,6 +255,12 @@ void vi_lane_idle(vi_lanes_work *w, int lane)
         all[i] = 0.0;
     }
     vi_lane_group *g = w->group;
+    if (g->sines != NULL) {
+        double *of_sines = (double *)g->sines;
+        for (size_t i = (size_t)lane; i < offsetof(vi_lane_sines, count) / sizeof *of_sines; i += VI_LANES) {
+            of_sines[i] = 0.0;
+        }
+    }
     w->run[lane].point = -1;
     g->cell_rate[lane] = g->period[lane] = g->many.present.rate[lane] = g->yielding.cell_rate[0][lane] = 1.0;
     g->goal_periods[lane] = 1e300;
@@ -277,6 +284,7 @@ static bool take_time(const vi_lanes_work *w, int lane, int64_t point)
         || !vi_clock_instant(&run->clock, 0.0, 0.0, &start)
         || !vi_clock_instant(&run->clock, p->begin[point], 0.0, &run->begin)
         || !vi_clock_instant(&run->clock, p->end[point], 0.0, &run->end)
+        || !vi_lane_take_sines(w->group, lane, p, point, &run->clock, run->end.periods)
         || (w->plan->periods && w->plan->each_period && run->end.periods - run->begin.periods > p->most_periods)) {
         return false;
     }

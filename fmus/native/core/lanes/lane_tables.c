@@ -1,6 +1,7 @@
 #include "lanes/lane_tables.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 /* State (q, p, cosine, sine) after some cells, as rows over (q, p, cosine, sine, 1). */
 typedef struct {
@@ -9,7 +10,7 @@ typedef struct {
 } step;
 
 /* Taylor terms of q over the share of the cell, for one part of the state, from the equation of motion. */
-static void expand(const vi_lane_mode *mode, double cell, int part, double term[VI_LANE_ORDER + 1])
+static void expand(const vi_lane_mode *mode, double cell, int part, int order, double term[])
 {
     const double square = cell * cell, turn = mode->angular_frequency * cell, turn_square = turn * turn;
     const double drag = 2.0 * mode->decay * cell, spring = mode->stiffness * square;
@@ -18,7 +19,7 @@ static void expand(const vi_lane_mode *mode, double cell, int part, double term[
     drive[1] = part == VI_OF_SINE ? -(mode->force * square) * turn : 0.0;
     term[0] = part == VI_OF_Q ? 1.0 : 0.0;
     term[1] = part == VI_OF_P ? cell : 0.0;
-    for (int n = 0; n + 2 <= VI_LANE_ORDER; ++n) {
+    for (int n = 0; n + 2 <= order; ++n) {
         const double share = 1.0 / ((n + 1.0) * (n + 2.0));
         const double held = n == 0 && part == VI_OF_ONE ? mode->held * square : 0.0;
         term[n + 2] = (((drive[0] + held) - drag * (n + 1.0) * term[n + 1]) - spring * term[n]) * share;
@@ -29,11 +30,11 @@ static void expand(const vi_lane_mode *mode, double cell, int part, double term[
 }
 
 /* Cosine and sine of the force's turn over a cell. */
-static void turn_of(double angle, double *cosine, double *sine)
+static void turn_of(double angle, int order, double *cosine, double *sine)
 {
     const double square = angle * angle;
     double c = 0.0, s = 0.0;
-    for (int n = VI_LANE_ORDER; n >= 2; n -= 2) {
+    for (int n = order; n >= 2; n -= 2) {
         c = (1.0 + c) * (-square / (n * (n - 1.0)));
         s = (1.0 + s) * (-square / (n * (n + 1.0)));
     }
@@ -85,6 +86,8 @@ static step stored(const vi_one_mode *tables, int lane, int cells)
     return s;
 }
 
+/* ---- bounds ---- */
+
 /* Bounds of q and p at the ends of some pairs: a number, and factors of |q| and |p| at the start. */
 typedef struct {
     double q[3], p[3];
@@ -111,25 +114,31 @@ static void reach_row(const vi_lane_array rows[][VI_PARTS], int lane, int pairs,
 }
 
 /* Bounds over a pair, in units of the pair, from q'' + drag q' + spring q = force cos + held. Inside a pair q exceeds its
- * ends by an eighth of the largest q'', and q' by half of it. */
-static void bound_pairs(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double pair, int far)
+ * ends by an eighth of the largest q'', and q' by half of it. `q`, `p`: bounds at the ends; loaded: do loads count? */
+static void bound_pair(const vi_lane_mode *mode, double pair, double q, double p, bool loaded, double *third,
+                       double *fourth)
 {
     const double square = pair * pair, turn = mode->angular_frequency * pair, drag = 2.0 * mode->decay * pair;
     const double spring = mode->stiffness * square, force = fabs(mode->force) * square, held = fabs(mode->held) * square;
     const double stiff = drag * drag - spring; /* q''' = force' - drag force + stiff q' + drag spring q */
     const double room = 1.0 / (1.0 - 0.5 * drag - 0.125 * spring), bend = stiff - turn * turn;
-    const double third = force * sqrt(turn * turn + drag * drag) + held * drag;
-    const double fourth = force * sqrt(bend * bend + turn * turn * drag * drag) + held * fabs(stiff);
+    const double own_third = force * sqrt(turn * turn + drag * drag) + held * drag;
+    const double own_fourth = force * sqrt(bend * bend + turn * turn * drag * drag) + held * fabs(stiff);
+    const double speed = pair * p, own = drag * speed + spring * q;
+    const double second = ((loaded ? force + held : 0.0) + own) * room;
+    const double slope = speed + 0.5 * second, size = q + 0.125 * second;
+    *third = (loaded ? own_third : 0.0) + (fabs(stiff) * slope + drag * spring * size);
+    *fourth = (loaded ? own_fourth : 0.0) + (drag * fabs(spring - stiff) * slope + spring * fabs(stiff) * size);
+}
+
+static void bound_pairs(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double pair, int far)
+{
     reach ends;
     reach_row(tables->end_q, lane, far ? VI_PAIRS : VI_NEAR_PAIRS, ends.q);
     reach_row(tables->end_p, lane, far ? VI_PAIRS : VI_NEAR_PAIRS, ends.p);
     for (int i = 0; i < 3; ++i) {
-        const double p = pair * ends.p[i], own = drag * p + spring * ends.q[i];
-        const double second = ((i == 0 ? force + held : 0.0) + own) * room;
-        const double slope = p + 0.5 * second, size = ends.q[i] + 0.125 * second;
-        tables->third_by[far][i][lane] = (i == 0 ? third : 0.0) + (fabs(stiff) * slope + drag * spring * size);
-        tables->fourth_by[far][i][lane] = (i == 0 ? fourth : 0.0)
-                                          + (drag * fabs(spring - stiff) * slope + spring * fabs(stiff) * size);
+        bound_pair(mode, pair, ends.q[i], ends.p[i], i == 0, &tables->third_by[far][i][lane],
+                   &tables->fourth_by[far][i][lane]);
     }
 }
 
@@ -161,7 +170,7 @@ void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, dou
     after[0] = (step){.q = {[VI_OF_Q] = 1.0}, .p = {[VI_OF_P] = 1.0}, .cosine = 1.0, .sine = 0.0};
     for (int part = 0; part < VI_PARTS; ++part) {
         double term[VI_LANE_ORDER + 1], q = 0.0, slope = 0.0;
-        expand(mode, cell, part, term);
+        expand(mode, cell, part, VI_LANE_ORDER, term);
         for (int n = VI_LANE_ORDER; n >= 0; --n) { /* smallest terms first */
             q += term[n];
             slope += n * term[n];
@@ -170,7 +179,7 @@ void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, dou
         after[1].q[part] = q;
         after[1].p[part] = slope / cell;
     }
-    turn_of(mode->angular_frequency * cell, &after[1].cosine, &after[1].sine);
+    turn_of(mode->angular_frequency * cell, VI_LANE_ORDER, &after[1].cosine, &after[1].sine);
     for (int i = 2; i <= VI_CELLS; ++i) {
         after[i] = joined(&after[i - i / 2], &after[i / 2]); /* fewest roundings */
     }
@@ -180,6 +189,94 @@ void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, dou
     tables->span[lane] = (double)VI_CELLS * cell;
     tables->stiffness[lane] = mode->stiffness;
     tables->load[lane] = fabs(mode->force) + fabs(mode->held);
+    tables->fastest_load[lane] = mode->angular_frequency;
     tables->drag[lane] = 2.0 * mode->decay;
     tables->root_rate[lane] = 2.0 * mode->decay + sqrt(mode->stiffness);
+}
+
+/* ---- further sines ---- */
+
+/* The step over a cell of a mode under a further sine, from that of the mode; sets the Taylor terms of the sine. */
+static step sine_cell(const vi_one_mode *tables, vi_lane_sines *sines, int further, int lane, const vi_lane_mode *mode,
+                      double cell)
+{
+    step after = stored(tables, lane, 1);
+    after.q[VI_OF_ONE] = after.p[VI_OF_ONE] = 0.0;
+    for (int part = 0; part < VI_SINE_PARTS; ++part) {
+        double term[VI_SINE_ORDER + 1], q = 0.0, slope = 0.0;
+        expand(mode, cell, VI_OF_COSINE + part, VI_SINE_ORDER, term);
+        for (int n = VI_SINE_ORDER; n >= 0; --n) {
+            q += term[n];
+            slope += n * term[n];
+            sines->taylor[n][further][part][lane] = term[n];
+        }
+        after.q[VI_OF_COSINE + part] = q;
+        after.p[VI_OF_COSINE + part] = slope / cell;
+    }
+    turn_of(mode->angular_frequency * cell, VI_SINE_ORDER, &after.cosine, &after.sine);
+    return after;
+}
+
+/* Set the Taylor terms of a further sine about the middles of pairs. */
+static void sine_middles(const vi_one_mode *tables, vi_lane_sines *sines, int further, int lane, const step *one)
+{
+    double scale = 1.0;
+    for (int n = 0; n <= VI_SINE_ORDER; ++n, scale *= 2.0) {
+        const vi_lane_array *own = tables->taylor[n], *its = sines->taylor[n][further];
+        const bool has_own = n <= VI_LANE_ORDER;
+        const double term[VI_PARTS] = {has_own ? scale * own[VI_OF_Q][lane] : 0.0,
+                                       has_own ? scale * own[VI_OF_P][lane] : 0.0,
+                                       scale * its[VI_OF_ITS_COSINE][lane], scale * its[VI_OF_ITS_SINE][lane], 0.0};
+        double middle[VI_PARTS];
+        shift(one, term, middle);
+        for (int part = 0; part < VI_SINE_PARTS; ++part) {
+            sines->middle[n][further][part][lane] = middle[VI_OF_COSINE + part];
+        }
+    }
+}
+
+static double size_of(const vi_lane_array its[VI_SINE_PARTS], int lane)
+{
+    const double c = its[VI_OF_ITS_COSINE][lane], s = its[VI_OF_ITS_SINE][lane];
+    return sqrt(c * c + s * s);
+}
+
+/* Add the numbers of a further sine to the bounds over pairs. */
+static void bound_sine(vi_one_mode *tables, const vi_lane_sines *sines, int further, int lane, const vi_lane_mode *mode,
+                       double pair, int far)
+{
+    double q = 0.0, p = 0.0, third, fourth;
+    for (int i = 0; i <= 2 * (far ? VI_PAIRS : VI_NEAR_PAIRS); i += 2) {
+        q = larger_of(q, size_of(sines->end_q[i][further], lane));
+        p = larger_of(p, size_of(sines->end_p[i][further], lane));
+    }
+    bound_pair(mode, pair, q, p, true, &third, &fourth);
+    tables->third_by[far][0][lane] += third;
+    tables->fourth_by[far][0][lane] += fourth;
+}
+
+void vi_lane_sine_tables(vi_one_mode *tables, vi_lane_sines *sines, int further, int lane, const vi_lane_mode *mode,
+                         double cell)
+{
+    step after[2 * VI_PAIRS + 1];
+    after[0] = (step){.q = {[VI_OF_Q] = 1.0}, .p = {[VI_OF_P] = 1.0}, .cosine = 1.0, .sine = 0.0};
+    after[1] = sine_cell(tables, sines, further, lane, mode, cell);
+    for (int i = 2; i <= VI_CELLS; ++i) {
+        after[i] = joined(&after[i - i / 2], &after[i / 2]);
+    }
+    for (int i = VI_CELLS + 2; i <= 2 * VI_PAIRS; i += 2) {
+        after[i] = joined(&after[i - VI_CELLS], &after[VI_CELLS]);
+    }
+    for (int i = 0; i <= 2 * VI_PAIRS; i += i < VI_CELLS ? 1 : 2) {
+        for (int part = 0; part < VI_SINE_PARTS; ++part) {
+            sines->end_q[i][further][part][lane] = after[i].q[VI_OF_COSINE + part];
+            sines->end_p[i][further][part][lane] = after[i].p[VI_OF_COSINE + part];
+            sines->turned[i][further][part][lane] = part == VI_OF_ITS_COSINE ? after[i].cosine : after[i].sine;
+        }
+    }
+    sine_middles(tables, sines, further, lane, &after[1]);
+    bound_sine(tables, sines, further, lane, mode, 2.0 * cell, 0);
+    bound_sine(tables, sines, further, lane, mode, 2.0 * cell, 1);
+    tables->load[lane] += fabs(mode->force);
+    tables->fastest_load[lane] = larger_of(tables->fastest_load[lane], mode->angular_frequency);
 }

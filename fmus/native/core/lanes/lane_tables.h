@@ -15,4 +15,9 @@ void vi_lane_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, dou
 /* Fill the tables of one lane for pairs of cells, after vi_lane_tables. */
 void vi_lane_pair_tables(vi_one_mode *tables, int lane, const vi_lane_mode *mode, double cell);
 
+/* Fill the tables of one lane for a further sine, whose force and angular frequency `mode` has; then its bounds cover it.
+ * After the tables of the mode and of all sines before it. */
+void vi_lane_sine_tables(vi_one_mode *tables, vi_lane_sines *sines, int further, int lane, const vi_lane_mode *mode,
+                         double cell);
+
 #endif

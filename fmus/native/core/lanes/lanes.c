@@ -24,10 +24,10 @@ typedef struct {
 
 enum { ALIGNMENT = 64 }; /* of the state, bytes */
 
-static kept_state *aligned(void *memory)
+static void *aligned(void *memory)
 {
     const uintptr_t place = ((uintptr_t)memory + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-    return (kept_state *)place;
+    return (void *)place;
 }
 
 static bool is_plan(const vi_lanes_plan *plan)
@@ -40,6 +40,10 @@ static bool is_plan(const vi_lanes_plan *plan)
     if (plan->coupled < 0 || plan->coupled > (plan->modes > 1)) {
         return false;
     }
+    if (plan->further < 0 || plan->further > VI_FURTHER_SINES || (plan->further > 0 && plan->yielding)
+        || vi_real_modes(plan) > VI_REAL_MODES) {
+        return false;
+    }
     return plan->yielding >= 0 && plan->yielding <= (plan->modes == 1 ? contacts : 0)
            && (plan->rate == 0.0 || (plan->rate > 0.0 && isfinite(plan->rate)))
            && (plan->sampled & ~(contacts | observed)) == 0 && vi_lanes_rounds_of(plan->instructions) != NULL;
@@ -47,7 +51,11 @@ static bool is_plan(const vi_lanes_plan *plan)
 
 VI_DOOR size_t vi_door_lanes_memory(const vi_lanes_plan *plan)
 {
-    return is_plan(plan) ? sizeof(kept_state) + (plan->coupled ? vi_lane_coupling_size() : 0) + ALIGNMENT : 0;
+    if (!is_plan(plan)) {
+        return 0;
+    }
+    return sizeof(kept_state) + ALIGNMENT + (plan->further ? sizeof(vi_lane_sines) + ALIGNMENT : 0)
+           + (plan->coupled ? vi_lane_coupling_size() : 0);
 }
 
 VI_DOOR int vi_door_lanes_instructions(int set)
@@ -99,8 +107,15 @@ static void begin(vi_lanes_work *work, kept_state *memory)
     }
     memset(memory, 0, sizeof *memory);
     memory->started = 1;
+    void *after = memory + 1;
+    if (work->plan->further) {
+        memory->group.sines = aligned(after);
+        memset(memory->group.sines, 0, sizeof *memory->group.sines);
+        memory->group.sines->count = work->plan->further;
+        after = memory->group.sines + 1;
+    }
     if (work->plan->coupled) {
-        memory->group.coupling = (void *)(memory + 1); /* follows the state */
+        memory->group.coupling = after;
         memset(memory->group.coupling, 0, vi_lane_coupling_size());
     }
     for (int lane = 0; lane < VI_LANES; ++lane) {

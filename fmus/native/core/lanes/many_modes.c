@@ -4,6 +4,7 @@
 
 #include "body/landing.h"
 #include "lanes/lane_body.h"
+#include "lanes/lane_sines.h"
 #include "lanes/lane_turn.h"
 #include "lanes/many_sampling.h"
 #include "lanes/many_tables.h"
@@ -84,6 +85,7 @@ static motion motion_from(const vi_lane_group *g, int lane, int modes, const pla
     for (int j = 0; j < modes; ++j) {
         const double drag = g->many.drag[j][lane], spring = g->many.spring[j][lane];
         double *term = m.mode[j].term;
+        m.mode[j].order = VI_LANE_ORDER;
         term[0] = s->q[j];
         term[1] = s->p[j] * g->cell[lane];
         for (int n = 0; n + 2 <= VI_LANE_ORDER; ++n) {
@@ -100,7 +102,7 @@ static vi_lane_cell point_motion(const vi_lane_group *g, int lane, int modes, in
     const double c = many->cosine[point][lane], n = many->sine[point][lane];
     const double turn = many->turn[lane], square = turn * turn;
     double drive[2] = {c * s->cosine + n * s->sine, turn * (n * s->cosine - c * s->sine)};
-    vi_lane_cell cell;
+    vi_lane_cell cell = {.order = VI_LANE_ORDER};
     for (int i = 0; i <= VI_LANE_ORDER; ++i) {
         cell.term[i] = drive[0] + (i == 0 ? many->offset[point][lane] : 0.0);
         const double next = -drive[0] * square / ((i + 1.0) * (i + 2.0));
@@ -115,8 +117,18 @@ static vi_lane_cell point_motion(const vi_lane_group *g, int lane, int modes, in
 
 /* ---- the careful search ---- */
 
+/* Set the modes of the further sines by the clock. */
+static void set_sines(vi_lane_group *g, int lane, int modes)
+{
+    const int further = vi_further_sines(g);
+    if (further > 0) {
+        vi_lane_set_sines(g, lane, modes - 2 * further);
+    }
+}
+
 static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts, double *share, vi_lane_meeting *met)
 {
+    set_sines(g, lane, modes);
     for (int j = 0; j < modes; ++j) {
         g->start_q[j][lane] = g->q[j][lane];
         g->start_p[j][lane] = g->p[j][lane];
@@ -266,6 +278,7 @@ static place now_of(const vi_lane_group *g, int lane, int modes)
 static void observe(vi_lane_group *g, int lane, int modes, int contacts, double *displacement, double *velocity)
 {
     (void)contacts;
+    set_sines(g, lane, modes);
     const place s = now_of(g, lane, modes);
     *displacement = point_at(g, lane, modes, VI_LANES_CONTACTS, &s, velocity);
 }
@@ -273,12 +286,20 @@ static void observe(vi_lane_group *g, int lane, int modes, int contacts, double 
 static void state(const vi_lane_group *g, int lane, const vi_lanes_plan *plan, double q[], double p[])
 {
     const vi_many_modes *many = &g->many;
-    const int modes = vi_real_modes(plan);
+    const int modes = vi_own_modes(plan);
+    const vi_lane_phases phases = vi_lane_phases_at(g, lane, g->periods[lane], g->rest[lane]);
     place s = now_of(g, lane, modes);
     for (int j = 0; j < modes; ++j) {
         const double c = many->steady_cosine[j][lane], n = many->steady_sine[j][lane];
         s.q[j] += (c * s.cosine + n * s.sine) + many->rest[j][lane];
         s.p[j] += g->angular_frequency[lane] * (n * s.cosine - c * s.sine);
+        for (int k = 0; k < plan->further; ++k) {
+            const double its_c = g->sines->steady[k][j][VI_OF_ITS_COSINE][lane];
+            const double its_n = g->sines->steady[k][j][VI_OF_ITS_SINE][lane];
+            const double cosine = phases.of[k][VI_OF_ITS_COSINE], sine = phases.of[k][VI_OF_ITS_SINE];
+            s.q[j] += its_c * cosine + its_n * sine;
+            s.p[j] += g->sines->angular_frequency[k][lane] * (its_n * cosine - its_c * sine);
+        }
     }
     for (int i = 0; i < plan->modes; ++i) {
         q[i] = plan->coupled ? 0.0 : s.q[i];

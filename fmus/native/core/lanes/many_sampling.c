@@ -9,6 +9,9 @@ void vi_lane_sample_many_from(vi_lane_group *g, int lane, int modes)
     turn(load(g->angular_frequency + lane) * load(g->rest + lane), &cosine, &sine);
     store(g->start_cosine + lane, cosine);
     store(g->start_sine + lane, sine);
+    if (g->sines != NULL) {
+        set_sines(g, lane, modes - 2 * vi_further_sines(g), vi_further_sines(g));
+    }
     for (int j = 0; j < modes; ++j) {
         g->start_q[j][lane] = g->q[j][lane];
         g->start_p[j][lane] = g->p[j][lane];

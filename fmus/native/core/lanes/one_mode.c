@@ -5,6 +5,8 @@
 
 #include "body/landing.h"
 #include "lanes/lane_body.h"
+#include "lanes/lane_sines.h"
+#include "lanes/lane_state.h"
 #include "lanes/lane_tables.h"
 #include "lanes/lane_turn.h"
 #include "lanes/sampling.h"
@@ -12,31 +14,18 @@
 
 /* Largest steady response that counts in the resolution, in units of the force's effect within one radian. */
 static const double LARGEST_STEADY = 8.0;
+/* Length of a cell, in units of 1 / frequency of a further sine; the omitted Taylor terms are below 2e-17 of its motion. */
+static const double SINE_REACH = 1.05;
 
 /* ---- the state ---- */
 
-/* Value of a table's row for the state at the start of the last round. */
-static double after_cells(const vi_lane_array row[VI_PARTS], const vi_lane_group *g, int lane)
+/* The motion of q over the cell at the present instant, at which the last round starts. */
+static vi_lane_cell present_cell(const vi_lane_group *g, int lane)
 {
-    return (row[VI_OF_Q][lane] * g->start_q[0][lane] + row[VI_OF_P][lane] * g->start_p[0][lane])
-           + ((row[VI_OF_COSINE][lane] * g->start_cosine[lane] + row[VI_OF_SINE][lane] * g->start_sine[lane])
-              + row[VI_OF_ONE][lane]);
-}
-
-/* The motion of q over the cell `passed` cells after the start of the last round. */
-static vi_lane_cell cell_after(const vi_lane_group *g, int lane, int passed)
-{
-    const vi_one_mode *one = &g->one;
-    const double q = after_cells(one->end_q[passed], g, lane), p = after_cells(one->end_p[passed], g, lane);
-    const double turn = one->turn_cosine[passed][lane], turn_sine = one->turn_sine[passed][lane];
-    const double cosine = g->start_cosine[lane] * turn - g->start_sine[lane] * turn_sine;
-    const double sine = g->start_sine[lane] * turn + g->start_cosine[lane] * turn_sine;
-    vi_lane_cell cell = {{q, p * g->cell[lane]}};
-    for (int n = 2; n <= VI_LANE_ORDER; ++n) {
-        const vi_lane_array *row = one->taylor[n];
-        cell.term[n] = (row[VI_OF_Q][lane] * q + row[VI_OF_P][lane] * p)
-                       + ((row[VI_OF_COSINE][lane] * cosine + row[VI_OF_SINE][lane] * sine) + row[VI_OF_ONE][lane]);
-    }
+    const vi_lane_state start = {g->start_q[0][lane], g->start_p[0][lane], g->start_cosine[lane], g->start_sine[lane]};
+    const vi_lane_phases phases = vi_lane_phases_at(g, lane, g->periods[lane], g->rest[lane]);
+    vi_lane_cell cell = vi_lane_cell_from(&g->one, lane, &start, g->cell[lane]);
+    vi_lane_cell_add_sines(&cell, g, lane, &phases);
     return cell;
 }
 
@@ -45,8 +34,8 @@ static vi_lane_cell cell_after(const vi_lane_group *g, int lane, int passed)
 /* The motion towards stop c. */
 static vi_lane_cell towards(const vi_lane_group *g, int lane, int c, const vi_lane_cell *cell)
 {
-    vi_lane_cell motion;
-    for (int n = 0; n <= VI_LANE_ORDER; ++n) {
+    vi_lane_cell motion = {.order = cell->order};
+    for (int n = 0; n <= cell->order; ++n) {
         motion.term[n] = g->sign[c][lane] * cell->term[n];
     }
     motion.term[0] = g->on[lane] == c + 1 ? 0.0 : motion.term[0] - g->limit[c][lane];
@@ -60,7 +49,7 @@ static vi_cell_result search(vi_lane_group *g, int lane, int modes, int contacts
     g->start_p[0][lane] = g->p[0][lane];
     vi_lane_turn(g->angular_frequency[lane] * g->rest[lane], &g->start_cosine[lane], &g->start_sine[lane]);
     g->jumped[lane] = g->passed[lane] = 0.0;
-    const vi_lane_cell cell = cell_after(g, lane, 0);
+    const vi_lane_cell cell = present_cell(g, lane);
     vi_cell_result result = VI_CELL_CLEAR;
     double slope;
     for (int c = 0; c < contacts; ++c) {
@@ -177,20 +166,42 @@ static bool take_contacts(vi_lane_group *g, int lane, int contacts, const vi_lan
     return contacts < 2 || of[0].sign == of[1].sign || of[0].limit + of[1].limit > 0.0;
 }
 
+/* Fill the tables for the further sines of a point; false for a force that is no number. */
+static bool take_sines(vi_lane_group *g, int lane, const vi_lanes_points *points, int64_t point, double cell)
+{
+    for (int k = 0; k < vi_further_sines(g); ++k) {
+        const vi_lane_mode mode = {points->stiffness[point], points->decay[point],
+                                   points->further_force[k * points->count + point], 0.0,
+                                   g->sines->angular_frequency[k][lane]};
+        if (!isfinite(mode.force)) {
+            return false;
+        }
+        vi_lane_sine_tables(&g->one, g->sines, k, lane, &mode, cell);
+    }
+    return true;
+}
+
 static bool take(vi_lane_group *g, int lane, const vi_lanes_plan *plan, const vi_lanes_points *points, int64_t point,
                  const double q[], const double p[])
 {
     vi_one_mode *one = &g->one;
     const vi_lane_mode mode = {points->stiffness[point], points->decay[point], points->force[point],
                                points->held[point], points->angular_frequency[point]};
-    const double natural = sqrt(mode.stiffness), drag = 2.0 * mode.decay;
-    const double fastest = vi_max(vi_max(natural, drag), mode.angular_frequency), period = g->period[lane];
-    const double cell = vi_lane_cell_length(vi_min(VI_CELL_REACH / fastest, VI_LONGEST_CELL * period));
+    const double natural = sqrt(mode.stiffness), drag = 2.0 * mode.decay, period = g->period[lane];
+    const double fastest = vi_max(vi_max(natural, drag), mode.angular_frequency);
+    double longest = vi_min(VI_CELL_REACH / fastest, VI_LONGEST_CELL * period);
+    for (int k = 0; k < plan->further; ++k) {
+        longest = vi_min(longest, SINE_REACH / g->sines->angular_frequency[k][lane]);
+    }
+    const double cell = vi_lane_cell_length(longest);
     if (!isfinite(mode.force) || !isfinite(mode.held) || !(cell > 0.0) || !(period <= VI_MOST_CELLS * cell)) {
         return false;
     }
     vi_lane_tables(one, lane, &mode, cell);
     vi_lane_pair_tables(one, lane, &mode, cell);
+    if (!take_sines(g, lane, points, point, cell)) {
+        return false;
+    }
     g->cell[lane] = cell;
     g->cell_rate[lane] = 1.0 / cell;
     g->q[0][lane] = q[0];

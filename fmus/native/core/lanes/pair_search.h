@@ -18,10 +18,10 @@ typedef struct {
     vector share, added, slope;
 } place;
 
-LANES_INLINE place place_at(const vector term[], vector share)
+LANES_INLINE place place_at(const vector term[], int order, vector share)
 {
     place a = {.share = share};
-    evaluate(term, share - MIDDLE, &a.added, &a.slope);
+    evaluate(term, order, share - MIDDLE, &a.added, &a.slope);
     return a;
 }
 
@@ -42,12 +42,12 @@ typedef struct {
     vector third, fourth;
 } bends;
 
-LANES_INLINE bends bends_of(const vector term[])
+LANES_INLINE bends bends_of(const vector term[], int order)
 {
     bends b = {6.0 * term[3], 24.0 * size_of(term[4])};
     double half = 0.5;
 #pragma GCC unroll 16
-    for (int n = 5; n <= VI_LANE_ORDER; ++n, half *= 0.5) {
+    for (int n = 5; n <= order; ++n, half *= 0.5) {
         b.fourth += (double)(n * (n - 1) * (n - 2) * (n - 3)) * half * size_of(term[n]);
     }
     return b;
@@ -91,10 +91,10 @@ LANES_INLINE vector third_of(const vector term[], vector share)
 }
 
 /* One step of third order (Chebyshev's) towards the contact, with the value and the slope after it. */
-LANES_INLINE place step_from(const vector term[], vector y, const place *from, const place *to, vector share, mask *found)
+LANES_INLINE place step_from(const vector term[], int order, vector y, const place *from, const place *to, vector share, mask *found)
 {
-    const place at = place_at(term, share);
-    const vector half = half_bend(term, share - MIDDLE), third = third_of(term, share), inverse = 1.0 / at.slope;
+    const place at = place_at(term, order, share);
+    const vector half = half_bend(term, VI_LANE_ORDER, share - MIDDLE), third = third_of(term, share), inverse = 1.0 / at.slope;
     const vector whole = (y + at.added) * inverse, bent = half * inverse, next = share - whole * (1.0 + whole * bent);
     place after = {.share = smaller(larger(next, from->share), to->share)};
     const vector step = after.share - share;
@@ -113,8 +113,8 @@ LANES_INLINE mask repeat_last(const vi_lane_group *g, int at, vector flown, cons
 }
 
 /* Find the contacts of some lanes, on a rising part of a pair. `y`: of the middle, in the direction of q. */
-LANES_INLINE place find_contact(const vi_lane_group *g, int at, mask hits, mask repeats, const vector term[], vector y,
-                                const place *from, const place *to)
+LANES_INLINE place find_contact(const vi_lane_group *g, int at, mask hits, mask repeats, const vector term[],
+                                int order, vector y, const place *from, const place *to)
 {
     const vector last = load(g->hit_share + at);
     place met = {.share = last};
@@ -125,7 +125,7 @@ LANES_INLINE place find_contact(const vi_lane_group *g, int at, mask hits, mask 
     }
     mask found = hits & ~hits, exact;
     for (int i = 0; i < MOST_CONTACT_STEPS && any(hits & ~found); ++i) {
-        const place next = step_from(term, y, from, to, met.share, &exact);
+        const place next = step_from(term, order, y, from, to, met.share, &exact);
         met = either_place(found, &met, &next);
         found |= exact;
     }

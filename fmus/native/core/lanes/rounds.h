@@ -49,13 +49,17 @@ LANES_INLINE flight begin_round(const vi_lane_group *g, int at)
     return f;
 }
 
-/* Displacements at the ends of the pairs ahead. */
-LANES_INLINE void ends_of_pairs(const vi_lane_group *g, int at, const flight *f, vector q[])
+/* Displacements at the ends of the pairs ahead. `of`: phases of the further sines. */
+LANES_INLINE void ends_of_pairs(const vi_lane_group *g, int at, int further, const flight *f, const phases *of,
+                                vector q[])
 {
     q[0] = f->now.q;
 #pragma GCC unroll 9
     for (int i = 1; i <= VI_PAIRS; ++i) {
         q[i] = linear(g->one.end_q[2 * i], at, &f->now);
+    }
+    if (further) {
+        add_sines(g->sines->end_q + 2, 2, VI_PAIRS, at, further, of, q + 1);
     }
 }
 
@@ -105,24 +109,31 @@ LANES_INLINE vector sure_pairs(const flight *f, int contacts, const vector count
 }
 
 /* Lanes that pass all their pairs go on from there in the same round. */
-LANES_INLINE void jump(const vi_lane_group *g, int at, mask jumps, flight *f)
+LANES_INLINE void jump(const vi_lane_group *g, int at, int further, mask jumps, const vector q[], flight *f, phases *of)
 {
-    const vector q = linear(g->one.end_q[2 * VI_PAIRS], at, &f->now), p = linear(g->one.end_p[2 * VI_PAIRS], at, &f->now);
-    const state next = turned(g, at, VI_PAIRS, q, p, &f->now);
+    vector p = linear(g->one.end_p[2 * VI_PAIRS], at, &f->now);
+    phases later = *of;
+    turn_sines(g, at, further, 2 * VI_PAIRS, &later, &p);
+    const state next = turned(g, at, VI_PAIRS, q[VI_PAIRS], p, &f->now);
     f->now = chosen(jumps, &next, &f->now);
     f->on = only(~jumps, f->on);
     f->jumped += only(jumps, all((double)VI_PAIRS));
     f->to_goal -= only(jumps, all((double)VI_PAIRS));
+    for (int k = 0; k < further; ++k) {
+        of->cosine[k] = choose(jumps, later.cosine[k], of->cosine[k]);
+        of->sine[k] = choose(jumps, later.sine[k], of->sine[k]);
+    }
 }
 
-/* Move on to the pair in which each lane may meet a contact, its goal or the end of its round. */
-LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts, flight *f)
+/* Move on to the pair in which each lane may meet a contact, its goal or the end of its round. `of`: phases of the further
+ * sines, now and then at the start of that pair. */
+LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts, int further, flight *f, phases *of)
 {
     candidate pair;
     vector count[VI_LANES_CONTACTS], cleared, q[VI_PAIRS + 1];
     for (int i = 0;; ++i) {
-        ends_of_pairs(g, at, f, q);
-        const vector bend = 2.0 * half_of(g, at, &f->now);
+        ends_of_pairs(g, at, further, f, of, q);
+        const vector bend = 2.0 * half_of(g, at, further, &f->now, of);
         for (int c = 0; c < contacts; ++c) {
             count[c] = count_clear(g, at, c, f, q, bend);
         }
@@ -131,7 +142,7 @@ LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts,
         if (i == MOST_JUMPS || !any(jumps)) {
             break;
         }
-        jump(g, at, jumps, f);
+        jump(g, at, further, jumps, q, f, of);
         bound(g, at, f);
     }
     const mask jumps = pair.passed == (double)VI_PAIRS;
@@ -148,7 +159,7 @@ LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts,
         pair.limit = choose(met, load(g->limit[c] + at), pair.limit);
         pair.number = choose(met, all((double)(c + 1)), pair.number);
     }
-    pair.start = after_pairs(g, at, &f->now, q, pair.passed);
+    pair.start = after_pairs(g, at, further, &f->now, of, q, pair.passed);
     return pair;
 }
 
@@ -170,10 +181,10 @@ typedef struct {
 } pair_search;
 
 LANES_INLINE pair_search begin_search(const vi_lane_group *g, int at, const flight *f, const candidate *pair,
-                                      const vector term[])
+                                      const vector term[], int order)
 {
     const vector none = all(0.0);
-    pair_search s = {.end = place_at(term, pair->length), .hits = none != none};
+    pair_search s = {.end = place_at(term, order, pair->length), .hits = none != none};
     s.from = (place){none, pair->start.q - term[0], pair->start.p * pair_of(g, at)};
     s.to = s.end;
     s.stop = (stop){pair->sign, pair->limit, (pair->passed == 0.0) & (f->on == pair->number)};
@@ -183,9 +194,9 @@ LANES_INLINE pair_search begin_search(const vi_lane_group *g, int at, const flig
 }
 
 /* Judge the parts of a pair, in their order, up to the first that has a contact. Undecided parts are halved. */
-LANES_INLINE void judge_parts(const vector term[], pair_search *s)
+LANES_INLINE void judge_parts(const vector term[], int order, pair_search *s)
 {
-    const bends b = bends_of(term);
+    const bends b = bends_of(term, order);
     for (int i = 0; i < MOST_PARTS && any(s->open); ++i) {
         const verdict part = judge(&s->stop, term, &b, &s->from, &s->to, s->noise);
         const mask hits = s->open & part.hits, passes = s->open & part.clear, cuts = s->open & ~(hits | passes);
@@ -196,7 +207,7 @@ LANES_INLINE void judge_parts(const vector term[], pair_search *s)
             s->to = either_place(passes & s->open, &s->end, &s->to);
             s->stop.leaves &= s->from.share == 0.0;
             if (any(cuts)) {
-                const place half = place_at(term, 0.5 * (s->from.share + s->to.share));
+                const place half = place_at(term, order, 0.5 * (s->from.share + s->to.share));
                 s->to = either_place(cuts, &half, &s->to);
             }
         }
@@ -204,10 +215,11 @@ LANES_INLINE void judge_parts(const vector term[], pair_search *s)
 }
 
 /* Move to the contact, the goal or the end of a pair with these Taylor coefficients. */
-LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, candidate *pair, const vector term[])
+LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, candidate *pair, const vector term[],
+                             int order)
 {
-    pair_search s = begin_search(g, at, f, pair, term);
-    judge_parts(term, &s);
+    pair_search s = begin_search(g, at, f, pair, term, order);
+    judge_parts(term, order, &s);
     arrival a = {.hits = s.hits, .careful = pair->twofold};
     place stays = s.end;
     if (any(s.open)) {
@@ -217,7 +229,7 @@ LANES_INLINE arrival search(const vi_lane_group *g, int at, const flight *f, can
     if (any(a.hits)) {
         const vector y = term[0] - pair->sign * pair->limit;
         const mask repeats = repeat_last(g, at, f->jumped + pair->passed, &pair->start);
-        const place met = find_contact(g, at, a.hits, repeats, term, y, &s.from, &s.to);
+        const place met = find_contact(g, at, a.hits, repeats, term, order, y, &s.from, &s.to);
         const mask left = (pair->passed == 0.0) & (f->on == pair->number);
         const mask lost = a.hits & (~(size_of(y + met.added) <= s.noise) | (left & (met.share < SHORTEST_RETURN)));
         a.hits &= ~lost;
@@ -288,16 +300,19 @@ LANES_INLINE void move_clock(vi_lane_group *g, int at, vector cells, vector shar
 }
 
 /* Do one round of a vector of lanes; true when one of them has an event. */
-LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts)
+LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int at, int contacts,
+                            int further)
 {
     flight f = begin_round(g, at);
+    phases of;
+    phases_at(g, at, further, load(g->periods + at), load(g->rest + at), &of);
     if (plan->rate > 0.0) {
         sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }
-    vector term[VI_LANE_ORDER + 1];
-    candidate pair = choose_pair(g, at, contacts, &f);
-    expand(g, at, &pair.start, term);
-    arrival a = search(g, at, &f, &pair, term);
+    vector term[VI_SINE_ORDER + 1];
+    candidate pair = choose_pair(g, at, contacts, further, &f, &of);
+    expand(g, at, further, &pair.start, &of, term);
+    arrival a = search(g, at, &f, &pair, term, order_with(further));
     const mask leaves = rebound(g, at, contacts, &pair, &a), moves = ~a.careful;
     const mask arrives = pair.goal & ~a.hits & moves, stays = a.careful & (pair.passed == 0.0);
     const vector impacts = load(g->impacts + at) + only(a.hits, all(1.0)), flown = f.jumped + pair.passed;
@@ -337,7 +352,8 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
 }
 
 /* Do rounds until a lane has an event. */
-LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts)
+LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *points, int contacts,
+                             int further)
 {
     const bool waits = some_wait(g);
     bool found = false;
@@ -346,7 +362,7 @@ LANES_INLINE void run_rounds(vi_lane_group *g, const vi_lanes_plan *plan, vi_lan
             if (waits) {
                 note_start(g, at);
             }
-            found |= one_round(g, plan, points, at, contacts);
+            found |= one_round(g, plan, points, at, contacts, further);
         }
         if (waits) {
             note_rounds(g, plan, points);

@@ -157,6 +157,9 @@ LANES_INLINE bool one_round_many(vi_lane_group *g, const vi_lanes_plan *plan, vi
     cells_ahead ahead;
     certified_flight s;
     vector amplitude[VI_REAL_MODES];
+    if (plan->further) {
+        set_sines(g, at, vi_own_modes(plan), plan->further);
+    }
     begin_round_many(g, at, modes, &ahead, amplitude);
     if (plan->rate > 0.0) {
         sample_instants_from(g, at);
@@ -205,9 +208,13 @@ void VI_ROUNDS(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_points *poi
         run_phase_rounds(g, plan, points, 1);
     } else if (plan->yielding) {
         run_phase_rounds(g, plan, points, 2);
+    } else if (plan->further && plan->contacts < 2) {
+        run_rounds(g, plan, points, 1, plan->further);
+    } else if (plan->further) {
+        run_rounds(g, plan, points, 2, plan->further);
     } else if (plan->contacts < 2) {
-        run_rounds(g, plan, points, 1);
+        run_rounds(g, plan, points, 1, 0);
     } else {
-        run_rounds(g, plan, points, 2);
+        run_rounds(g, plan, points, 2, 0);
     }
 }

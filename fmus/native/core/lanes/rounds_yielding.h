@@ -242,8 +242,8 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
 LANES_INLINE vector closer(const vector term[], vector y, vector sign, vector share)
 {
     vector added, slope;
-    evaluate(term, share, &added, &slope);
-    const vector bend = half_bend(term, share);
+    evaluate(term, VI_LANE_ORDER, share, &added, &slope);
+    const vector bend = half_bend(term, VI_LANE_ORDER, share);
     const vector inverse = 1.0 / slope, step = (sign * y + added) * inverse;
     return share - step * (1.0 + step * (bend * inverse));
 }
@@ -270,7 +270,7 @@ LANES_INLINE phase_arrival search_phase(const vi_lane_group *g, int at, int cont
 {
     vector term[VI_LANE_ORDER + 1], event[VI_LANE_ORDER + 1], added, slope;
     expand_phase(g, at, contacts, s, cell, term, event);
-    evaluate(event, cell->length, &added, &slope);
+    evaluate(event, VI_LANE_ORDER, cell->length, &added, &slope);
     const vector length = cell->length;
     const mask leaves = (cell->passed == 0.0) & (s->on == cell->number);
     const vector y = only(~leaves, event[0] - cell->limit), first = event[1], end_y = y + added;
@@ -293,13 +293,13 @@ LANES_INLINE phase_arrival search_phase(const vi_lane_group *g, int at, int cont
             share = smaller(larger(closer(event, y, all(1.0), share), all(0.0)), length);
         }
         a.share = choose(a.hits, share, length);
-        evaluate(event, a.share, &added, &slope);
+        evaluate(event, VI_LANE_ORDER, a.share, &added, &slope);
         /* rounding would decide whether a graze is an event: its extreme is within the noise */
         const mask lost = a.hits & ~((size_of(y + added) <= noise) & (slope * slope > 2.0 * second * noise));
         a.hits &= ~lost;
         a.careful |= lost;
     }
-    evaluate(term, a.share, &added, &slope);
+    evaluate(term, VI_LANE_ORDER, a.share, &added, &slope);
     a.q = cell->q + added;
     a.p = slope * s->rate;
     return a;

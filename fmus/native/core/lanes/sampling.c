@@ -146,7 +146,8 @@ void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_
     const sampled_phase phase = phase_of_lane(g, plan, points, lane);
     vi_lane_state state = {samples->from_q[lane], samples->from_p[lane], samples->from_cosine[lane],
                            samples->from_sine[lane]};
-    vi_lane_cell cell = {{0.0}};
+    vi_lane_cell cell = {.order = VI_LANE_ORDER};
+    vi_lane_phases phases = vi_lane_phases_at(g, lane, samples->from_periods[lane], samples->from_rest[lane]);
     double value, slope;
     int64_t passed = 0, expanded = -1; /* cells before `state`; the cell that is expanded */
     while (samples->next[lane] < samples->count[lane]) {
@@ -158,10 +159,17 @@ void vi_lane_take_samples(vi_lane_group *g, const vi_lanes_plan *plan, vi_lanes_
         const int64_t whole = (int64_t)cells;
         for (; passed + VI_CELLS <= whole; passed += VI_CELLS) {
             state = vi_lane_after_cells(phase.tables, lane, &state, VI_CELLS);
+            vi_lane_state_add_sines(&state, g, lane, VI_CELLS, &phases);
+            phases = vi_lane_phases_at(g, lane, samples->from_periods[lane],
+                                       samples->from_rest[lane] + (double)(passed + VI_CELLS) * phase.cell);
         }
         if (whole != expanded) {
-            const vi_lane_state start = vi_lane_after_cells(phase.tables, lane, &state, (int)(whole - passed));
+            const double rest = samples->from_rest[lane] + (double)whole * phase.cell;
+            vi_lane_state start = vi_lane_after_cells(phase.tables, lane, &state, (int)(whole - passed));
+            vi_lane_state_add_sines(&start, g, lane, (int)(whole - passed), &phases);
+            const vi_lane_phases there = vi_lane_phases_at(g, lane, samples->from_periods[lane], rest);
             cell = vi_lane_cell_from(phase.tables, lane, &start, phase.cell);
+            vi_lane_cell_add_sines(&cell, g, lane, &there);
             expanded = whole;
         }
         vi_lane_cell_at(&cell, cells - (double)whole, &value, &slope);

@@ -129,13 +129,9 @@ LANES_INLINE vector whole_part(vector a)
     return near - only(near > a, all(1.0));
 }
 
-/* Cosine and sine of 0 <= angle <= 8, to 1 ulp (the polynomials are fdlibm's). */
-LANES_INLINE void turn(vector angle, vector *cosine, vector *sine)
+/* Cosine and sine of an angle r beyond a number of quarter turns, for |r| <= pi/4 (the polynomials are fdlibm's). */
+LANES_INLINE void turn_beyond(mask count, vector r, vector *cosine, vector *sine)
 {
-    const vector shifted = angle * 0.63661977236758134308 + WHOLE;
-    const vector quarters = shifted - WHOLE;
-    const mask count = (mask)shifted;
-    const vector r = (angle - quarters * 1.57079632673412561417) - quarters * 6.07710050650619224932e-11;
     const vector z = r * r, half = 0.5 * z, w = z * z;
     const vector odd = (-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03)
                        + w * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06)
@@ -148,6 +144,23 @@ LANES_INLINE void turn(vector angle, vector *cosine, vector *sine)
     const mask swapped = -(count & 1);
     *sine = (vector)((mask)choose(swapped, c, s) ^ ((count & 2) << 62));
     *cosine = (vector)((mask)choose(swapped, s, c) ^ (((count + 1) & 2) << 62));
+}
+
+/* Cosine and sine of 0 <= angle <= 8, to 1 ulp. */
+LANES_INLINE void turn(vector angle, vector *cosine, vector *sine)
+{
+    const vector shifted = angle * 0.63661977236758134308 + WHOLE;
+    const vector quarters = shifted - WHOLE;
+    const vector r = (angle - quarters * 1.57079632673412561417) - quarters * 6.07710050650619224932e-11;
+    turn_beyond((mask)shifted, r, cosine, sine);
+}
+
+/* Cosine and sine of a number of turns below 2^48. */
+LANES_INLINE void turn_by(vector turns, vector *cosine, vector *sine)
+{
+    const vector shifted = 4.0 * turns + WHOLE;
+    const vector r = (turns - 0.25 * (shifted - WHOLE)) * 6.283185307179586232;
+    turn_beyond((mask)shifted, r, cosine, sine);
 }
 
 #endif

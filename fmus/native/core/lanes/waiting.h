@@ -44,6 +44,8 @@ static inline int64_t begin_flight(vi_waiting_flights *w, const vi_lane_group *g
     w->cosine[n] = g->start_cosine[lane];
     w->sine[n] = g->start_sine[lane];
     w->end_q[n] = g->q[0][lane];
+    w->periods[n] = g->record.from_periods[lane];
+    w->rest[n] = g->record.from_rest[lane];
     w->strobes_before[n] = (int32_t)w->strobes;
     return n;
 }
@@ -56,6 +58,8 @@ static inline void add_strobe(vi_waiting_flights *w, const vi_lane_group *g, int
     w->from_p[n] = g->start_p[0][lane];
     w->from_cosine[n] = g->start_cosine[lane];
     w->from_sine[n] = g->start_sine[lane];
+    w->from_periods[n] = g->record.from_periods[lane];
+    w->from_rest[n] = g->record.from_rest[lane];
     w->strobe_cells[n] = cells;
     w->turn[n] = turn;
     w->impacts[n] = g->record.from_impacts[lane];
@@ -92,12 +96,21 @@ static inline void note_round(vi_lane_group *g, const vi_lanes_plan *plan, int l
 static inline void fill_up(vi_waiting_flights *w)
 {
     for (int64_t n = w->flights; n % VI_WIDTH != 0; ++n) {
-        w->q[n] = w->p[n] = w->cosine[n] = w->sine[n] = w->cells[n] = w->end_q[n] = 0.0;
+        w->q[n] = w->p[n] = w->cosine[n] = w->sine[n] = w->cells[n] = w->end_q[n] = w->periods[n] = w->rest[n] = 0.0;
         w->strobes_before[n] = 0;
     }
     for (int64_t n = w->strobes; n % VI_WIDTH != 0; ++n) {
         w->from_q[n] = w->from_p[n] = w->from_cosine[n] = w->from_sine[n] = w->strobe_cells[n] = 0.0;
+        w->from_periods[n] = w->from_rest[n] = 0.0;
     }
+}
+
+/* Set the phases of the further sines some cells after the starts of the rounds of a vector of strobes. */
+LANES_INLINE void phases_after_cells(const vi_lane_group *g, int lane, const vi_waiting_flights *w, int64_t first,
+                                     vector cells, phases *of)
+{
+    phases_of_lane(g, lane, vi_further_sines(g), load(w->from_periods + first),
+                   load(w->from_rest + first) + cells * g->cell[lane], of);
 }
 
 /* Compute the states at the strobes. */
@@ -108,16 +121,20 @@ LANES_INLINE void compute_strobes(const vi_lane_group *g, int lane, int contacts
         state now = {load(w->from_q + first), load(w->from_p + first), load(w->from_cosine + first),
                      load(w->from_sine + first)};
         const vector cells = load(w->strobe_cells + first);
-        vector whole = whole_part(cells), term[VI_LANE_ORDER + 1], added, slope;
-        const vector share = cells - whole;
+        vector whole = whole_part(cells), term[VI_SINE_ORDER + 1], added, slope;
+        const vector share = cells - whole, last = whole;
+        phases of;
+        phases_after_cells(g, lane, w, first, last - whole, &of);
         for (mask jumps = whole >= (double)VI_CELLS; any(jumps); jumps = whole >= (double)VI_CELLS) {
-            const state next = after_all_cells(&g->one, lane, &now);
+            const state next = after_cells(g, lane, VI_CELLS, &now, &of);
             now = chosen(jumps, &next, &now);
             whole -= only(jumps, all((double)VI_CELLS));
+            phases_after_cells(g, lane, w, first, last - whole, &of);
         }
-        now = after_own_cells(&g->one, lane, &now, whole);
-        expand_of_lane(g, lane, &now, term);
-        evaluate(term, share, &added, &slope);
+        now = after_own_cells(g, lane, &now, &of, whole);
+        phases_after_cells(g, lane, w, first, last, &of);
+        expand_of_lane(g, lane, &now, &of, term);
+        evaluate_of_lane(g, term, share, &added, &slope);
         vector q = now.q + added;
         for (int c = 0; c < contacts; ++c) { /* beyond a stop by rounding: put on it */
             const double sign = g->sign[c][lane], limit = g->limit[c][lane];
@@ -137,6 +154,8 @@ static inline void cut_flights(vi_waiting_flights *w, const double q[], const do
         w->p[after] = p[n];
         w->cosine[after] = 1.0;
         w->sine[after] = 0.0;
+        w->periods[after] = w->turn[n];
+        w->rest[after] = 0.0;
     }
 }
 

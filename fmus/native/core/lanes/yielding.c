@@ -97,6 +97,7 @@ static bool event_at(const vi_lane_group *g, int lane, int c, const vi_lane_cell
     const double sign = pressed > 0 ? -1.0 : g->sign[c][lane], limit = pressed > 0 ? 0.0 : g->limit[c][lane];
     const bool by_force = pressed > 0 || recedes_from(g, lane, c);
     const double lag = by_force ? g->yielding.lag[c][lane] * g->cell_rate[lane] : 0.0;
+    event->order = VI_LANE_ORDER;
     for (int n = 0; n < VI_LANE_ORDER; ++n) {
         event->term[n] = sign * (cell->term[n] + lag * ((n + 1.0) * cell->term[n + 1]));
     }
@@ -297,7 +298,7 @@ static double peak(const vi_lane_group *g, int lane, int c, double duration)
     for (; left > 0.0; left -= 1.0) {
         const vi_lane_cell cell = vi_lane_cell_from(tables, lane, &now, length);
         const double end = vi_min(left, 1.0);
-        vi_lane_cell press;
+        vi_lane_cell press = {.order = VI_LANE_ORDER};
         double value, slope;
         for (int n = 0; n < VI_LANE_ORDER; ++n) {
             press.term[n] = cell.term[n] + lag * ((n + 1.0) * cell.term[n + 1]);

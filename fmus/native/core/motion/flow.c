@@ -23,11 +23,17 @@ static double discriminant(double mass, double damping, double stiffness)
     return ((product - square) + (product_error - square_error)) / (4.0 * mass * mass);
 }
 
+/* stiffness - w^2 without cancellation. */
+static inline double detuning_of(const vi_mode *mode, double w)
+{
+    return mode->stiffness < 0.0 ? mode->stiffness - w * w : (mode->natural - w) * (mode->natural + w);
+}
+
 /* Steady response to force cos(phase), as a multiple of the cosine and of the sine, and its amplitude. Returns whether
  * it exists and is not 0. */
 static bool respond(const vi_mode *mode, double force, double w, double *cosine, double *sine, double *amplitude)
 {
-    const double detuning = (mode->natural - w) * (mode->natural + w);
+    const double detuning = detuning_of(mode, w);
     const double drag = 2.0 * mode->decay * w;
     const double size = vi_magnitude(detuning, drag);
     *cosine = *sine = *amplitude = 0.0;
@@ -62,7 +68,10 @@ void vi_mode_drive(vi_mode *mode, double force, double angular_frequency)
 {
     mode->force = force;
     mode->angular_frequency = angular_frequency;
-    mode->fastest = fmax(fmax(mode->natural, 2.0 * mode->decay), angular_frequency);
+    mode->fastest = fmax(fmax(mode->natural, 2.0 * fabs(mode->decay)), angular_frequency);
+    if (mode->stiffness < 0.0) {
+        mode->fastest = fmax(mode->fastest, fmax(mode->fast, -mode->slow));
+    }
     for (int k = 0; k < vi_mode_sines(mode); ++k) {
         mode->fastest = fmax(mode->fastest, mode->further[k].angular_frequency);
     }
@@ -105,55 +114,72 @@ void vi_further_after(const vi_mode *mode, const vi_phase start[], double u, vi_
     }
 }
 
+/* The two rates of decay; the smaller is found from the larger one, without cancellation. */
+static void find_rates(vi_mode *mode)
+{
+    mode->fast = mode->decay + mode->rate;
+    mode->slow = mode->decay;
+    if (mode->regime == VI_OVERDAMPED && mode->decay < 0.0) {
+        mode->slow = mode->decay - mode->rate;
+        mode->fast = mode->stiffness / mode->slow;
+    } else if (mode->regime == VI_OVERDAMPED) {
+        mode->slow = mode->stiffness / mode->fast;
+    }
+}
+
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
                    double angular_frequency)
 {
     mode->stiffness = stiffness / mass;
-    mode->natural = sqrt(mode->stiffness);
+    mode->natural = sqrt(fabs(mode->stiffness));
     mode->decay = damping / (2.0 * mass);
+    mode->growth = (stiffness < 0.0 ? mode->natural : 0.0) + (damping < 0.0 ? -2.0 * mode->decay : 0.0);
     const double d = discriminant(mass, damping, stiffness);
     mode->regime = d > 0.0 ? VI_UNDERDAMPED : d < 0.0 ? VI_OVERDAMPED : VI_CRITICAL;
     mode->rate = sqrt(fabs(d));
-    mode->fast = mode->decay + mode->rate;
-    mode->slow = mode->regime == VI_OVERDAMPED ? mode->stiffness / mode->fast : mode->decay;
+    find_rates(mode);
     mode->sines = 0;
     vi_mode_drive(mode, amplitude / mass, angular_frequency);
 }
 
-/* ---- homogeneous flow: e_cos = Ce, e_sin = Se of equations.md 1.2 ---- */
+/* ---- homogeneous flow: e_cos = Ce, e_sin = Se of equations.md 1.2 and 1.9 ---- */
 
 typedef struct {
-    double e_cos, e_sin; /* Phi11 = e_cos + decay e_sin, Phi12 = e_sin */
-    double back;         /* Phi22 */
-    double slow, fast;   /* the two decaying exponentials */
+    double e_sin;       /* Phi12 */
+    double front, back; /* Phi11 and Phi22 */
+    double slow, fast;  /* the two exponentials */
 } propagator;
 
 static propagator overdamped(const vi_mode *mode, double slow, double fast, double lost)
 {
     propagator p = {.slow = slow, .fast = fast};
-    p.e_cos = 0.5 * (slow + fast);
+    const double e_cos = 0.5 * (slow + fast);
     p.e_sin = slow * (lost / (2.0 * mode->rate));
-    /* far from critical damping Ce - decay Se cancels; near it the difference of the exponentials cancels */
-    p.back = mode->rate > 0.5 * mode->decay ? (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate)
-                                            : p.e_cos - mode->decay * p.e_sin;
+    /* far from critical damping Ce - |decay| Se cancels; near it the difference of the exponentials cancels */
+    const bool far = mode->rate > 0.5 * fabs(mode->decay);
+    p.front = mode->decay < 0.0 && far ? (mode->fast * slow - mode->slow * fast) / (2.0 * mode->rate)
+                                       : e_cos + mode->decay * p.e_sin;
+    p.back = mode->decay >= 0.0 && far ? (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate)
+                                       : e_cos - mode->decay * p.e_sin;
     return p;
 }
 
 static inline propagator underdamped(const vi_mode *mode, double decay, double cosine, double sine)
 {
     propagator p = {.slow = decay, .fast = decay};
-    p.e_cos = decay * cosine;
+    const double e_cos = decay * cosine;
     p.e_sin = decay * (sine / mode->rate);
-    p.back = p.e_cos - mode->decay * p.e_sin;
+    p.front = e_cos + mode->decay * p.e_sin;
+    p.back = e_cos - mode->decay * p.e_sin;
     return p;
 }
 
 static inline propagator critical(const vi_mode *mode, double decay, double u)
 {
     propagator p = {.slow = decay, .fast = decay};
-    p.e_cos = decay;
     p.e_sin = decay * u;
-    p.back = p.e_cos - mode->decay * p.e_sin;
+    p.front = decay + mode->decay * p.e_sin;
+    p.back = decay - mode->decay * p.e_sin;
     return p;
 }
 
@@ -169,7 +195,7 @@ static inline propagator propagate(const vi_mode *mode, double u)
 
 static void take_rows(const vi_mode *mode, const propagator *p, double phi[4])
 {
-    phi[0] = p->e_cos + mode->decay * p->e_sin;
+    phi[0] = p->front;
     phi[1] = p->e_sin;
     phi[2] = -mode->stiffness * p->e_sin;
     phi[3] = p->back;
@@ -201,9 +227,10 @@ static propagator propagate_from_before(const vi_segment *s, double u)
     const double c = cos(angle), sn = sin(angle);
     propagator p;
     p.slow = p.fast = exp(-mode->decay * time);
-    p.e_cos = p.slow * (c - rest * sn);
+    const double e_cos = p.slow * (c - rest * sn);
     p.e_sin = p.slow * ((sn + rest * c) / mode->rate);
-    p.back = p.e_cos - mode->decay * p.e_sin;
+    p.front = e_cos + mode->decay * p.e_sin;
+    p.back = e_cos - mode->decay * p.e_sin;
     return p;
 }
 
@@ -222,7 +249,7 @@ static double largest_split(const vi_segment *s, double x, double v)
     for (int k = 0; k < vi_mode_sines(mode); ++k) {
         load += fabs(mode->further[k].force);
     }
-    if (mode->regime == VI_OVERDAMPED && mode->fastest * s->length > LONGEST_SERIES) {
+    if (mode->regime == VI_OVERDAMPED && mode->decay > 0.0 && mode->fastest * s->length > LONGEST_SERIES) {
         return LARGEST_SPLIT_OVERDAMPED * (fabs(x) + (fabs(v) + load * s->length) / mode->fast);
     }
     const double time = mode->fastest * s->length > 1.0 ? 1.0 / mode->fastest : s->length;
@@ -293,7 +320,7 @@ static void bound_split(vi_segment *s)
         s->slow_part = fabs(s->v + mode->fast * s->x) / (2.0 * mode->rate);
         s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
     }
-    s->scale = fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
+    s->scale = s->swell * fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
     double power = s->length;
     for (int n = 2; n <= vi_segment_degree(s); ++n) {
         power *= s->length;
@@ -301,18 +328,18 @@ static void bound_split(vi_segment *s)
     }
 }
 
-/* Bound on the homogeneous |x''''| from the energy of the present state; the energy never grows. */
+/* Bound on the homogeneous |x''''| from the energy of the present state while this energy does not grow. */
 static double energy_bound(const vi_mode *mode, double x, double v)
 {
-    const double damping = 2.0 * mode->decay;
-    const double energy = sqrt(v * v + mode->stiffness * x * x);
-    const double second = sqrt(damping * damping + mode->stiffness) * energy;
-    const double third = damping * second + mode->stiffness * energy;
-    return damping * third + mode->stiffness * second;
+    const double damping = 2.0 * fabs(mode->decay), stiffness = fabs(mode->stiffness);
+    const double energy = sqrt(v * v + stiffness * x * x);
+    const double second = sqrt(damping * damping + stiffness) * energy;
+    const double third = damping * second + stiffness * energy;
+    return damping * third + stiffness * second;
 }
 
-/* Bound on the homogeneous |x''''| from here on: equations.md 2.2, one order up. */
-static inline double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
+/* Bound on the homogeneous |x''''| from here on, where nothing grows: equations.md 2.2, one order up. */
+static inline double falling_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
 {
     const vi_mode *mode = s->mode;
     const double amplitude_bound = mode->stiffness * mode->stiffness * s->amplitude * slow_left;
@@ -328,12 +355,19 @@ static inline double homogeneous_bound(const vi_segment *s, double slow_left, do
     return fmin(energy, mode->regime == VI_UNDERDAMPED ? amplitude_bound : parts);
 }
 
+/* The same for all motions, up to twice the segment's length where they grow. */
+static inline double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
+{
+    const double bound = falling_bound(s, slow_left, fast_left, x, v);
+    return vi_mode_grows(s->mode) ? s->swell * bound : bound;
+}
+
 static void split_at(const vi_segment *s, double u, vi_motion *m)
 {
     const vi_mode *mode = s->mode;
     const double w = mode->angular_frequency;
     const propagator p = propagate_segment(s, u);
-    const double x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+    const double x = p.front * s->x + p.e_sin * s->v;
     const double v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
     const double angle = s->phase.angle + w * u;
     const double c = cos(angle), sn = sin(angle);
@@ -357,7 +391,7 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
         part->v = s->start_rate;
     } else {
         p = propagate_segment(s, u);
-        part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+        part->x = p.front * s->x + p.e_sin * s->v;
         part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
     }
     part->a = -2.0 * mode->decay * part->v - mode->stiffness * part->x;
@@ -366,7 +400,11 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
     if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
         part->reach = s->amplitude * p.slow;
     } else {
-        part->reach = mode->stiffness > 0.0 ? sqrt(part->x * part->x + part->v * part->v / mode->stiffness) : HUGE_VAL;
+        const double stiffness = fabs(mode->stiffness);
+        part->reach = stiffness > 0.0 ? sqrt(part->x * part->x + part->v * part->v / stiffness) : HUGE_VAL;
+    }
+    if (vi_mode_grows(mode)) {
+        part->reach *= s->swell;
     }
 }
 
@@ -392,6 +430,7 @@ static void set_out(vi_segment *segment, const vi_mode *mode, const vi_drive *dr
     }
     segment->length = length;
     segment->since = segment->since_low = 0.0;
+    segment->swell = vi_mode_grows(mode) ? exp(2.0 * mode->growth * length) : 1.0;
 }
 
 /* Choose the form of a segment whose other members are set. */
@@ -462,7 +501,7 @@ void vi_segment_end(const vi_segment *segment, double u, vi_phase phase, const v
     const vi_mode *mode = segment->mode;
     const double w = mode->angular_frequency, c = phase.cosine, sn = phase.sine;
     const propagator p = propagate_segment(segment, u);
-    *x = (p.e_cos + mode->decay * p.e_sin) * segment->x + p.e_sin * segment->v
+    *x = p.front * segment->x + p.e_sin * segment->v
          + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
     *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v
          + w * (mode->steady_sin * c - mode->steady_cos * sn) + segment->level_rate;

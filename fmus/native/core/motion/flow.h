@@ -2,7 +2,8 @@
  *
  *     x'' + 2 decay x' + stiffness x = force cos(angular_frequency t) + further sines + held + held_rate (t - t0) + ...
  *
- * all per unit mass. Two forms of the same solution, chosen once for each segment:
+ * all per unit mass. Stiffness and decay may be negative: the motion then grows (equations.md 1.9), and its bounds hold
+ * up to twice the length of its segment. Two forms of the same solution, chosen once for each segment:
  *  - the steady response is split off, wherever it is not much larger than the motion itself;
  *  - otherwise (near resonance, slow forcing, no spring) a Taylor series, exact to the last bit on a short segment.
  *    A huge steady response would cost the digits by which it exceeds the motion.
@@ -12,7 +13,7 @@
 
 #include "motion/segment.h"
 
-/* Prepare a mode; mass > 0, stiffness >= 0, damping >= 0, angular_frequency >= 0 in SI units. */
+/* Prepare a mode; mass > 0, angular_frequency >= 0, any stiffness and damping, in SI units. */
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
                    double angular_frequency);
 

@@ -35,7 +35,7 @@ void vi_origin_follow(const vi_origin *origin, vi_segment *segment, const vi_clo
 void vi_origin_reach(vi_origin *origin, const vi_segment *segment, vi_instant start, double x, double v)
 {
     const vi_mode *mode = segment->mode;
-    if (segment->series || mode->regime != VI_UNDERDAMPED || segment->held_rate != 0.0
+    if (segment->series || mode->regime != VI_UNDERDAMPED || vi_mode_grows(mode) || segment->held_rate != 0.0
         || vi_segment_degree(segment) > 1) {
         *origin = (vi_origin){.known = 0};
         return;

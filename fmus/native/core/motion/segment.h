@@ -19,22 +19,29 @@ typedef struct {
 
 /* A mode and the harmonic forces on it: that of the clock, and further sines. */
 typedef struct {
-    double stiffness;         /* natural angular frequency squared, 1/s^2, >= 0 */
-    double natural;           /* natural angular frequency, rad/s */
-    double decay;             /* damping_ratio * natural, 1/s, >= 0 */
+    double stiffness;         /* 1/s^2 */
+    double natural;           /* sqrt|stiffness|, rad/s */
+    double decay;             /* half the damping, 1/s */
     vi_damping_regime regime;
-    double rate;              /* sqrt|natural^2 - decay^2|, rad/s (1/s overdamped) */
-    double slow, fast;        /* decay rates when overdamped, 1/s */
+    double rate;              /* sqrt|stiffness - decay^2|, rad/s (1/s overdamped) */
+    double slow, fast;        /* decay rates when overdamped, 1/s; slow < 0: this part grows */
+    double growth;            /* rate above which nothing grows, 1/s: equations.md 1.9; 0 where the energy never grows */
     double force;             /* amplitude per unit mass, m/s^2 */
     double angular_frequency; /* of the force, rad/s */
     bool steady_exists;
     double steady_cos, steady_sin; /* steady response = steady_cos cos(phase) + steady_sin sin(phase), m */
     double steady_amplitude;  /* m; the sum over all sines */
     double steady_snap;       /* the largest fourth derivative of the steady response, m/s^4 */
-    double fastest;           /* largest of natural, 2 decay, and all angular frequencies of forces, rad/s */
+    double fastest;           /* largest of all rates and all angular frequencies of forces, rad/s */
     int32_t sines;            /* number of further sines */
     vi_further further[VI_SINES_ROOM];
 } vi_mode;
+
+/* May a motion of this mode grow by itself? */
+static inline bool vi_mode_grows(const vi_mode *mode)
+{
+    return VI_GROWING && mode->growth > 0.0;
+}
 
 /* Number of further sines; a constant where a component has none. */
 static inline int vi_mode_sines(const vi_mode *mode)
@@ -88,6 +95,7 @@ typedef struct {
     double start, start_rate; /* homogeneous displacement and velocity at the start, when split */
     double level, level_rate; /* particular solution of the load */
     double level_higher[VI_HIGHER_ROOM]; /* its coefficients 2 to degree */
+    double swell;         /* bounds of a growing motion hold up to twice the length by this factor; else 1 */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
     double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
     double scale;         /* sum of the sizes of a displacement's terms, m; rounding is 1e-16 of it */

@@ -39,7 +39,7 @@ static double fastest_rate(const vi_structure_model *model, const vi_drift_start
         return model->fastest;
     }
     for (int j = 0; j < vi_structure_modes(model) && !model->coupled; ++j) {
-        drag = vi_max(drag, 2.0 * model->mode[j].decay);
+        drag = vi_max(drag, 2.0 * fabs(model->mode[j].decay));
     }
     const double decay = 0.5 * (drag + damping);
     return decay + sqrt(decay * decay + model->fastest * model->fastest + stiffness);
@@ -250,7 +250,7 @@ static void size_loads(const vi_structure_model *model, const vi_drift_start *st
 {
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        size[j] = vi_mode_force_size(mode) + fabs(start->drive.held[j]) + mode->stiffness * fabs(start->q[j]);
+        size[j] = vi_mode_force_size(mode) + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
         size[j] += vi_structure_drag_size(model, j, start->p);
     }
 }

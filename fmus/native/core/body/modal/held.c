@@ -74,7 +74,7 @@ static double load_size(const vi_series_noise *noise, int j)
     const vi_mode *mode = &noise->s->model->mode[j];
     double size = fabs(mode->force) * noise->drive + more_size(noise, j);
     if (noise->n == 2) {
-        size += fabs(noise->held[j]) + mode->stiffness * fabs(noise->s->state->q[j]);
+        size += fabs(noise->held[j]) + fabs(mode->stiffness * noise->s->state->q[j]);
     } else if (noise->n == 3) {
         size += fabs(noise->s->state->held_rate[j]);
     }
@@ -108,7 +108,7 @@ static void carry(vi_series_noise *noise)
         forces[l] = force_noise(noise, l);
     }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
-        const double stiffness = model->mode[j].stiffness;
+        const double stiffness = fabs(model->mode[j].stiffness);
         const double terms = load_size(noise, j) + stiffness * fabs(noise->drift->modal[n - 2][j])
                              + (double)(n - 1) * vi_structure_drag_size(model, j, noise->drift->modal[n - 1]);
         double carried =

@@ -206,7 +206,8 @@ bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *larg
         if (point->shape[j] == 0.0) {
             continue;
         }
-        if (segment->series || mode->natural == 0.0 || segment->level_rate != 0.0 || vi_flight_degree(flight) > 1) {
+        if (segment->series || mode->natural == 0.0 || vi_mode_grows(mode) || segment->level_rate != 0.0
+            || vi_flight_degree(flight) > 1) {
             return false;
         }
         reach += fabs(point->shape[j]) * sqrt(segment->x * segment->x + segment->v * segment->v / mode->stiffness);

@@ -75,7 +75,7 @@ vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, co
  * accelerations; they are left out as vi_rippling_step does. */
 double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_flight_instant *instant, double horizon);
 
-/* Largest displacement * sign for all later time; false when no bound exists (series form, sloping input). */
+/* Largest displacement * sign for all later time; false when no bound exists (series form, sloping input, growth). */
 bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *largest);
 
 /* Modal displacements and velocities after u seconds at a known forcing phase, which keeps long flights exact. */

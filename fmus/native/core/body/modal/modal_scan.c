@@ -108,8 +108,8 @@ typedef struct {
     extents extent[VI_PORTS];  /* of the contacts */
 } scanner;
 
-/* Bounds of a mode for a whole flight: an underdamped mode stays within its amplitude, and energies never grow. */
-static extent extent_of(const vi_segment *segment)
+/* Bounds of a mode for a whole flight, where nothing grows: an underdamped mode stays within its amplitude. */
+static extent falling_extent(const vi_segment *segment)
 {
     const vi_mode *mode = segment->mode;
     const double x = segment->start, v = segment->start_rate;
@@ -117,11 +117,19 @@ static extent extent_of(const vi_segment *segment)
         const double rate = mode->natural * segment->amplitude;
         return (extent){segment->amplitude, rate, mode->stiffness * mode->natural * rate};
     }
-    const double damping = 2.0 * mode->decay, rate = sqrt(v * v + mode->stiffness * x * x);
-    const double second = sqrt(damping * damping + mode->stiffness) * rate;
-    const double third = damping * second + mode->stiffness * rate;
+    const double damping = 2.0 * fabs(mode->decay), stiffness = fabs(mode->stiffness);
+    const double rate = sqrt(v * v + stiffness * x * x), second = sqrt(damping * damping + stiffness) * rate;
+    const double third = damping * second + stiffness * rate;
     const double reach = mode->natural > 0.0 ? rate / mode->natural : HUGE_VAL;
-    return (extent){reach, rate, damping * third + mode->stiffness * second};
+    return (extent){reach, rate, damping * third + stiffness * second};
+}
+
+/* The same for all motions, up to twice the flight's length where they grow. */
+static extent extent_of(const vi_segment *segment)
+{
+    const extent e = falling_extent(segment);
+    const double swell = segment->swell;
+    return vi_mode_grows(segment->mode) ? (extent){swell * e.reach, swell * e.rate, swell * e.fourth} : e;
 }
 
 static void take_extents(scanner *s, int k)
@@ -374,6 +382,18 @@ static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, 
     return least;
 }
 
+/* The longest level of steps. The bounds of growing motions, and of polynomials, hold for twice the flight. */
+static int longest_level(const vi_flight *flight)
+{
+    const double growing = vi_structure_grows(flight->model) ? 1.0 : 0.0;
+    const double samples = vi_flight_degree(flight) > 1 ? (double)VI_SCAN_SAMPLES : growing;
+    int l = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
+    while (samples > 0.0 && l >= 0 && step_of(flight->model, l) * samples > flight->length) {
+        --l;
+    }
+    return l;
+}
+
 /* ---- from sample to sample ---- */
 
 /* Move a place on by 1 to VI_SCAN_SAMPLES steps. */
@@ -512,11 +532,7 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
     s.looked_for = looked_for;
     renew(scan, flight->model);
     begin(&s, from, first);
-    int longest = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
-    while (vi_flight_degree(flight) > 1 && longest >= 0
-           && step_of(flight->model, longest) * VI_SCAN_SAMPLES > flight->length) {
-        --longest; /* the bound of polynomials holds for twice the flight */
-    }
+    const int longest = longest_level(flight);
     int l = level_between(&s, -1, longest);
     for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
         vi_scan_level *level = &scan->level[l];

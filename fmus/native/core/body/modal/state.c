@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/growth.h"
 #include "body/modal/stop_motion.h"
 
 /* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
@@ -14,7 +15,8 @@ static const double LITTLE_ROOM = 1e-6;
 void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
                        double angular_frequency)
 {
-    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
+    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * fabs(natural), natural * fabs(natural), force,
+                  angular_frequency);
 }
 
 /* Bound on the rates of a full damping matrix. */
@@ -60,10 +62,14 @@ void vi_structure_prepare(vi_structure_model *model)
     model->fastest = coupling_rate(model);
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        for (int k = 0; k < vi_mode_sines(mode); ++k) {
+            rate = vi_max(rate, mode->further[k].angular_frequency);
+        }
         model->fastest = vi_max(model->fastest, rate);
     }
     model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
+    model->growth = VI_GROWING ? vi_growth_of(model) : 0.0;
 }
 
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)

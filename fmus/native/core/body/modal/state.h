@@ -49,10 +49,13 @@ typedef struct {
     int64_t given_modes;   /* the last modes have a given motion, that of stops; 0 where stops stand still */
     int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
     double tolerance;      /* relative error of a contact whose force is a power of the penetration */
+    double displacement_limit; /* of all points of a motion that grows, m: it ends beyond; 0: no limit */
+    int32_t ends_unbounded; /* end a motion that grows where its stops are out of reach? */
+    int32_t unused;         /* no padding, which would be saved */
     vi_clock clock;
     int32_t sines;                 /* further sines: those of the modes, with their phases */
     vi_sine sine[VI_SINES_ROOM];
-    vi_mode mode[VI_MODES]; /* set by vi_structure_mode, in ascending order of natural frequency */
+    vi_mode mode[VI_MODES]; /* set by vi_structure_mode, in ascending order of stiffness */
     double shape[VI_PORTS][VI_MODES];
     /* modal velocities after a unit impulse at the contact, kg^(-1/2); equal to shape except for collocation */
     double impulse[VI_PORTS][VI_MODES];
@@ -72,6 +75,7 @@ typedef struct {
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
     double fastest;                      /* largest rate of any mode, rad/s */
     double radian;                       /* 1 / fastest, s; 0 where nothing turns */
+    double growth;                       /* largest growth of any mode, 1/s; 0 where no motion grows */
 } vi_structure_model;
 
 /* Status of a contact of a structure. */
@@ -121,6 +125,9 @@ typedef struct {
     double speed;   /* fastest approach so far, m/s */
 } vi_cascade;
 
+/* Why a motion that grows has ended. */
+typedef enum { VI_BOUNDED = 0, VI_STOPS_OUT_OF_REACH = 1, VI_BEYOND_LIMIT = 2 } vi_unbounded;
+
 typedef struct {
     vi_instant now;
     vi_standstill standstill;
@@ -144,6 +151,8 @@ typedef struct {
     int32_t status[VI_PORTS];   /* vi_contact_status */
     int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
+    int32_t unbounded;          /* the motion has grown beyond its stops or its limit: vi_unbounded */
+    int32_t unused;             /* no padding, which would be saved */
     int32_t follow_energies;    /* input: integrate `energies` */
     int32_t moved;              /* the instant at which the motion began has passed */
     vi_energies energies;
@@ -189,8 +198,8 @@ typedef struct {
     vi_table tables;        /* of the motions of stops, behind each other */
 } vi_structure;
 
-/* Set mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.
- * A mode of frequency 0 has no damping. The clock must be started with the same angular frequency. */
+/* Set mode j: natural angular frequency (rad/s; negative: the stiffness is minus its square), damping ratio and modal
+ * amplitude of the harmonic force. A mode of frequency 0 has no damping. The clock must be started with the same angular frequency. */
 void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
                        double angular_frequency);
 
@@ -243,6 +252,12 @@ static inline int vi_structure_modes(const vi_structure_model *model)
 static inline int vi_structure_free_modes(const vi_structure_model *model)
 {
     return vi_structure_modes(model) - (VI_STOPS_MOVE ? (int)model->given_modes : 0);
+}
+
+/* May a motion of the structure grow by itself? */
+static inline bool vi_structure_grows(const vi_structure_model *model)
+{
+    return VI_GROWING && model->growth > 0.0;
 }
 
 /* shape . vector */

@@ -14,6 +14,7 @@
 #include "body/modal/structure/power_contact.h"
 #include "body/modal/structure/pressed.h"
 #include "body/modal/structure/thin.h"
+#include "body/modal/structure/unbounded.h"
 
 /* Depth, relative to the depth reached by a thin contact, below which a power law counts as thin. */
 static const double ENTRY = 1e-3;
@@ -214,7 +215,7 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
         const bool forced = (mode->force != 0.0 && model->clock.angular_frequency > 0.0) || !vi_structure_is_plain(s);
-        const double load = fabs(now->held[j]) + fabs(mode->force) + mode->stiffness * fabs(s->state->q[j]);
+        const double load = fabs(now->held[j]) + fabs(mode->force) + fabs(mode->stiffness * s->state->q[j]);
         if (forced || s->state->held_rate[j] != 0.0 || s->state->p[j] != 0.0
             || fabs(2.0 * drift->modal[2][j]) > VI_ROUNDING * load) {
             return false;
@@ -261,9 +262,12 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     const vi_event_found first = vi_structure_first_event(s, &drift, &now, reach, vi_max(reach, drift.length));
     *event = first.event;
     *k = first.contact;
-    const double u = first.time;
+    double u = first.time;
     if (first.event == VI_DRIFT_NO_EVENT && at_rest_for_good(s, &drift, &now)) {
         return length;
+    }
+    if (vi_unbounded_drift(s, &drift, &u)) {
+        *event = VI_DRIFT_NO_EVENT;
     }
     if (s->record->extrema) {
         vi_extremes_of_drift(s, &drift, u);

@@ -65,7 +65,8 @@ static bool fits(const vi_structure *s, const vi_situation *now, double length)
 {
     const int64_t modes = vi_structure_modes(s->model);
     return modes >= FEWEST_MODES && s->power != NULL && s->state->budget.events * modes * modes >= REPAID
-           && vi_structure_is_plain(s) && !vi_structure_stops_move(s->model) && !s->model->coupled && !s->model->varies
+           && vi_structure_is_plain(s) && !vi_structure_stops_move(s->model) && !vi_structure_grows(s->model)
+           && !s->model->coupled && !s->model->varies
            && !now->any_thin && !s->state->follow_energies
            && length * s->model->fastest > ONE_SEGMENT && moves(s);
 }

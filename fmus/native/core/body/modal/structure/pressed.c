@@ -290,7 +290,7 @@ double vi_structure_rest_on(const vi_structure *s, double length, double room)
 {
     int32_t port[VI_PORTS];
     if (s->pressed == NULL || !vi_structure_is_plain(s) || vi_structure_stops_move(s->model)
-        || s->state->series < PATIENCE_HELD || !moves(s)) {
+        || vi_structure_grows(s->model) || s->state->series < PATIENCE_HELD || !moves(s)) {
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);

@@ -6,6 +6,7 @@
 
 #include "body/landing.h"
 #include "body/modal/forces.h"
+#include "body/modal/growth.h"
 #include "body/modal/held.h"
 #include "body/modal/loads.h"
 #include "body/modal/modal_flight.h"
@@ -17,6 +18,7 @@
 #include "body/modal/structure/random_flight.h"
 #include "body/modal/structure/search.h"
 #include "body/modal/structure/settle.h"
+#include "body/modal/structure/unbounded.h"
 #include "motion/majorant.h"
 
 /* Time that a released contact stays on its stop, in units of 1 / fastest rate + |time|. Contacts released together
@@ -105,8 +107,9 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
     const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
-    return lasts && !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods
-           && !s->state->follow_energies;
+    const bool is_limited = vi_structure_grows(s->model) && s->model->displacement_limit > 0.0;
+    return lasts && !is_limited && !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema
+           && !s->record->periods && !s->state->follow_energies;
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -205,7 +208,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_phase phase;
     const vi_drive drive = vi_structure_drive_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, &drive,
-                    vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
+                    vi_min(vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), vi_growth_reach(s->model)),
+                    bounce < HUGE_VAL);
     vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
     vi_search_points(s, &flight, points);
     const bool idle = vi_search_is_idle(s, &flight, points);
@@ -218,7 +222,9 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     if (search_result == VI_SEARCH_BEYOND) {
         return false;
     }
-    const bool meets = search_result == VI_SEARCH_CONTACT, whole = !meets && found.u >= length;
+    const bool touches = search_result == VI_SEARCH_CONTACT;
+    const bool ends = vi_unbounded_flight(s, &flight, points, touches, &found.u), meets = touches && !ends;
+    const bool whole = !meets && !ends && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);
@@ -417,6 +423,9 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
+    if (state->unbounded) {
+        return VI_STEP_UNBOUNDED;
+    }
     if (VI_STOPS_MOVE && vi_stop_motions_jam(s, VI_ROUNDING, pair)) {
         return VI_STEP_STANDSTILL;
     }
@@ -427,6 +436,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     begin_step(s);
+    s->state->unbounded = VI_BOUNDED;
     vi_step_result result = VI_STEP_DONE;
     while (result == VI_STEP_DONE && !s->state->pending
            && vi_clock_is_before(s->state->now, target)) {
