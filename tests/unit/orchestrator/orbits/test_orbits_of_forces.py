@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from support.orbit_flow import state_at_phase_0
 
 import vibroimpact as vi
+from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.energies import orbit_energies
 from vibroimpact.analysis.orbits.feedback import impact_map
@@ -65,7 +66,7 @@ some = st.floats(0.2, 1.0)
 
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
-    """Draw a chain of one to three masses under two or three sines, and perhaps a constant force."""
+    """Draw a chain of one to three masses under two or three sines, perhaps a constant force and a moving stop."""
     masses = draw(st.integers(1, 3))
     ratios = draw(st.lists(st.sampled_from([0.5, 1.5, 2.0, 3.0, 2.5]), min_size=1, max_size=2, unique=True))
     forces: list[Tables] = [
@@ -84,8 +85,11 @@ def scenes(draw: st.DrawFn) -> Scene:
         "stiffnesses": [draw(some) for _ in range(masses)],
         "dampings": [0.1 * draw(some) for _ in range(masses)],
     }
-    stops = [{"position": draw(st.floats(0.1, 0.8)), "restitution": draw(st.floats(0.3, 0.9))}]
-    return scene(body=chain, stop=stops, forcing=forces)
+    stop: Tables = {"position": draw(st.floats(0.1, 0.8)), "restitution": draw(st.floats(0.3, 0.9))}
+    if draw(st.booleans()):
+        stop |= {"motion_amplitude": 0.2 * draw(some), "motion_phase": draw(st.floats(-3.0, 3.0))}
+        stop |= {"motion_angular_frequency": 0.9 * draw(st.sampled_from([0.5, 1.0, 2.0]))}
+    return scene(body=chain, stop=[stop], forcing=forces)
 
 
 @settings(max_examples=8, derandomize=True, deadline=None)
@@ -101,6 +105,35 @@ def test_orbits_are_fixed_points_of_runs(drawn: Scene) -> None:
         grown = max(1.0, float(np.abs(orbit.multipliers[0])))
         assert run.final_state is not None
         assert np.abs(run.final_state - state).max() <= 1e-10 * grown * (1.0 + np.abs(state).max())
+
+
+def ball(gamma: float) -> Scene:
+    """Return a ball on a table that is shaken with an acceleration of gamma g; g = 1 and the frequency is 1."""
+    table = {"position": 0.0, "side": "lower", "restitution": 0.5, "motion_amplitude": gamma}
+    return Scene.from_dict(
+        {
+            "scene": {"units": "nondimensional"},
+            "body": {"mass": 1.0, "stiffness": 0.0, "displacement_start": 3.0},
+            "forcing": [{"signal": "constant", "amplitude": -1.0}],
+            "stop": [table | {"motion_angular_frequency": 1.0, "motion_phase": 0.3}],
+            "record": {"transient_periods": 40, "recorded_periods": 4, "impacts": True},
+        }
+    )
+
+
+def test_a_ball_on_a_shaken_table_has_its_known_orbits() -> None:
+    stable, unstable = vi.find_orbits(ball(1.2))
+    assert (stable.name, stable.is_stable, unstable.is_stable) == ("P(1,1)", True, False)
+    np.testing.assert_allclose(
+        [each.velocities[0] for each in (stable, unstable)], 4.0 * np.pi / 3.0, rtol=1e-14
+    )
+    with closing(PointRunner(ball(1.2), execution="fused")) as runner:
+        impacts = runner.run({}, tuple(state_at_phase_0(stable).tolist())).impacts
+    assert impacts is not None
+    np.testing.assert_allclose(impacts[:, 2], stable.velocities[0], rtol=1e-12)
+    found = vi.follow(ball(1.2), "stop[1].motion_amplitude", 1.2, 1.6, doublings=0)
+    doubling = found.motion_amplitude.values[found.orbit_special.values == SpecialOrbit.period_doubling]
+    np.testing.assert_allclose(doubling, 1.526823700519061, rtol=1e-12)
 
 
 def test_follow_takes_the_amplitude_of_a_further_sine_and_refuses_its_frequency() -> None:
