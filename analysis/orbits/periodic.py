@@ -9,11 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.trigonometric import TURN, SumOfSines
+from vibroimpact.analysis.orbits.trigonometric import SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
+TURN = 2.0 * np.pi
 MOST_STEPS = 60
 """Number of Newton steps after which the search for an orbit fails."""
 MOST_HALVINGS = 12

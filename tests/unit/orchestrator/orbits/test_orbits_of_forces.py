@@ -21,6 +21,7 @@ from vibroimpact.analysis.orbits.normal_forms import one_mode
 from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.orchestrator.orbits import impacting_body
+from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 
@@ -105,6 +106,26 @@ def test_orbits_are_fixed_points_of_runs(drawn: Scene) -> None:
         grown = max(1.0, float(np.abs(orbit.multipliers[0])))
         assert run.final_state is not None
         assert np.abs(run.final_state - state).max() <= 1e-10 * grown * (1.0 + np.abs(state).max())
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_basins_follow_states_in_lanes_and_one_by_one_alike(first: bool) -> None:
+    states = np.array([[0.1, -0.4], [-0.3, 0.2], [0.4, 1.1]])
+    ends = []
+    for how in ("auto", "fused"):
+        flow = BodyFlow(scene(execution={"how": how}), workers=1)
+        with closing(flow):
+            ends.append(flow.follow(states, 3, first=first))
+    assert all(each.well.all() for each in ends)
+    np.testing.assert_allclose(ends[0].states, ends[1].states, rtol=0.0, atol=1e-12)
+
+
+def test_basins_take_a_moving_stop() -> None:
+    stop = {"position": 0.5, "restitution": 0.7, "motion_amplitude": 0.1, "motion_angular_frequency": 0.8}
+    found = vi.basins(scene(stop=[stop]), points=(3, 3))
+    assert found.attractor_name.values.tolist() == ["P(1,1)"]
+    beyond = found.displacement_start.values > 0.5 + 0.1  # of the stop at time 0
+    np.testing.assert_array_equal(found.basin.values, np.broadcast_to(np.where(beyond, -2, 0), (3, 3)))
 
 
 def ball(gamma: float) -> Scene:
