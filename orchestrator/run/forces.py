@@ -87,8 +87,7 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
         }
     for number, stop in enumerate(scene.stops, start=1):
         if isinstance(stop, StopTable) and stop.moves:
-            phase = stop.motion_phase - turned * stop.motion_angular_frequency
-            found[f"stop[{number}].phase"] = phase
+            found[f"stop[{number}].phase"] = stop.motion_phase - turned * stop.motion_angular_frequency
     return found | _signal_floats(scene, body) | _table_floats(scene)
 
 

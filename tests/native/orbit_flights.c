@@ -478,7 +478,7 @@ static void check_refusals(uint64_t *seed)
     REFUSED(bad.sine[0] = (double)NAN);
     REFUSED(bad.stop_cosine[0] = (double)INFINITY);
     REFUSED(bad.body.contacts = 0);
-    REFUSED(bad.body.contacts = VI_PORTS + 1);
+    REFUSED(bad.body.contacts = VI_ORBIT_CONTACTS + 1);
     REFUSED(bad.body.angular_frequency = 0.0);
     REFUSED(bad.body.angular_frequency = (double)NAN);
     REFUSED(bad.natural[0] = 0.0; bad.damping_ratio[0] = 0.1);

@@ -32,7 +32,8 @@ class Flow:
         """Return the state after a flight of u seconds from a phase of the clock."""
         waves = [(np.cos(n * phase), np.sin(n * phase)) for n in self.body.harmonics]
         start = np.concatenate([state, [1.0], np.ravel(waves)])
-        return (expm(self.matrix * u) @ start)[: state.size]
+        end: np.ndarray = expm(self.matrix * u) @ start
+        return end[: state.size]
 
     def gap(self, contact: int, state: np.ndarray, phase: float, derivative: int) -> float:
         """Return the distance beyond a stop, or the speed towards it relative to it."""

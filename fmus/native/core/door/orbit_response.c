@@ -23,8 +23,8 @@ static bool is_finite(int count, const double values[])
 
 static bool is_body(const vi_orbit_body *body)
 {
-    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS
-                && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS && body->angular_frequency > 0.0
+    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1
+                && body->contacts <= VI_ORBIT_CONTACTS && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS && body->angular_frequency > 0.0
                 && isfinite(body->angular_frequency);
     for (int k = 0; good && k < body->harmonics; ++k) {
         good = body->order[k] >= 1.0 && body->order[k] == floor(body->order[k])
