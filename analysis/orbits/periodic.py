@@ -182,7 +182,8 @@ def least_speed(body: ImpactingBody) -> float:
 
     Impulses on a body without a spring balance each other. A single impact then has the speed of rounding.
     """
-    return TOUCHES * body.scale * body.angular_frequency if body.loose else 0.0
+    fastest = max(body.harmonics) * body.angular_frequency
+    return TOUCHES * body.scale * fastest if body.loose else 0.0
 
 
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:

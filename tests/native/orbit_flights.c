@@ -136,8 +136,9 @@ static void couple(uint64_t *seed, orbit_case *drawn)
     for (int k = 0; k < body->harmonics; ++k) {
         rate[k] = body->order[k] * body->angular_frequency;
     }
-    CHECK(vi_door_orbit_couple(modes, body->harmonics, rate, body->natural, damping, body->cosine, body->sine, &coupling,
-                               &work) == 0,
+    CHECK(vi_door_orbit_couple(modes, body->harmonics, rate, body->natural, damping, body->cosine, body->sine,
+                               &coupling, &work)
+              == 0,
           "%d modes", modes);
     body->coupling = &coupling;
 }
@@ -384,7 +385,8 @@ static void check_wave(const orbit_case *drawn)
     CHECK(vi_door_orbit_wave(&drawn->body, &one, &level, cosine, sine) == VI_ORBIT_DONE, "wave");
     for (phase = 0.0; phase < TURN; phase += 0.7) {
         double velocity, distance, slopes[2], sum = level, size = fabs(level);
-        CHECK(vi_door_orbit(&drawn->body, &one, &velocity, &distance, &slopes[0], &slopes[1]) == VI_ORBIT_DONE, "impact");
+        CHECK(vi_door_orbit(&drawn->body, &one, &velocity, &distance, &slopes[0], &slopes[1]) == VI_ORBIT_DONE,
+              "impact");
         for (int k = 0; k < drawn->body.harmonics; ++k) {
             const double angle = drawn->order[k] * phase;
             sum += cosine[k] * cos(angle) + sine[k] * sin(angle);

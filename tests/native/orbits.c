@@ -172,7 +172,8 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
         s.natural[0] = s.damping_ratio[0] = 0.0;
     }
     const int end = vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster);
-    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT || end == VI_ORBIT_ADRIFT, "end %d", end);
+    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT || end == VI_ORBIT_ADRIFT,
+          "end %d", end);
     if (end != VI_ORBIT_DONE) {
         return;
     }
@@ -203,8 +204,8 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
     if (invariants && expected > -12.0 && slowest > 1e-3) {
         const double exact = exp(expected), size = determinant_bound(2 * modes, monodromy);
         const double found = determinant(2 * modes, monodromy);
-        CHECK(fabs(found - exact) <= 1e-6 * exact + 1e-13 * size,
-              "%d modes: determinant %.17g, not %.17g", modes, found, exact);
+        CHECK(fabs(found - exact) <= 1e-6 * exact + 1e-13 * size, "%d modes: determinant %.17g, not %.17g", modes,
+              found, exact);
     }
 }
 

@@ -24,8 +24,8 @@ static bool is_finite(int count, const double values[])
 static bool is_body(const vi_orbit_body *body)
 {
     bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1
-                && body->contacts <= VI_ORBIT_CONTACTS && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS && body->angular_frequency > 0.0
-                && isfinite(body->angular_frequency);
+                && body->contacts <= VI_ORBIT_CONTACTS && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS
+                && body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
     for (int k = 0; good && k < body->harmonics; ++k) {
         good = body->order[k] >= 1.0 && body->order[k] == floor(body->order[k])
                && is_finite(body->modes, body->cosine + (ptrdiff_t)k * body->modes)
@@ -36,7 +36,8 @@ static bool is_body(const vi_orbit_body *body)
     for (int j = 0; good && j < body->modes; ++j) {
         good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
                && isfinite(body->damping_ratio[j] + body->held[j])
-               && (body->natural[j] > 0.0 || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
+               && (body->natural[j] > 0.0
+                   || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
         good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0
