@@ -50,7 +50,14 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import MOTION_KEYS, ContactTable, Execution, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import (
+    MOTION_KEYS,
+    ContactTable,
+    Execution,
+    Record,
+    SceneTable,
+    Stop,
+)
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
@@ -401,7 +408,13 @@ class Parts(SceneTable):
             return self._component_numbers().numbers()
         tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
         found = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
-        return ((key, number) for key, number in found if not is_left_out(key))
+        standing = {
+            f"{key}.{motion}"
+            for key, stop in zip(self.stop_keys, self.stops, strict=True)
+            if not stop.moves
+            for motion in MOTION_KEYS
+        }
+        return ((key, number) for key, number in found if not (is_left_out(key) or key in standing))
 
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables with numbers, by their name in keys."""

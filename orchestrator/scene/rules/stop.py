@@ -151,14 +151,12 @@ def motions_are_whole(draft: Draft) -> Iterator[Problem]:
         if stop is not None and stop.moves:
             yield from _sine_problems(draft, stop, f"stop[{number}]")
             yield from _table_problems(stop, f"stop[{number}]")
-    moving = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.moves), 0)
-    if not moving:
-        return
+    drifting = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.drifts), 0)
     for axis in draft.axes:
-        if axis.continuation:
-            hint = "A stop moves from time 0 on, so that the end of a run is no start of the next."
+        if drifting and axis.continuation:
+            hint = "It moves on from time 0, so that the end of a run is no start of the next."
             key = key_path(("sweep", axis.key, "path"))
-            yield Problem(key, f'"independent" beside the moving stop[{moving}]', "a continuation", hint)
+            yield Problem(key, f'"independent" beside a stop[{drifting}] that drifts', "a continuation", hint)
 
 
 def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]:
@@ -166,9 +164,7 @@ def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]
     frequency = draft.span(f"{where}.motion_angular_frequency") or (0.0, 0.0)
     if any(amplitude) and frequency[0] == 0.0:
         hint = "The stop moves by motion_amplitude cos(motion_angular_frequency time + motion_phase)."
-        yield Problem(
-            f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint
-        )
+        yield Problem(f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint)
 
 
 def _table_problems(stop: OwnStop, where: str) -> Iterator[Problem]:

@@ -196,7 +196,14 @@ class _Points:
             span = draft.span(f"stop[{number}].position")
             if stop is not None and stop.at is not None and span is not None:
                 point = self._body.point(stop.at)
-                yield _Limit(f"stop[{number}]", (point,), stop.side == "upper", LAWS[stop.law].is_rigid, span, stop.moves)
+                yield _Limit(
+                    f"stop[{number}]",
+                    (point,),
+                    stop.side == "upper",
+                    LAWS[stop.law].is_rigid,
+                    span,
+                    stop.moves,
+                )
         for number, contact in enumerate(draft.meetings, start=1):
             span = draft.span(f"contact[{number}].clearance")
             if contact is None or span is None:

@@ -206,8 +206,8 @@ double vi_stop_motions_work(const vi_structure *s, const double impulse[])
 /* Difference of the directions of two rows up to which they count as one line, relative to their sizes. */
 static const double PARALLEL = 16.0 * DBL_EPSILON;
 
-/* Room between the stops of contacts i and k, relative to their displacements, where they hold one line of a body from
- * both sides; HUGE_VAL where they do not. */
+/* Room between the stops of contacts i and k, relative to their displacements. HUGE_VAL unless they limit one line of a
+ * body from both sides, and one of them moves. */
 static double room_between(const vi_structure *s, int i, int k)
 {
     const vi_structure_model *model = s->model;

@@ -1,7 +1,7 @@
 /* Stops that move. The motion of a stop is given, so no force changes it: it is that of a body of infinite mass.
  *
- * Each given motion is a mode behind those of the bodies: an undamped mode for a sine, a mode without a spring for a
- * velocity and a table. Row k of the shapes has minus the motion of stop k, so shape_k . q is the displacement of the
+ * Each given motion is a mode behind those of the bodies. It is undamped for a sine, and has no spring for a velocity and
+ * a table. Row k of the shapes has minus the motion of stop k, so shape_k . q is the displacement of the
  * contact relative to its stop. Impulses and forces of contacts push the modes of the bodies only. Clearances, bounds,
  * sums of chatter, rest and release then need no case for a moving stop. equations.md 6.13
  */
