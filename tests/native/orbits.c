@@ -10,14 +10,14 @@
 
 static const double TURN = 6.283185307179586;
 
-enum { HARMONICS = 3 };
+enum { HARMONICS = 3, CONTACTS = 8 };
 
 typedef struct {
     double natural[VI_MODES], damping_ratio[VI_MODES], held[VI_MODES];
     double order[HARMONICS], cosine[HARMONICS * VI_MODES], sine[HARMONICS * VI_MODES];
-    double stop_cosine[HARMONICS * VI_ORBIT_CONTACTS], stop_sine[HARMONICS * VI_ORBIT_CONTACTS];
-    double shape[VI_ORBIT_CONTACTS * VI_MODES], impulse[VI_ORBIT_CONTACTS * VI_MODES];
-    double direction[VI_ORBIT_CONTACTS], position[VI_ORBIT_CONTACTS], restitution[VI_ORBIT_CONTACTS];
+    double stop_cosine[HARMONICS * CONTACTS], stop_sine[HARMONICS * CONTACTS];
+    double shape[CONTACTS * VI_MODES], impulse[CONTACTS * VI_MODES];
+    double direction[CONTACTS], position[CONTACTS], restitution[CONTACTS];
     double phase[VI_ORBIT_IMPACTS];
     int32_t contact[VI_ORBIT_IMPACTS];
     vi_orbit_body body;
@@ -29,7 +29,7 @@ typedef struct {
 
 static void draw(sample *s, uint64_t *seed, int most_modes)
 {
-    const int modes = 1 + (int)choice(seed, (unsigned)most_modes), contacts = 1 + (int)choice(seed, VI_ORBIT_CONTACTS);
+    const int modes = 1 + (int)choice(seed, (unsigned)most_modes), contacts = 1 + (int)choice(seed, CONTACTS);
     for (int j = 0; j < modes; ++j) {
         s->natural[j] = pow(10.0, uniform(seed, -1.0, 1.5));
         s->damping_ratio[j] = choice(seed, 4) ? uniform(seed, 0.0, 0.2) : uniform(seed, 0.9, 3.0);
