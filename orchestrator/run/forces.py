@@ -119,7 +119,7 @@ def _table_floats(scene: Scene) -> dict[str, float]:
 
 def phases_of_new_start(scene: Scene) -> dict[str, float]:
     """Return the phases of the sines, by variable name, where time 0 is where the phase of the clock is 0."""
-    if not scene.has_several_forces:
+    if not scene.lists_forces:
         return {"forcing.phase": 0.0}
     floats = force_floats(scene, begins_anew=False)
     return {name: value for name, value in floats.items() if name.endswith(".phase")}

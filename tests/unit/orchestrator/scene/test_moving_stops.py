@@ -119,11 +119,13 @@ def test_a_wrong_motion_is_named(lines: tuple[str, ...], without: tuple[str, ...
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("study", [vi.find_orbits, vi.accuracy])
-def test_studies_of_stops_that_stand_still_name_a_moving_one(study: Any) -> None:
+@pytest.mark.parametrize(
+    ("study", "lines"), [(vi.find_orbits, ("velocity = 0.1",)), (vi.accuracy, ())], ids=["orbit", "accuracy"]
+)
+def test_studies_name_a_moving_stop_that_they_do_not_take(study: Any, lines: tuple[str, ...]) -> None:
     forced = ("[forcing]", "amplitude = 0.1", "angular_frequency = 2.0")
     with pytest.raises(UsageError, match=r"stop\[1\]"):
-        study(scene(*forced, without=("forcing =",)))
+        study(scene(*lines, *forced, without=("forcing =",)))
 
 
 def test_runs_end_by_name_where_moving_stops_leave_no_room() -> None:
