@@ -224,11 +224,13 @@ class PulseForcing(SignalForcing):
         Rule(doc='`"half_sine"`, `"triangle"` with equal flanks, or `"trapezoid"` with `rise`'),
     ]
     rise: Annotated[
-        NotNegative,
+        NotNegative | None,
         Rule(
-            unit="s", doc="of a trapezoid: its rise and its fall, up to half of the duration; 0: a rectangle"
+            unit="s",
+            doc="of a trapezoid: its rise and its fall, up to half of the duration; 0: a rectangle",
+            default="0",
         ),
-    ] = 0.0
+    ] = None
 
     @property
     def kind_number(self) -> int:
@@ -237,7 +239,7 @@ class PulseForcing(SignalForcing):
 
     def numbers(self) -> dict[str, float]:
         """Return start, duration and rise."""
-        return {"start": self.start, "duration": self.duration, "rise": self.rise}
+        return {"start": self.start, "duration": self.duration, "rise": self.rise or 0.0}
 
     def values_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the shape of the pulse, and 0 outside."""
@@ -245,7 +247,7 @@ class PulseForcing(SignalForcing):
         inside = (part >= 0.0) & (part <= 1.0)
         if self.shape == "half_sine":
             return np.where(inside, np.sin(math.pi * np.clip(part, 0.0, 1.0)), 0.0)
-        rise = 0.5 if self.shape == "triangle" else self.rise / self.duration
+        rise = 0.5 if self.shape == "triangle" else (self.rise or 0.0) / self.duration
         flank = np.minimum(part, 1.0 - part)
         return np.where(inside, np.minimum(flank / rise, 1.0) if rise > 0.0 else 1.0, 0.0)
 

@@ -35,6 +35,7 @@ class Body(NamedTuple):
     ratios: np.ndarray
     forced: np.ndarray
     contacts: np.ndarray
+    damping: np.ndarray | None = None
 
 
 def body_of(random: np.random.Generator, contacts: int) -> Body:
@@ -42,16 +43,20 @@ def body_of(random: np.random.Generator, contacts: int) -> Body:
     undamped = random.random() < 0.2
     ratios = np.zeros(modes) if undamped else random.uniform(0.0, 0.1, modes)
     shapes = 1.0 + random.normal(size=(contacts, modes))
+    factor = 0.2 * random.normal(size=(modes, modes))
     return Body(
-        np.sort(random.uniform(0.3, 6.0, modes)), ratios, 1.0 + 0.3 * random.normal(size=modes), shapes
+        np.sort(random.uniform(0.3, 6.0, modes)),
+        ratios,
+        1.0 + 0.3 * random.normal(size=modes),
+        shapes,
+        factor @ factor.T if random.random() < 0.3 else None,
     )
 
 
 def sines_of(random: np.random.Generator, body: Body, count: int) -> list[Sine]:
     """Return sines at any frequencies, now and then at that of a mode."""
-    frequencies = [
-        body.frequencies[0] if random.random() < 0.15 else random.uniform(0.2, 4.0) for _ in range(count)
-    ]
+    drawn = 10.0 ** random.uniform(-0.7, random.choice([0.6, 2.5]), count)
+    frequencies = [body.frequencies[0] if random.random() < 0.15 else w for w in drawn]
     return [Sine(random.uniform(0.1, 1.0), float(w), random.uniform(0.0, 2.0 * math.pi)) for w in frequencies]
 
 
@@ -75,7 +80,9 @@ def fmu_of(
         "mode.contact_shape": body.contacts,
         "mode.sine": np.tile(body.forced, (max(1, len(sines)), 1)),
     }
-    return structure_fmu(arrays, given, **options)
+    if body.damping is not None:
+        arrays["mode.damping"] = body.damping
+    return structure_fmu(arrays, given, coupled=body.damping is not None, **options)
 
 
 def stops_of(random: np.random.Generator, count: int) -> dict[str, float]:
@@ -140,7 +147,7 @@ def superposed(body: Body, sines: Sequence[Sine], time: float) -> tuple[float, f
 @settings(max_examples=20)
 def test_motions_add_up_and_the_millionth_period_is_as_exact_as_the_first(seed: int, periods: float) -> None:
     random = np.random.default_rng(seed)
-    body = body_of(random, 0)
+    body = body_of(random, 0)._replace(damping=None)
     clock, *sines = sines_of(random, body._replace(frequencies=np.array([5.0])), 4)
     time = 2.0 * math.pi * periods / clock.angular_frequency
     parameters = {"record.extrema": False}

@@ -56,7 +56,10 @@ void vi_structure_prepare(vi_structure_model *model)
     model->fastest = coupling_rate(model);
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        for (int k = 0; k < vi_mode_sines(mode); ++k) {
+            rate = vi_max(rate, mode->further[k].angular_frequency);
+        }
         model->fastest = vi_max(model->fastest, rate);
     }
     model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
