@@ -6,7 +6,6 @@
 
 #include "body/landing.h"
 #include "body/modal/forces.h"
-#include "body/modal/growth.h"
 #include "body/modal/held.h"
 #include "body/modal/modal_flight.h"
 #include "body/modal/structure/arrival.h"

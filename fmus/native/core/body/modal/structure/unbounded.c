@@ -96,8 +96,8 @@ static double drift_beyond(const vi_structure *s, const vi_drift *drift, double 
 
 /* ---- stops out of reach ---- */
 
-/* Distance by which the unforced part of a mode may come closer to a stop from now on, m, for a weight towards the stop;
- * HUGE_VAL where it is not bounded. *leaves: the mode grows away from the stop. */
+/* Distance by which the unforced part of a mode may come closer to a stop from now on, m; HUGE_VAL where it is not
+ * bounded. `weight`: of the mode towards the stop. *leaves: the mode grows away from the stop. */
 static double approach_of(const vi_segment *segment, const vi_part *part, double weight, bool *leaves)
 {
     const vi_mode *mode = segment->mode;
