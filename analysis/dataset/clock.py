@@ -8,23 +8,23 @@ from typing import Any
 from vibroimpact.fmus.errors import DatasetError
 
 CLOCK_PERIODS = "clock_periods"
-"""Attribute: periods of the first sine in a forcing period; 0 where the sines have no common period."""
+"""Attribute: periods of the first sine in a forcing period; 0 where not all forces repeat with it."""
 
 
 def refuse_quasi_periodic(attrs: Mapping[Any, Any], study: str) -> None:
-    """Raise DatasetError for runs under sines without a common period, whose motion repeats with none of them.
+    """Raise DatasetError for runs under forces without a common period, whose motion does not repeat.
 
     Examples
     --------
     >>> refuse_quasi_periodic({"clock_periods": 2}, "classify")
     >>> refuse_quasi_periodic({"clock_periods": 0}, "classify")
     Traceback (most recent call last):
-    vibroimpact.fmus.errors.DatasetError: classify: expected sines with a common period, got sines without one. The \
-motion is quasi-periodic.
+    vibroimpact.fmus.errors.DatasetError: classify: expected forces with a common period, got forces without one. Their \
+motion does not repeat.
     """
     if attrs.get(CLOCK_PERIODS, 1) == 0:
         raise DatasetError(
-            f"{study}: expected sines with a common period, got sines without one. The motion is quasi-periodic."
+            f"{study}: expected forces with a common period, got forces without one. Their motion does not repeat."
         )
 
 

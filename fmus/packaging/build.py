@@ -217,8 +217,9 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
     # the constants remove loops over modes from a body with only one, and further loads from bodies without
-    constants = {"VI_ONLY_MODES": 0 if modes is not None else 1, "VI_SINES": blocks.get("sine", 0)}
-    return {**arrays, **constants, "VI_DEGREE": component.degree, "VI_GROWING": int(component.growing)}
+    constants = {f"VI_{block.upper()}S": blocks.get(block, 0) for block in ("sine", "signal")}
+    constants |= {"VI_ONLY_MODES": 0 if modes is not None else 1, "VI_GROWING": int(component.growing)}
+    return {**arrays, **constants, "VI_DEGREE": component.degree}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:

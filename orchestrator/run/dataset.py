@@ -20,7 +20,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS, RunColumns, arrays_of
-from vibroimpact.analysis.dataset.schema import POINT_COLUMNS, RAGGED, RULES, SWEPT_ALONG
+from vibroimpact.analysis.dataset.schema import POINT_COLUMNS, RAGGED, RULES, SWEPT_ALONG, unit_in
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
@@ -76,6 +76,8 @@ class DatasetForm:
             known = scene.body.long_names(scene.stops)
             own = {stored[name]: {"long_name": known[name]} for name in scene.sampled if name in known}
             self._attributes |= own | self._of_further(scene.body)
+        own = _attributes_of_forces(scene)
+        self._attributes |= {stored[name]: own[name] for name in scene.sampled if name in own}
         if not scene.is_one_body and records_impacts(scene):
             self._attributes["impact_contact"] = _named_contacts([each.name for each in scene.meetings])
 
@@ -241,21 +243,26 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         units = dict(scene.declared_units)
         stored = {file: units[key] for key, file in names.items() if key in units}
         return units | stored if scene.units == "SI" else stored
-    forcing = _units_of_forces(scene)
-    forcing |= dict.fromkeys(scene.channels, "V")
+    forcing = None if scene.has_several_forces else scene.forcing
+    units = {} if forcing is None else {"forcing": FORCING_UNITS[forcing.kind]}
+    units |= dict.fromkeys(scene.channels, "V")
     if isinstance(scene.body, StructureBody):
-        forcing |= {
+        units |= {
             name: _OF_MOTION[name.partition("[")[0]] for name in observed_variables(scene.record.observed)
         }
-    return forcing | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
+    return units | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
-def _units_of_forces(scene: Scene) -> dict[str, str]:
-    """Return the units of the sampled forces, by name in a time series."""
-    forcing = None if scene.has_several_forces else scene.forcing
-    if forcing is not None:
-        return {"forcing": FORCING_UNITS[forcing.kind]}
-    return {f"forcing[{n}]": FORCING_UNITS[force.kind] for n, force in enumerate(scene.forces, start=1)}
+def _attributes_of_forces(scene: Scene) -> dict[str, dict[str, Any]]:
+    """Return names and units of the samples of several forces, by name in a time series."""
+    forces = enumerate(scene.forces if scene.has_several_forces else (), start=1)
+    return {
+        f"forcing[{number}]": {
+            "long_name": f"force {number} of the scene, {force.signal}",
+            "units": unit_in(scene.units, FORCING_UNITS[force.kind]),
+        }
+        for number, force in forces
+    }
 
 
 def cf_unit(scene: Scene, key: str) -> str | None:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
-from vibroimpact.orchestrator.scene.forcing_clock import sines_of
-from vibroimpact.orchestrator.scene.forcing_models import ConstantForcing, Force, Forcing
+from vibroimpact.orchestrator.scene.forcing_clock import signals_of, sines_of
+from vibroimpact.orchestrator.scene.forcing_models import ConstantForcing, Force, Forcing, SignalForcing
 
 Floats = NDArray[np.float64]
+_BASE = "base_acceleration"
 
 
 def further_forces(scene: Scene) -> list[Force]:
@@ -25,11 +26,21 @@ def further_forces(scene: Scene) -> list[Force]:
 
 
 def force_integers(scene: Scene) -> dict[str, int]:
-    """Return whether each force besides the clock is an acceleration of the base, by variable name."""
-    return {
-        f"sine[{number}].of_base": force.kind == "base_acceleration"
-        for number, force in enumerate(further_forces(scene), start=1)
-    }
+    """Return the kinds and tables of signals, and whether each force is an acceleration of the base, by variable."""
+    sines = enumerate(further_forces(scene), start=1)
+    found: dict[str, int] = {f"sine[{number}].of_base": force.kind == _BASE for number, force in sines}
+    first = 1
+    for number, signal in enumerate(signals_of(scene.forces), start=1):
+        count = len(signal.rows[0])
+        found |= {
+            f"signal[{number}].kind": signal.kind_number,
+            f"signal[{number}].of_base": signal.kind == _BASE,
+            f"signal[{number}].seed": signal.seed_number,
+            f"signal[{number}].table_start": first if count else 1,
+            f"signal[{number}].table_count": count,
+        }
+        first += count
+    return found
 
 
 def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
@@ -68,12 +79,26 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
             f"sine[{number}].phase": phase - turned * frequency,
             **_row("mode.sine", f"{number},", body.load(force)),
         }
+    return found | _signal_floats(scene, body)
+
+
+def _signal_floats(scene: Scene, body: StructureBody) -> dict[str, float]:
+    """Return the real parameters of signals that are no sines, with their tables one after the other."""
+    found: dict[str, float] = {}
+    before = 0
+    for number, signal in enumerate(signals_of(scene.forces), start=1):
+        found[f"signal[{number}].amplitude"] = _amplitude(signal)
+        found |= {f"signal[{number}].{name}": value for name, value in signal.numbers().items()}
+        found |= _row("mode.signal", f"{number},", body.load(signal))
+        for name, column in zip(("time", "value"), signal.rows, strict=True):
+            found |= {f"table.{name}[{row}]": value for row, value in enumerate(column, start=before + 1)}
+        before += len(signal.rows[0])
     return found
 
 
 def _amplitude_of_clock(sine: Forcing) -> dict[str, float]:
     """Return the amplitude of the first sine; the FMU adds the motion of a base to its accelerations."""
-    name = "forcing.base_acceleration" if sine.kind == "base_acceleration" else "forcing.amplitude"
+    name = "forcing.base_acceleration" if sine.kind == _BASE else "forcing.amplitude"
     return {name: _amplitude(sine)}
 
 
@@ -109,6 +134,10 @@ class Forces:
         """Return the force of a number, from 1, at instants; the sum over the masses for an array of amplitudes."""
         force = self._forces[number - 1]
         size = math.fsum(force.amplitude) if isinstance(force.amplitude, tuple) else force.amplitude
+        if isinstance(force, SignalForcing):
+            shape = force.values_at(times)
+            assert shape is not None, "the rules of scenes refuse it"
+            return size * shape
         if not isinstance(force, Forcing):
             return np.full(len(times), size)
         phase = self._phases[len(sines_of(self._forces[: number - 1]))]

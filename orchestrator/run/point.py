@@ -53,6 +53,7 @@ from vibroimpact.orchestrator.run.window import (
     recorded_window,
 )
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.forcing_clock import signals_of
 from vibroimpact.orchestrator.scene.laws import LAWS
 
 if TYPE_CHECKING:
@@ -180,7 +181,9 @@ class PointRunner(Runner):
 
 def built_for(scene: Scene) -> tuple[object, ...]:
     """Return the numbers for which a scene's components are made, and which parameters cannot change later."""
-    return scene.body.size, scene.body.kept_modes, scene.body.is_coupled, scene.execution.macro_step
+    seeds = tuple(signal.seed_number for signal in signals_of(scene.forces))
+    body = scene.body
+    return body.size, body.kept_modes, body.is_coupled, scene.execution.macro_step, seeds
 
 
 def driver_of(

@@ -8,7 +8,7 @@ from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.run.time_series import follow_energies
 from vibroimpact.orchestrator.scene.body_models import StructureBody
-from vibroimpact.orchestrator.scene.forcing_clock import sines_of, sweeps_frequencies
+from vibroimpact.orchestrator.scene.forcing_clock import signals_of, sines_of, sweeps_frequencies
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
@@ -124,6 +124,8 @@ def clock_remark(scene: Scene) -> str:
     'quasi-periodic: 2 sines without a common period; a forcing period is one of the first'
     """
     clock, sines = scene.clock, len(sines_of(scene.forces))
+    if clock is not None and signals_of(scene.forces):
+        return "a forcing period is one of the first sine, with which the other signals do not repeat"
     if clock is None or sines < 2 or clock.periods == 1 == int(clock.is_common):
         return ""
     if clock.is_common:

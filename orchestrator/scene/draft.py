@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import (
@@ -23,6 +24,7 @@ from vibroimpact.orchestrator.scene.forcing_models import (
     FORCING_MODELS,
     Force,
     Forcing,
+    TableForcing,
     forcing_keys,
     is_one_sine,
 )
@@ -126,10 +128,15 @@ class Draft(DraftTables):
     """
 
     def __init__(
-        self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...], *, is_part: bool = False
+        self,
+        document: Mapping[str, Any],
+        axes: tuple[SweepAxis, ...],
+        folder: Path = Path(),
+        *,
+        is_part: bool = False,
     ) -> None:
         super().__init__(with_swept_keys(document, axes))
-        self.axes, self._is_part = axes, is_part
+        self.axes, self._folder, self._is_part = axes, folder, is_part
         self.names: tuple[str | None, ...] = ()
         self.parts: tuple[Draft, ...] = ()
         self.links: tuple[LinkTable | None, ...] = ()
@@ -161,7 +168,20 @@ class Draft(DraftTables):
         if raw is None:
             return ()
         entries = self.entries("forcing") if isinstance(raw, list) else [(raw, ("forcing",))]
-        return tuple(self.variant(FORCING_MODELS, "signal", "sine", *entry) for entry in entries)
+        read = [(self.variant(FORCING_MODELS, "signal", "sine", *entry), entry[1]) for entry in entries]
+        return tuple(self._with_rows(force, path) for force, path in read)
+
+    def _with_rows(self, force: Force | None, path: KeyPath) -> Force | None:
+        """Return a force with the rows of its file, if it names one; None with the problem of a wrong file."""
+        if not isinstance(force, TableForcing) or force.file is None:
+            return force
+        from vibroimpact.orchestrator.scene.forcing_files import rows_of_file  # few scenes need it
+
+        found = rows_of_file(self._folder / force.file, key_path((*path, "file")))
+        if isinstance(found, Problem):
+            self.problems.append(found)
+            return None
+        return force.model_copy(update=dict(zip(("times", "values"), found, strict=True)))
 
     @property
     def forcing(self) -> Forcing | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
 
-from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
+from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing, Signal, SignalForcing
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MOST_PERIODS = 64
@@ -32,7 +32,7 @@ class Clock:
     periods : int
         Periods of the first sine in a period of the clock.
     is_common : bool
-        Whether each sine has a whole number of periods in a period of the clock; otherwise motions are quasi-periodic.
+        Whether all forces repeat with the period of the clock; otherwise motions have no period.
     near : tuple of (int, int, int)
         Number (from 1) of each sine whose ratio p / q to the first sine nearly holds, p, and q.
     """
@@ -54,6 +54,11 @@ def sines_of(forces: Sequence[Force | None]) -> list[Forcing]:
     return [force for force in forces if isinstance(force, Forcing)]
 
 
+def signals_of(forces: Sequence[Force | None]) -> list[Signal]:
+    """Return the forces that are neither sines nor constants, in their order."""
+    return [force for force in forces if isinstance(force, SignalForcing)]
+
+
 def sweeps_frequencies(axes: Sequence[SweepAxis]) -> bool:
     """Return whether a sweep varies the frequency of a force.
 
@@ -66,7 +71,8 @@ def sweeps_frequencies(axes: Sequence[SweepAxis]) -> bool:
 def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False) -> Clock | None:
     """Return the clock of some forces; None without a sine, and for a single force of frequency 0.
 
-    A sweep over a frequency has the first sine as its clock, as points have other common periods or none.
+    A sweep over a frequency has the first sine as its clock, as points have other common periods or none. So have
+    sines beside another signal, which repeats with no period.
 
     Examples
     --------
@@ -80,6 +86,8 @@ def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False
     if not sines:
         return None
     first = sines[0]
+    if signals_of(forces):
+        return Clock(first.angular_frequency, first.phase, is_common=False)
     if len(sines) == 1:
         frequency = first.angular_frequency
         # swept frequencies may be an array, whose numbers are all 0 or all > 0

@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sweeps
 from vibroimpact.orchestrator.scene.forcing_models import (
     Force,
     Forcing,
+    TableForcing,
     forces_in_words,
     forcing_keys,
     is_one_sine,
@@ -261,10 +262,14 @@ class Parts(SceneTable):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Further files that a run reads: recordings and FMUs."""
+        """Further files that a run reads: recordings, tables of forces, and FMUs."""
         folder = Path(self.source).parent
         recordings = self.replay.recordings if self.replay is not None else ()
-        return (*(folder / name for name in recordings), *(component.fmu for component in self.components))
+        tables = (force.file for force in self.forces if isinstance(force, TableForcing) and force.file)
+        return (
+            *(folder / name for name in (*recordings, *tables)),
+            *(component.fmu for component in self.components),
+        )
 
     @property
     def runs(self) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Container, Iterable, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from vibroimpact.orchestrator.scene.forcing_models import Force, is_one_sine
+from vibroimpact.orchestrator.scene.forcing_models import Force, RandomForcing, is_one_sine
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
 from vibroimpact.orchestrator.scene.problems import nearest
 
@@ -53,7 +53,10 @@ def sampled_names(body: BodyTable, stops: int, forces: Sequence[Force | None]) -
     """
     only = forces[0].amplitude if len(forces) == 1 and forces[0] is not None else 0.0
     count = len(forces) if not is_one_sine(forces) else len(only) if isinstance(only, tuple) else 0
-    names = [*_PLAIN, *(each_of("forcing", count) if count else ["forcing"])]
+    loads = each_of("forcing", count) if count else ["forcing"]
+    # the FMU alone knows a random force
+    unknown = [name for name, force in zip(loads, forces, strict=False) if isinstance(force, RandomForcing)]
+    names = [*_PLAIN, *(name for name in loads if name not in unknown)]
     for name in AT_CONTACT:
         names += each_of(name, stops)
     return (*names, *CONSERVATIVE, *body.own_variables, *(INTEGRATED if body.IS_STRUCTURE else ()))

@@ -35,7 +35,7 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
 
         reading = read_components(document, folder)
     else:
-        reading = _read_body(document)
+        reading = _read_body(document, folder)
     problems = [*unknown, *reading.draft.problems, *reading.problems]
     return ({}, problems) if problems else ({**dict(reading.draft.header or {}), **reading.parts()}, [])
 
@@ -49,9 +49,9 @@ def _mixed_problem(general: list[str], short: list[str]) -> Problem:
     return Problem(general[0], expected, got, hint)
 
 
-def _read_body(document: Mapping[str, Any]) -> Reading:
+def _read_body(document: Mapping[str, Any], folder: Path) -> Reading:
     axes, wrong_axes = read_short_sweep(document) if "sweep" in document else ((), [])
-    draft = Draft(document, axes)
+    draft = Draft(document, axes, folder)
     return Reading(draft, wrong_axes + rule_problems(draft), partial(_parts, draft))
 
 

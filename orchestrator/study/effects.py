@@ -226,7 +226,9 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
         effect = rule_of(scene.field(key)).effect
         if effect and value != 0.0:
             called.setdefault(effect, []).append(key)
-    if len(scene.forces) == 1 and np.any(scene.forces[0].amplitude):
+    if len(scene.forces) == 1 and scene.clock is None and scene.has_several_forces:
+        yield _without(scene, "forcing", "forcing", lambda document: document.pop("forcing"))
+    elif len(scene.forces) == 1 and np.any(scene.forces[0].amplitude):
         called["forcing"] = ["forcing.amplitude"]
     if getattr(scene.body, "rayleigh", None) is not None:
         called.setdefault(DAMPING, []).append("body.rayleigh")

@@ -12,6 +12,7 @@ FLOORS = (
     (".",),
     ("motion",),
     ("contact", "measuring", "modes"),
+    ("signals",),
     ("body",),
     ("body/modal",),
     ("body/modal/structure",),

@@ -1,5 +1,6 @@
 /* The file of a structure's modes: read as written, and refused by one line when damaged. */
 #define VI_SINES 15
+#define VI_SIGNALS 8
 #include "../../fmus/native/adapters/resources.c"
 #include "../../fmus/native/structure/structure_file.c"
 
@@ -24,14 +25,17 @@ static uint64_t bits_of(double value)
 }
 
 /* Fill `bytes` with a file of random numbers; returns its length. */
-static size_t make(uint64_t *seed, int modes, int contacts, int sines)
+static size_t make(uint64_t *seed, int modes, int contacts, int sines, int rows)
 {
-    const int count = modes * (VI_STRUCTURE_ROWS + modes + contacts + sines);
+    const int signals = rows > 0 ? 1 : 0;
+    const int count = modes * (VI_STRUCTURE_ROWS + modes + contacts + sines + signals) + 2 * rows;
     memcpy(bytes, MAGIC, LETTERS);
     put_number(LETTERS, (uint64_t)modes);
     put_number(LETTERS + NUMBER, (uint64_t)contacts);
     put_number(LETTERS + 2 * NUMBER, (uint64_t)sines);
-    put_number(LETTERS + 3 * NUMBER, choice(seed, 2));
+    put_number(LETTERS + 3 * NUMBER, (uint64_t)signals);
+    put_number(LETTERS + 4 * NUMBER, (uint64_t)rows);
+    put_number(LETTERS + 5 * NUMBER, choice(seed, 2));
     for (int i = 0; i < count; ++i) {
         put_number(HEAD + (size_t)i * NUMBER, bits_of(uniform(seed, -1.0, 1.0)));
     }
@@ -48,14 +52,15 @@ static vi_structure_file *opened(size_t length, char message[VI_MESSAGE_LENGTH])
 
 static void files_are_read_as_written(uint64_t *seed)
 {
-    static const int sizes[][3] = {{1, 0, 0}, {1, 1, 0}, {5, 3, 2}, {VI_MODES, VI_PORTS, VI_SINES}};
+    static const int sizes[][4] = {
+        {1, 0, 0, 0}, {1, 1, 0, 2}, {5, 3, 2, 0}, {VI_MODES, VI_PORTS, VI_SINES, VI_TABLE_ROOM}};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
         char message[VI_MESSAGE_LENGTH];
-        const size_t length = make(seed, sizes[i][0], sizes[i][1], sizes[i][2]);
+        const size_t length = make(seed, sizes[i][0], sizes[i][1], sizes[i][2], sizes[i][3]);
         vi_structure_file *file = opened(length, message);
         CHECK(file != NULL && message[0] == '\0', "%s", message);
         CHECK(file->modes == sizes[i][0] && file->contacts == sizes[i][1], "%d, %d", file->modes, file->contacts);
-        CHECK(file->sines == sizes[i][2], "%d", file->sines);
+        CHECK(file->sines == sizes[i][2] && file->rows == sizes[i][3], "%d, %d", file->sines, file->rows);
         for (size_t k = 0; k < (length - HEAD) / NUMBER; ++k) {
             CHECK(bits_of(file->numbers[k]) == bits_at(bytes + HEAD + k * NUMBER), "number %zu", k);
         }
@@ -96,7 +101,8 @@ static void a_damaged_file_is_refused_by_one_line(uint64_t *seed)
     int refused = 0;
     for (int i = 0; i < FILES; ++i) {
         char message[VI_MESSAGE_LENGTH];
-        const size_t whole = make(seed, 1 + (int)choice(seed, 5), (int)choice(seed, 4), (int)choice(seed, 3));
+        const size_t whole = make(seed, 1 + (int)choice(seed, 5), (int)choice(seed, 4), (int)choice(seed, 3),
+                                  3 * (int)choice(seed, 2));
         vi_structure_file *file = opened(damaged(seed, whole), message);
         if (file == NULL) {
             static const char start[] = "resources/structure.bin: expected ";

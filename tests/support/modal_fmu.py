@@ -11,6 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from support.component_fmu import ComponentFmu
 
 MODES, CONTACTS = 64, 32
+#: Shapes of the arrays of a Structure that have not one number for each mode.
+SHAPES = {
+    "mode.contact_shape": (CONTACTS, MODES),
+    "mode.damping": (MODES, MODES),
+    "mode.sine": (15, MODES),
+    "mode.signal": (8, MODES),
+    "table.time": (8192,),
+    "table.value": (8192,),
+}
 Arrays = Mapping[str, ArrayLike]
 
 
@@ -45,7 +54,6 @@ def structure_fmu(
 def set_array(fmu: ComponentFmu, name: str, values: ArrayLike) -> None:
     """Set an array of the Structure from its part in use; the rest is 0."""
     part = np.asarray(values, dtype=float)
-    sizes = {"mode.contact_shape": (CONTACTS, MODES), "mode.damping": (MODES, MODES)}
-    whole = np.zeros(sizes.get(name, (MODES,)))
+    whole = np.zeros(SHAPES.get(name, (MODES,)))
     whole[tuple(map(slice, part.shape))] = part
     fmu.fmu.setFloat64([fmu.reference(name)], whole.ravel().tolist())

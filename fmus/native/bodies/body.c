@@ -25,7 +25,13 @@ static const vi_body *const_body_of(const void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power};
+    const bool any_signals = VI_SIGNALS > 0 && c->signals_key != 0;
+    if (any_signals && c->signals.key != c->signals_key) { /* at the start, or after a state of another set-up */
+        form->make_signals((char *)c - form->place, &c->signals);
+        c->signals.key = c->signals_key;
+    }
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power,
+                          any_signals ? &c->signals : NULL};
 }
 
 static void defaults(void *self)
@@ -92,11 +98,14 @@ int vi_body_ports(const vi_body *c)
 static void drive(void *self, vi_body *c)
 {
     double force[VI_MODES];
+    char message[VI_MESSAGE_LENGTH] = "";
     if (!c->forcing_changed) {
         return;
     }
+    form->check_forcing(self, message);
     form->find_forcing(self, force);
-    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
+    bool good = message[0] == '\0'
+                && vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency, c->state.now);
     for (int j = 0; j < vi_structure_modes(&c->model); ++j) {
         good = good && isfinite(force[j]);
     }
@@ -106,6 +115,7 @@ static void drive(void *self, vi_body *c)
         if (form->drive_further != NULL) {
             form->drive_further(self, false);
         }
+        vi_structure_load(&parts);
         c->forcing_changed = 0;
     }
 }
@@ -123,6 +133,7 @@ static void hold_inputs(void *self, vi_body *c)
     const vi_structure parts = vi_body_parts(c);
     form->find_inputs(self, held, held_rate);
     vi_structure_hold(&parts, held, held_rate);
+    vi_structure_load(&parts);
     vi_structure_meet_forces(&parts);
     c->inputs_changed = 0;
 }
@@ -173,7 +184,7 @@ static double cosine_of_forcing(const vi_body *c)
 /* Present acceleration of the base, m/s^2: the input, plus the forcing of this amplitude (m/s^2). */
 static double base_acceleration(const vi_body *c, double amplitude)
 {
-    const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
+    const double since = vi_clock_elapsed(&c->model.clock, c->state.input_since, c->state.now);
     const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
     return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
 }
@@ -197,7 +208,9 @@ static void update_outputs(void *self)
     *(double *)(void *)((char *)self + vi_this_description.time) = present_time(self);
     const vi_structure parts = vi_body_parts(c);
     double base = base_acceleration(c, form->base_forcing(self));
-    base += form->base_further != NULL ? form->base_further(self, vi_structure_further(&parts)) : 0.0;
+    if (form->base_further != NULL) {
+        base += form->base_further(self, vi_structure_further(&parts), c->state.signal_value);
+    }
     vi_structure_outputs(&parts, c->modal_acceleration);
     c->displacement = vi_structure_observed(&parts);
     c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
@@ -376,8 +389,8 @@ static bool needs_events(const void *self)
     return false;
 }
 
-/* Bytes of `pressed`, `scan` and `power`, the last members. */
-enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) };
+/* Bytes of `pressed`, `scan`, `power` and `signals`, the last members. */
+enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) + sizeof(vi_signal_loads) };
 
 /* Caches and unused rows of the record are not saved. */
 static size_t used_size(const void *self)

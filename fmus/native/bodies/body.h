@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "body/modal/loads.h"
 #include "body/modal/modal_scan.h"
 #include "body/modal/power_tables.h"
 #include "body/modal/pressed_flow.h"
@@ -34,10 +35,12 @@ typedef struct {
     vi_structure_model model;
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
+    uint64_t signals_key; /* hash of the signals' parameters, 0: there are none */
     vi_record record;   /* saved only as far as it is used; the members after it are not saved */
-    vi_pressed_cache pressed; /* `pressed`, `scan` and `power` are caches */
+    vi_pressed_cache pressed; /* `pressed`, `scan`, `power` and `signals` are caches */
     vi_scan scan;
     vi_power_tables power;
+    vi_signal_loads signals;
 } vi_body;
 
 /* The functions and references of one component; `self` is its struct. */
@@ -68,6 +71,8 @@ typedef struct {
     void (*find_forcing)(const void *self, double force[VI_MODES]);
     /* Put the further sines on the modes: at the start, or tuned ones, whose phases go on. NULL: there are none. */
     void (*drive_further)(void *self, bool at_start);
+    /* Make the signals of time from their parameters; NULL: there are none. */
+    void (*make_signals)(void *self, vi_signal_loads *signals);
     /* Modal forces of the inputs, and their slopes. */
     void (*find_inputs)(const void *self, double held[VI_MODES], double held_rate[VI_MODES]);
     /* Adapt the modes to the present amplitudes, until the next step; NULL: modes do not depend on amplitudes. */
@@ -75,7 +80,7 @@ typedef struct {
     /* Amplitude of the base's acceleration by the forcing, m/s^2. */
     double (*base_forcing)(const void *self);
     /* Present acceleration of the base by further forces, m/s^2; NULL: there are none. */
-    double (*base_further)(const void *self, const vi_phase further[]);
+    double (*base_further)(const void *self, const vi_phase further[], const double signal_value[]);
     /* Compute the component's own outputs from the absolute acceleration of the base, m/s^2. */
     void (*update_outputs)(void *self, double base_acceleration);
     /* Describe its states in the model description. */

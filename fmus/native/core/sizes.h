@@ -17,11 +17,19 @@
 #ifndef VI_SINES
 #define VI_SINES 0 /* sines of the forcing besides the clock's */
 #endif
+#ifndef VI_SIGNALS
+#define VI_SIGNALS 0 /* signals of time among the loads */
+#endif
 #ifndef VI_DEGREE
 #define VI_DEGREE 1 /* degree of the polynomials in time that inputs are on a segment, >= 1 */
 #endif
 
 /* Rooms of arrays that may be unused: C has no empty arrays. */
-enum { VI_SINES_ROOM = VI_SINES > 0 ? VI_SINES : 1, VI_HIGHER_ROOM = VI_DEGREE > 1 ? VI_DEGREE - 1 : 1 };
+enum {
+    VI_SINES_ROOM = VI_SINES > 0 ? VI_SINES : 1,
+    VI_SIGNALS_ROOM = VI_SIGNALS > 0 ? VI_SIGNALS : 1,
+    VI_LOADS_ROOM = VI_SIGNALS > 0 ? VI_MODES : 1,
+    VI_HIGHER_ROOM = VI_DEGREE > 1 ? VI_DEGREE - 1 : 1
+};
 
 #endif

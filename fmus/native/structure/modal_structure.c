@@ -26,6 +26,9 @@ static void defaults(void *self)
             s->body.model.shape[k][j] = 1.0;
         }
     }
+    for (int k = 0; k < VI_SIGNALS; ++k) {
+        s->signals.signal[k].table_start = 1;
+    }
 }
 
 static void sized(void *self, const char *block, int count)
@@ -80,6 +83,12 @@ static void attach(void *self, const void *resources)
     for (int k = 0; k < file->sines; ++k) {
         next = take(next, n, s->sine_shape[k]);
     }
+    memset(s->signals.force, 0, sizeof s->signals.force);
+    for (int k = 0; k < file->signals; ++k) {
+        next = take(next, n, s->signals.force[k]);
+    }
+    next = take(next, file->rows, s->signals.time);
+    (void)take(next, file->rows, s->signals.value);
 }
 
 /* ---- validation ---- */
@@ -195,6 +204,7 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
                         s->turns[k] ? "> 0" : "0", w);
         }
     }
+    vi_structure_check_amplitudes(&s->signals, message);
 }
 
 static bool parameters_are_good(const modal_structure *s, char *message)
@@ -218,6 +228,7 @@ static bool parameters_are_good(const modal_structure *s, char *message)
     vi_check_not_negative(message, "displacement_limit", s->body.model.displacement_limit);
     check_shapes(s, message);
     check_forcing(s, message);
+    vi_structure_check_signals(&s->signals, n, message);
     vi_check_each(message, vi_check_finite, "mode.displacement_start", s->displacement_start, n);
     vi_check_each(message, vi_check_finite, "mode.velocity_start", s->velocity_start, n);
     vi_body_check(&s->body, message);
@@ -279,6 +290,7 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
     vi_structure_model *model = &s->body.model;
     vi_structure_state *state = &s->body.state;
     double force[VI_MODES];
+    s->body.signals_key = vi_structure_signals_key(&s->signals);
     find_forcing(s, force);
     model->modes = (int32_t)s->modes;
     model->contacts = vi_body_ports(&s->body);
@@ -299,6 +311,11 @@ static bool prepare(void *self, char message[VI_MESSAGE_LENGTH])
 
 /* ---- loads and outputs ---- */
 
+static void make_signals(void *self, vi_signal_loads *signals)
+{
+    vi_structure_make_signals(&((const modal_structure *)self)->signals, signals);
+}
+
 static void find_inputs(const void *self, double held[VI_MODES], double held_rate[VI_MODES])
 {
     const modal_structure *s = self;
@@ -315,10 +332,10 @@ static void find_inputs(const void *self, double held[VI_MODES], double held_rat
     }
 }
 
-static double base_further(const void *self, const vi_phase further[])
+static double base_further(const void *self, const vi_phase further[], const double signal_value[])
 {
     const modal_structure *s = self;
-    double sum = 0.0;
+    double sum = vi_structure_base_of_signals(&s->signals, signal_value);
     int count = 0;
     for (int k = 0; k < VI_SINES; ++k) {
         const vi_structure_sine *sine = &s->sine[k];
@@ -365,6 +382,7 @@ const vi_body_form vi_this_body = {
     .base_forcing = base_forcing,
     .drive_further = drive_further,
     .base_further = base_further,
+    .make_signals = make_signals,
     .update_outputs = update_outputs,
     .show_states = show_states,
 };

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "body.h"
+#include "structure_signals.h"
 
 /* A force besides the forcing: a sine, or constant where the frequency is 0. */
 typedef struct {
@@ -27,6 +28,7 @@ typedef struct {
     double forcing_amplitude, forcing_base_acceleration;
     vi_structure_sine sine[VI_SINES_ROOM];
     double sine_shape[VI_SINES_ROOM][VI_MODES];
+    vi_structure_signals signals;
     int32_t sines_started, turns[VI_SINES_ROOM]; /* since the start: is a sine not constant? */
     /* inputs */
     double force, force_rate;

@@ -13,7 +13,7 @@ static const char NAME[] = "structure.bin";
 static const char MAGIC[] = "VISTRUC2";
 
 /* Bytes of the letters, of a number, of all before the arrays, of the largest file. */
-enum { LETTERS = 8, NUMBER = 8, HEAD = LETTERS + 4 * NUMBER, MOST_BYTES = HEAD + VI_MOST_NUMBERS * NUMBER };
+enum { LETTERS = 8, NUMBER = 8, HEAD = LETTERS + 6 * NUMBER, MOST_BYTES = HEAD + VI_MOST_NUMBERS * NUMBER };
 
 /* The bits of a number, on a machine of any byte order. */
 static uint64_t bits_at(const unsigned char bytes[])
@@ -57,7 +57,7 @@ static bool read_content(const unsigned char bytes[], size_t length, vi_structur
                          char message[VI_MESSAGE_LENGTH])
 {
     if (length < HEAD || memcmp(bytes, MAGIC, LETTERS) != 0) {
-        vi_complain(message, "resources/%s: expected a file that begins with %s and four sizes, got another", NAME,
+        vi_complain(message, "resources/%s: expected a file that begins with %s and six sizes, got another", NAME,
                     MAGIC);
         return false;
     }
@@ -65,14 +65,18 @@ static bool read_content(const unsigned char bytes[], size_t length, vi_structur
     if (!read_size(sizes, "modes", 1, VI_MODES, &file->modes, message)
         || !read_size(sizes + NUMBER, "contacts", 0, VI_PORTS, &file->contacts, message)
         || !read_size(sizes + 2 * NUMBER, "sines", 0, VI_SINES, &file->sines, message)
-        || !read_size(sizes + 3 * NUMBER, "as mark of coupled damping", 0, 1, &file->coupled, message)) {
+        || !read_size(sizes + 3 * NUMBER, "signals", 0, VI_SIGNALS, &file->signals, message)
+        || !read_size(sizes + 4 * NUMBER, "rows of tables", 0, VI_TABLE_ROOM, &file->rows, message)
+        || !read_size(sizes + 5 * NUMBER, "as mark of coupled damping", 0, 1, &file->coupled, message)) {
         return false;
     }
-    const int count = file->modes * (VI_STRUCTURE_ROWS + file->modes + file->contacts + file->sines);
+    const int of_modes = VI_STRUCTURE_ROWS + file->modes + file->contacts + file->sines + file->signals;
+    const int count = file->modes * of_modes + 2 * file->rows;
     const size_t expected = HEAD + (size_t)count * NUMBER;
     if (length != expected) {
-        vi_complain(message, "resources/%s: expected %zu bytes for %d modes, %d contacts and %d sines, got %s", NAME,
-                    expected, (int)file->modes, (int)file->contacts, (int)file->sines, length < expected ? "fewer" : "more");
+        vi_complain(message, "resources/%s: expected %zu bytes for %d modes, %d contacts, %d sines, %d signals and %d rows"
+                             " of tables, got %s", NAME, expected, (int)file->modes, (int)file->contacts,
+                    (int)file->sines, (int)file->signals, (int)file->rows, length < expected ? "fewer" : "more");
         return false;
     }
     return read_numbers(bytes + HEAD, count, file, message);

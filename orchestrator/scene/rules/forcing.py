@@ -8,10 +8,17 @@ from typing import Any, NamedTuple
 
 from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
-from vibroimpact.orchestrator.scene.forcing_models import MOST_CONSTANTS, MOST_SINES, Force, Forcing
+from vibroimpact.orchestrator.scene.forcing_models import (
+    MOST_CONSTANTS,
+    MOST_SINES,
+    ConstantForcing,
+    Force,
+    Forcing,
+)
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems, size_problem
+from vibroimpact.orchestrator.scene.rules.signals import signal_problems
 
 ALONE = "beside one body alone"
 _MOST = {"sine": MOST_SINES, "constant": MOST_CONSTANTS}
@@ -121,11 +128,13 @@ def _in_a_structure(draft: Draft, each: _Read) -> Iterator[Problem]:
 
 def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
     for key, _, written in draft.written_forces():
+        if written.get("signal", "sine") != "sine":
+            continue
         given = FREQUENCY_KEYS & written.keys()
         if len(given) == 2:
             expected = "angular_frequency (rad/s) or frequency (Hz)"
             yield Problem(f"{key}.frequency", expected, "both", f"Remove one{draft.swept_counts}.")
-        if not given and written and written.get("signal", "sine") == "sine":
+        if not given and written:
             hint = "Add angular_frequency = ... to [forcing], in rad/s; 0 makes a constant force."
             if draft.has_several_forces:
                 hint = 'Add angular_frequency = ..., in rad/s, or signal = "constant".'
@@ -135,8 +144,8 @@ def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
 def _units_agree(draft: Draft) -> Iterator[Problem]:
     if not draft.header or draft.header.units != "nondimensional":
         return
-    for key, _, written in draft.written_forces():
-        if "frequency" in written:
+    for key, force, written in draft.written_forces():
+        if "frequency" in written and isinstance(force, Forcing):
             hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
             yield Problem(f"{key}.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
 
@@ -148,7 +157,7 @@ def _several_forces(draft: Draft) -> Iterator[Problem]:
     """Forces that the component Structure has: their numbers, their sines, and what is simulated with one sine."""
     if not draft.has_several_forces:
         return
-    for rule in (_numbers_are_few, _sines_have_periods, _forces_have_room):
+    for rule in (_numbers_are_few, _sines_have_periods, _forces_have_room, signal_problems):
         yield from rule(draft)
     if not draft.is_structure:
         yield from _keys_of_one_sine(draft)
@@ -174,14 +183,13 @@ def _forces_have_room(draft: Draft) -> Iterator[Problem]:
     """The FMU has room for the clock and 15 forces; the clock is the first sine or the common period of all."""
     clock, sines = draft.clock, sum(isinstance(each.force, Forcing) for each in _valid(draft))
     first = clock is not None and clock.periods == 1
-    further, most = len(draft.forces) - first, MOST_SINES - 1
-    if further > most and sines <= MOST_SINES and len(draft.forces) - sines <= MOST_CONSTANTS:
+    constants = sum(isinstance(each.force, ConstantForcing) for each in _valid(draft))
+    most = MOST_SINES - 1 + first
+    if sines + constants > most and sines <= MOST_SINES and constants <= MOST_CONSTANTS:
         hint = (
-            ""
-            if clock is None or first
-            else f"The common period has {clock.periods} periods of the first sine."
+            f"The common period has {clock.periods} periods of the first sine." if clock and not first else ""
         )
-        yield Problem("forcing", f"at most {most + first} forces in all", f"{len(draft.forces)}", hint)
+        yield Problem("forcing", f"at most {most} sines and constants in all", f"{sines + constants}", hint)
 
 
 def _keys_of_one_sine(draft: Draft) -> Iterator[Problem]:

@@ -64,10 +64,33 @@ double vi_gaussian_quantile(int64_t j)
     return q < 0.0 ? -size : size;
 }
 
+/* The number of 53 bits of a counter. */
+static double number_of(uint32_t high, uint32_t low)
+{
+    const uint64_t whole = ((uint64_t)high << 32 | low) >> 11;
+    return vi_gaussian_quantile((int64_t)whole - (INT64_C(1) << 52));
+}
+
+static void bits_of(uint64_t seed, uint64_t channel, uint64_t index, uint32_t bits[4])
+{
+    bits[0] = (uint32_t)index;
+    bits[1] = (uint32_t)(index >> 32);
+    bits[2] = (uint32_t)channel;
+    bits[3] = (uint32_t)(channel >> 32);
+    vi_philox(bits, (uint32_t)seed, (uint32_t)(seed >> 32));
+}
+
 double vi_gaussian(uint64_t seed, uint64_t channel, uint64_t index)
 {
-    uint32_t bits[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)channel, (uint32_t)(channel >> 32)};
-    vi_philox(bits, (uint32_t)seed, (uint32_t)(seed >> 32));
-    const uint64_t whole = ((uint64_t)bits[1] << 32 | bits[0]) >> 11;
-    return vi_gaussian_quantile((int64_t)whole - (INT64_C(1) << 52));
+    uint32_t bits[4];
+    bits_of(seed, channel, index, bits);
+    return number_of(bits[1], bits[0]);
+}
+
+void vi_gaussian_pair(uint64_t seed, uint64_t channel, uint64_t index, double pair[2])
+{
+    uint32_t bits[4];
+    bits_of(seed, channel, index, bits);
+    pair[0] = number_of(bits[1], bits[0]);
+    pair[1] = number_of(bits[3], bits[2]);
 }

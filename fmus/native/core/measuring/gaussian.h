@@ -10,6 +10,9 @@
  * and indices are independent. */
 double vi_gaussian(uint64_t seed, uint64_t channel, uint64_t index);
 
+/* Two numbers of one counter, as independent as all others; the first one is vi_gaussian of the same arguments. */
+void vi_gaussian_pair(uint64_t seed, uint64_t channel, uint64_t index, double pair[2]);
+
 /* The Gaussian number below which the probability is (j + 1/2) / 2^53 + 1/2; -2^52 <= j < 2^52. */
 double vi_gaussian_quantile(int64_t j);
 

@@ -108,6 +108,14 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
     return high + low;
 }
 
+double vi_clock_time_twofold(const vi_clock *clock, vi_instant instant, double *low)
+{
+    double rounding;
+    const double sum = seconds_since(clock, instant, clock->origin, clock->origin_low, &rounding), high = sum + rounding;
+    *low = rounding - (high - sum);
+    return high;
+}
+
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
 {
     const double difference = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, difference);

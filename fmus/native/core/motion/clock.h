@@ -57,6 +57,9 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
 /* Time of an instant, s, rounded once. */
 double vi_clock_time(const vi_clock *clock, vi_instant instant);
 
+/* Time of an instant to twice the digits: the sum of the returned number and *low, s. */
+double vi_clock_time_twofold(const vi_clock *clock, vi_instant instant, double *low);
+
 /* Is instant `a` before `b`? */
 static inline bool vi_clock_is_before(vi_instant a, vi_instant b)
 {

@@ -68,7 +68,7 @@ typedef struct {
     double angle, cosine, sine;
 } vi_phase;
 
-/* What acts on the modes from an instant on, per unit mass. */
+/* Drive: all that acts on the modes from an instant on, per unit mass. */
 typedef struct {
     vi_phase phase;                  /* of the clock's force */
     const vi_phase *further;         /* of the further sines */

@@ -1,5 +1,5 @@
-/* Sines besides the clock's, at any frequencies. A phase is a whole number of turns and a rest, as the clock's time is:
- * the phase at the start of period n is the fraction of n turns, so the 10^6th period is as exact as the first.
+/* Sines besides the clock's, at any frequencies. Phases are counted as the clock counts time. At the start of period n
+ * the phase is the fraction of n times the turns in a period. So the 10^6th period is as exact as the first.
  */
 #ifndef VIBROIMPACT_SINES_H
 #define VIBROIMPACT_SINES_H

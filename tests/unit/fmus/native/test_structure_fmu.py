@@ -266,6 +266,7 @@ def test_a_file_holds_the_largest_structure(tmp_path: Path, version: str) -> Non
 
 
 HEAD = structure_file({"mode.angular_frequency": [1.0, 2.0], "mode.contact_shape": [[1.0, 1.0]]})
+SIZES = "2 modes, 1 contacts, 0 sines, 0 signals and 0 rows of tables"
 Members = dict[str, dict[str, bytes]]
 
 
@@ -284,14 +285,17 @@ def good_members(tmp_path_factory: pytest.TempPathFactory) -> Members:
 @pytest.mark.parametrize(
     ("content", "rule"),
     [
-        (b"", "a file that begins with VISTRUC1 and three sizes, got another"),
-        (b"VISTRUC2" + HEAD[8:], "a file that begins with VISTRUC1"),
-        (HEAD[:-1], "208 bytes for 2 modes and 1 contacts, got fewer"),
-        (HEAD + b"\0", "208 bytes for 2 modes and 1 contacts, got more"),
+        (b"", "a file that begins with VISTRUC2 and six sizes, got another"),
+        (b"VISTRUC1" + HEAD[8:], "a file that begins with VISTRUC2"),
+        (HEAD[:-1], f"232 bytes for {SIZES}, got fewer"),
+        (HEAD + b"\0", f"232 bytes for {SIZES}, got more"),
         (HEAD[:8] + bytes(8) + HEAD[16:], "1 to 64 modes, got 0"),
         (HEAD[:8] + b"\x41" + HEAD[9:], "1 to 64 modes, got 65"),
         (HEAD[:16] + b"\xff" * 8 + HEAD[24:], "0 to 32 contacts, got -1"),
-        (HEAD[:24] + b"\2" + HEAD[25:], "0 to 1 as mark of coupled damping, got 2"),
+        (HEAD[:24] + b"\x10" + HEAD[25:], "0 to 15 sines, got 16"),
+        (HEAD[:32] + b"\x09" + HEAD[33:], "0 to 8 signals, got 9"),
+        (HEAD[:40] + b"\1\x20" + HEAD[42:], "0 to 8192 rows of tables, got 8193"),
+        (HEAD[:48] + b"\2" + HEAD[49:], "0 to 1 as mark of coupled damping, got 2"),
         (HEAD[:-8] + b"\xff" * 8, "finite numbers, got"),
     ],
 )
@@ -308,7 +312,7 @@ def test_a_damaged_file_is_refused_by_one_line(
 
 
 def test_a_damaged_file_is_not_exported(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 208 bytes"):
+    with pytest.raises(UsageError, match=r"resources/structure\.bin: expected 232 bytes"):
         export_fmu("Structure", tmp_path / "new.fmu", modes=2, contacts=1, structure=HEAD[:-1])
     assert not (tmp_path / "new.fmu").exists()
 
@@ -318,6 +322,93 @@ def test_more_modes_than_the_file_has_are_refused(tmp_path: Path) -> None:
         UsageError, match=r"modes: expected at most the 2 modes of resources/structure\.bin, got 3"
     ):
         export_fmu("Structure", tmp_path / "new.fmu", modes=3, contacts=1, structure=HEAD)
+
+
+# ---- further sines ----
+
+FORCED: Arrays = {
+    "mode.angular_frequency": [0.8, 2.1],
+    "mode.damping_ratio": [0.03, 0.02],
+    "mode.contact_shape": [[1.0, 0.6]],
+    "mode.observed_shape": [1.0, 0.6],
+    "mode.forcing": [1.0, 0.6],
+    "mode.base": [-1.0, 0.4],
+    "mode.sine": [[0.5, -1.0], [-1.0, 0.4]],
+}
+SINES = {
+    **{"forcing.amplitude": 0.4, "forcing.angular_frequency": 1.0, "forcing.phase": 0.3},
+    **{"sine[1].amplitude": 0.3, "sine[1].angular_frequency": 1.7, "sine[1].phase": 2.0},
+    **{
+        "sine[2].amplitude": 0.2,
+        "sine[2].angular_frequency": 0.6,
+        "sine[2].phase": -0.5,
+        "sine[2].of_base": True,
+    },
+}
+
+
+@pytest.mark.parametrize("version", ["3.0", "2.0"])
+def test_a_file_holds_the_rows_of_sines(tmp_path: Path, version: str) -> None:
+    scene = {**SINES, **stop(0.4, 0.6)}
+    path = export_fmu(
+        "Structure", tmp_path / "two.fmu", modes=2, contacts=1, fmi=version, starts=scene,
+        structure=structure_file(FORCED),
+    )  # fmt: skip
+    with structure_fmu(FORCED, scene) as own, ComponentFmu(path, version=version) as exported:
+        assert np.array_equal(history(own, 30.0, 10), history(exported, 30.0, 10))
+        assert own.get("contact[1].count") > 3
+
+
+def test_an_acceleration_of_the_base_by_a_sine_is_in_the_absolute_acceleration() -> None:
+    still = {"mode.angular_frequency": [0.0], "mode.base": [-1.0], "mode.sine": [[-1.0], [-1.0], [1.0]]}
+    of_base = {"sine[1].amplitude": 0.3, "sine[1].angular_frequency": 1.7, "sine[1].of_base": True}
+    of_base |= {"sine[2].amplitude": 0.5, "sine[2].of_base": True}
+    of_base |= {"sine[3].amplitude": 0.2, "sine[3].angular_frequency": 0.3}
+    with structure_fmu(still, of_base) as fmu:
+        fmu.step(2.0)
+        assert fmu.get("acceleration") == pytest.approx(0.2 * math.cos(0.6), abs=1e-13)
+
+
+def test_tuned_sines_keep_their_phases() -> None:
+    at, tuned = (
+        31.7,
+        {"forcing.angular_frequency": 1.1, "sine[1].amplitude": 0.5, "sine[2].angular_frequency": 0.7},
+    )
+    shifted = {"forcing.phase": 0.3 - 0.1 * at, "sine[2].phase": -0.5 - 0.1 * at}
+    with structure_fmu(FORCED, {**SINES, **stop(0.4, 0.6)}) as fmu:
+        fmu.step(at)
+        start = {
+            f"mode.{name}_start": [fmu.get(f"modal_{name}[{k}]") for k in (1, 2)]
+            for name in ("displacement", "velocity")
+        }
+        for name, value in tuned.items():
+            fmu.set(name, value)
+        fmu.step(10.0)
+        reached = fmu.state()
+    again = {**SINES, **tuned, **shifted, **stop(0.4, 0.6)}
+    with structure_fmu({**FORCED, **start}, again, start_time=at) as fmu:
+        fmu.step(10.0)
+        assert fmu.state() == pytest.approx(reached, abs=1e-10)
+        assert fmu.get("contact[1].count") >= 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "rule"),
+    [
+        ("sine[1].amplitude", math.inf, "a finite number, got inf"),
+        ("sine[1].angular_frequency", -1.0, "0, or 1e-150 to 1e"),
+        ("sine[1].angular_frequency", 0.0, "> 0, as at the start, got 0"),
+        ("sine[3].angular_frequency", 1.0, "0, as at the start, got 1"),
+    ],
+)
+def test_a_sine_is_not_tuned_to_what_it_cannot_be(name: str, value: float, rule: str) -> None:
+    messages: list[str] = []
+    with structure_fmu(FORCED, {**SINES, **stop(0.4, 0.6)}, messages=messages) as fmu:
+        fmu.step(1.0)
+        fmu.set(name, value)
+        with pytest.raises(FMICallException):
+            fmu.step(1.0)
+    assert f"{name}: expected {rule}" in messages[-1]
 
 
 # ---- what is refused ----
@@ -339,10 +430,11 @@ MATRIX = np.diag([0.1, 0.2, 0.3])
             [0.0, 2.0, 1.0],
             r"\[3\]: expected at least that of the mode before, 2, got 1",
         ),
-        ("mode.angular_frequency", [-1.0, 1.0, 2.0], r"\[1\]: expected 0, or 1e-150 to 1e\+150, got -1"),
+        ("mode.angular_frequency", [-1e-200, 1.0, 2.0], r"\[1\]: expected 0, or a size of 1e-150 to 1e\+150"),
+        ("mode.angular_frequency", [-1.0, -2.0, 1.0], r"\[2\]: expected at least that of the mode before, -1"),
         ("mode.angular_frequency", [0.0, math.nan, 2.0], r"\[2\]: expected 0, or"),
         ("mode.angular_frequency", [0.0, 1.0, 1e200], r"\[3\]: expected 0, or"),
-        ("mode.damping_ratio", [0.0, -0.1, 0.0], r"\[2\]: expected a finite number >= 0, got -0.1"),
+        ("mode.damping_ratio", [0.0, math.nan, 0.0], r"\[2\]: expected a finite number, got nan"),
         (
             "mode.contact_shape",
             [[0.0, 0.0, 0.0]],
@@ -373,7 +465,6 @@ def test_a_bad_array_ends_initialization_with_one_line_that_names_it(
     ("place", "value", "rule"),
     [
         ((0, 1), 0.05, r"mode\.damping\[2,1\]: expected that of \[1,2\]"),
-        ((1, 1), -0.2, r"mode\.damping: expected a matrix that takes energy from each motion"),
         ((2, 0), math.nan, r"mode\.damping\[3,1\]: expected a finite number"),
     ],
 )
@@ -386,3 +477,62 @@ def test_a_bad_matrix_is_refused_where_it_is_read(place: tuple[int, int], value:
         assert re.search(rule, fmu.messages[0])
     with structure_fmu({**GOOD, "mode.damping": matrix}) as fmu:
         fmu.step(1.0)
+
+
+# ---- modes that grow ----
+
+FALLING: Arrays = {
+    "mode.angular_frequency": [-1.0],
+    "mode.contact_shape": [[1.0]],
+    "mode.observed_shape": [1.0],
+    "mode.displacement_start": [0.5],
+}
+
+
+def test_a_motion_that_grows_asks_for_the_end_of_the_simulation_at_its_limit() -> None:
+    with structure_fmu(FALLING, {"displacement_limit": 50.0}) as fmu:
+        _, terminates, _, reached = fmu.fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=10.0)
+        assert terminates
+        assert reached == pytest.approx(math.acosh(100.0), rel=1e-15)
+        assert fmu.get("displacement") == pytest.approx(50.0, rel=1e-14)
+        assert "unbounded: a displacement passed displacement_limit, 50 m, at time" in fmu.messages[-1]
+
+
+def test_a_motion_that_leaves_its_only_stop_goes_on_unless_it_is_to_end() -> None:
+    for ends, reached in ((False, 4.0), (True, 0.0)):
+        arrays = {**FALLING, "mode.displacement_start": [-0.5]}
+        with structure_fmu(arrays, {**stop(1.0), "ends_unbounded": ends}) as fmu:
+            _, terminates, _, time = fmu.fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=4.0)
+            assert (terminates, time) == (ends, reached)
+
+
+def test_an_export_of_fmi_2_ends_the_simulation_in_its_way(tmp_path: Path) -> None:
+    table = export_fmu(
+        "Structure",
+        tmp_path / "falls.fmu",
+        fmi="2.0",
+        starts={"displacement_limit": 50.0},
+        structure=structure_file({name: np.array(value) for name, value in FALLING.items()}, coupled=False),
+    )
+    with ComponentFmu(table, version="2.0") as fmu:
+        with pytest.raises(FMICallException, match="fmi2DoStep|discard|2"):
+            fmu.step(10.0)
+        assert "displacement_limit, 50 m" in fmu.messages[-1]
+
+
+def test_potential_energy_of_a_negative_stiffness_is_negative() -> None:
+    with structure_fmu(FALLING) as fmu:
+        assert fmu.get("energy.potential") == -0.125
+        fmu.step(1.0)
+        assert fmu.get("energy.potential") + fmu.get("energy.kinetic") == pytest.approx(-0.125, rel=1e-14)
+
+
+def test_damping_of_any_sign_that_couples_modes_is_taken() -> None:
+    matrix = np.array([[-0.2, 0.3], [0.3, 0.1]])
+    arrays = {**FALLING, "mode.angular_frequency": [-1.0, 2.0], "mode.damping": matrix}
+    with structure_fmu({**arrays, "mode.observed_shape": [1.0, 1.0]}, coupled=True) as fmu:
+        fmu.step(2.0)
+        system = np.zeros((4, 4))
+        system[:2, 2:], system[2:, :2], system[2:, 2:] = np.eye(2), np.diag([1.0, -4.0]), -matrix
+        exact = expm(2.0 * system) @ [0.5, 0.0, 0.0, 0.0]
+        assert fmu.get("displacement") == pytest.approx(exact[0] + exact[1], rel=1e-13)

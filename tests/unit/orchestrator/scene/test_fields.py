@@ -16,6 +16,7 @@ from vibroimpact.orchestrator.scene import (
     Scene,
     body_models,
     component_models,
+    forcing_models,
     measuring_models,
     models,
     parse_scene,
@@ -34,7 +35,15 @@ from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_key
 
 MODELS = {
     found
-    for module in (models, body_models, measuring_models, replay_models, sweep_models, component_models)
+    for module in (
+        models,
+        forcing_models,
+        body_models,
+        measuring_models,
+        replay_models,
+        sweep_models,
+        component_models,
+    )
     for found in vars(module).values()
     if isinstance(found, type) and issubclass(found, BaseModel) and found is not StructureBody
     if found.model_fields.keys()
@@ -86,7 +95,7 @@ def test_the_reference_has_a_table_for_every_model() -> None:
 @pytest.mark.parametrize("fmu", BODIES)
 def test_the_fmu_has_the_variable_of_each_field_in_the_same_unit(fmu: str) -> None:
     variables = component_facts(fmu_path(fmu, "3.0")).variables
-    for model in (*BODIES[fmu], models.Forcing):
+    for model in (*BODIES[fmu], forcing_models.Forcing):
         for key in known_keys(model):
             rule = rule_of(field_of(model, key))
             if rule.fmu:

@@ -29,7 +29,7 @@ WRONG_SWEEPS = [
         FORCED,
         '"forcing.omega" = { values = [1] }',
         'sweep."forcing.omega"',
-        "Known here: amplitude, angular_frequency, frequency, phase",
+        "Known here: amplitude, location, angular_frequency, frequency, phase",
     ),
     (
         FORCED,

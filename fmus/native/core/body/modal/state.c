@@ -71,11 +71,12 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
 {
     vi_structure_state *state = s->state;
     const vi_phase *further = vi_structure_further(s);
-    vi_instant *past[VI_PORTS + 3] = {&state->held_since, &state->standstill.instant, &state->budget.mark};
+    vi_instant *past[VI_PORTS + 4] = {&state->held_since, &state->input_since, &state->standstill.instant,
+                                      &state->budget.mark};
     for (int k = 0; k < VI_PORTS; ++k) {
-        past[3 + k] = &state->separated[k];
+        past[4 + k] = &state->separated[k];
     }
-    vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 3);
+    vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 4);
     for (int k = 0; k < vi_structure_sines(s->model); ++k) {
         vi_sine *sine = &s->model->sine[k];
         *sine = vi_sine_from(&s->model->clock, sine->angular_frequency, state->now, further[k].angle);
@@ -292,7 +293,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     if (state->exchange.on) { /* the importer gives inputs at each instant: there is no step with slopes */
         memset(state->held_rate, 0, sizeof state->held_rate);
     }
-    state->held_since = state->now;
+    state->held_since = state->input_since = state->now;
     state->budget.unfinished = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_contact *contact = &s->contacts[k];
@@ -305,5 +306,9 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
         for (int j = 0; j < vi_structure_modes(s->model) && push != 0.0; ++j) {
             state->held[j] -= s->model->shape[k][j] * push;
         }
+    }
+    if (VI_SIGNALS > 0) {
+        memcpy(state->input, state->held, sizeof state->input);
+        memcpy(state->input_rate, state->held_rate, sizeof state->input_rate);
     }
 }

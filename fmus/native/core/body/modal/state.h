@@ -126,6 +126,10 @@ typedef struct {
     int64_t degree;                             /* of the loads; above 1 held_since is the present instant */
     double higher[VI_HIGHER_ROOM][VI_MODES];    /* coefficients 2 to degree */
     double loads_last;                          /* time from now for which they are valid, s; HUGE_VAL for any time */
+    /* with signals `held` has them; then these are the inputs alone, and the instant of the inputs */
+    vi_instant input_since;
+    double input[VI_LOADS_ROOM], input_rate[VI_LOADS_ROOM];
+    double signal_value[VI_SIGNALS_ROOM];       /* of each signal at held_since */
     int32_t status[VI_PORTS];   /* vi_contact_status */
     int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
@@ -159,6 +163,9 @@ typedef struct vi_scan vi_scan;
 /* Responses over steps in a contact with a power law: power_tables.h. */
 typedef struct vi_power_tables vi_power_tables;
 
+/* Loads that are signals of time: loads.h. */
+typedef struct vi_signal_loads vi_signal_loads;
+
 /* Pointers to the parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
@@ -169,6 +176,7 @@ typedef struct {
     vi_pressed_cache *pressed; /* NULL: long rests are followed by series, like short ones */
     vi_scan *scan;       /* NULL: flights are followed by certified steps only */
     vi_power_tables *power; /* NULL: contacts with a power law are followed by series only */
+    vi_signal_loads *loads; /* NULL: there are none */
 } vi_structure;
 
 /* Set mode j: natural angular frequency (rad/s; negative: the stiffness is minus its square), damping ratio and modal
@@ -276,7 +284,7 @@ vi_phase vi_structure_phase(const vi_structure *s);
 /* Phases of the further sines. */
 const vi_phase *vi_structure_further(const vi_structure *s);
 
-/* What acts on the modes from now on; `held` is set to the present loads. */
+/* Drive of the modes from now on; `held` is set to the present loads. */
 vi_drive vi_structure_drive_now(const vi_structure *s, double held[]);
 
 /* Sum of the sizes of the harmonic forces on mode j. */

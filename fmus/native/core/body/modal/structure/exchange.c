@@ -9,6 +9,7 @@
 #include "body/law_check.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/loads.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
@@ -109,6 +110,7 @@ bool vi_exchange_set_time(const vi_exchange_body *body, double time)
         return false;
     }
     body->parts.state->now = instant;
+    vi_structure_load(&body->parts);
     return true;
 }
 

@@ -7,11 +7,13 @@
 #include "body/landing.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/loads.h"
 #include "body/modal/modal_flight.h"
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/drift.h"
 #include "body/modal/structure/extremes.h"
+#include "body/modal/structure/random_flight.h"
 #include "body/modal/structure/search.h"
 #include "body/modal/structure/settle.h"
 #include "body/modal/structure/unbounded.h"
@@ -92,6 +94,7 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     } else {
         state->now = after;
     }
+    vi_structure_load(s);
 }
 
 /* ---- flight ---- */
@@ -99,8 +102,10 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 /* Is no record wanted before the target, so that one evaluation is enough for any length? */
 static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
 {
-    return !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema && !s->record->periods
-           && !s->state->follow_energies && !(vi_structure_grows(s->model) && s->model->displacement_limit > 0.0);
+    const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
+    const bool limited = vi_structure_grows(s->model) && s->model->displacement_limit > 0.0;
+    return lasts && !limited && !flight->series && vi_flight_degree(flight) == 1 && !s->record->extrema
+           && !s->record->periods && !s->state->follow_energies;
 }
 
 /* Is it certain, for any acceleration, that no contact is about to meet its stop or slow to leave it? */
@@ -171,6 +176,18 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     vi_flight_end(flight, u, clock->angular_frequency * target.rest, further, s->state->q, s->state->p);
     vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
     move(s, u, VI_ENDS_AT_TARGET, target);
+}
+
+/* Fly over intervals of a random load; false where they do not fit. */
+static bool fly_far(const vi_structure *s, vi_instant target)
+{
+    const double u = vi_random_flight(s, target);
+    if (!(u > 0.0)) {
+        return false;
+    }
+    forget_origins(s);
+    move(s, u, VI_ENDS_ANYWHERE, target);
+    return true;
 }
 
 /* Fly to the next contact, the segment's end, or the target, whichever is first; false when numbers overflow. */
@@ -317,7 +334,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     fresh.further_at.periods = INT64_MAX; /* no phase is known */
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
-    fresh.now = fresh.held_since = now;
+    fresh.now = fresh.held_since = fresh.input_since = now;
     fresh.phase = vi_phase_of(0.0);
     vi_budget_start(&fresh.budget, now);
     *state = fresh;
@@ -394,7 +411,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     }
     if (coupled && loads_are_finite(s)) {
         drift(s, target, request);
-    } else if (coupled || !fly(s, target, request)) {
+    } else if (coupled || !(fly_far(s, target) || fly(s, target, request))) {
         return VI_STEP_NOT_FINITE;
     }
     if (!is_finite(s)) {

@@ -170,7 +170,8 @@ static bool is_out_of_reach(const vi_structure *s, const vi_flight *flight, cons
 /* May the certificate be asked for? Loads that change, and stops of other components, may bring the motion back. */
 static bool is_left_alone(const vi_structure *s, const vi_flight *flight)
 {
-    if (!s->model->ends_unbounded || s->model->asks || flight->series || s->model->varies
+    const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
+    if (!s->model->ends_unbounded || !lasts || s->model->asks || flight->series || s->model->varies
         || vi_flight_degree(flight) > 1) {
         return false;
     }
