@@ -431,7 +431,11 @@ MATRIX = np.diag([0.1, 0.2, 0.3])
             r"\[3\]: expected at least that of the mode before, 2, got 1",
         ),
         ("mode.angular_frequency", [-1e-200, 1.0, 2.0], r"\[1\]: expected 0, or a size of 1e-150 to 1e\+150"),
-        ("mode.angular_frequency", [-1.0, -2.0, 1.0], r"\[2\]: expected at least that of the mode before, -1"),
+        (
+            "mode.angular_frequency",
+            [-1.0, -2.0, 1.0],
+            r"\[2\]: expected at least that of the mode before, -1",
+        ),
         ("mode.angular_frequency", [0.0, math.nan, 2.0], r"\[2\]: expected 0, or"),
         ("mode.angular_frequency", [0.0, 1.0, 1e200], r"\[3\]: expected 0, or"),
         ("mode.damping_ratio", [0.0, math.nan, 0.0], r"\[2\]: expected a finite number, got nan"),
@@ -490,7 +494,7 @@ FALLING: Arrays = {
 
 
 def test_a_motion_that_grows_asks_for_the_end_of_the_simulation_at_its_limit() -> None:
-    with structure_fmu(FALLING, {"displacement_limit": 50.0}) as fmu:
+    with structure_fmu(FALLING, {"displacement_limit": 50.0}, early_return=True) as fmu:
         _, terminates, _, reached = fmu.fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=10.0)
         assert terminates
         assert reached == pytest.approx(math.acosh(100.0), rel=1e-15)
@@ -501,9 +505,17 @@ def test_a_motion_that_grows_asks_for_the_end_of_the_simulation_at_its_limit() -
 def test_a_motion_that_leaves_its_only_stop_goes_on_unless_it_is_to_end() -> None:
     for ends, reached in ((False, 4.0), (True, 0.0)):
         arrays = {**FALLING, "mode.displacement_start": [-0.5]}
-        with structure_fmu(arrays, {**stop(1.0), "ends_unbounded": ends}) as fmu:
+        with structure_fmu(arrays, {**stop(1.0), "ends_unbounded": ends}, early_return=True) as fmu:
             _, terminates, _, time = fmu.fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=4.0)
             assert (terminates, time) == (ends, reached)
+
+
+def test_a_step_that_must_not_end_early_is_discarded() -> None:
+    with (
+        structure_fmu(FALLING, {"displacement_limit": 50.0}) as fmu,
+        pytest.raises(FMICallException, match="discard"),
+    ):
+        fmu.step(10.0)
 
 
 def test_an_export_of_fmi_2_ends_the_simulation_in_its_way(tmp_path: Path) -> None:
