@@ -219,7 +219,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
         return false;
     }
     const bool touches = search_result == VI_SEARCH_CONTACT;
-    const bool ends = vi_unbounded_flight(s, &flight, points, touches, &found.u), meets = touches && !ends;
+    const bool ends = vi_structure_grows(s->model) && vi_unbounded_flight(s, &flight, points, touches, &found.u);
+    const bool meets = touches && !ends;
     const bool whole = !meets && !ends && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
@@ -417,7 +418,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
-    if (state->unbounded) {
+    if (vi_structure_grows(s->model) && state->unbounded) {
         return VI_STEP_UNBOUNDED;
     }
     vi_structure_settle(s, stops_here(s, target, request));

@@ -202,9 +202,6 @@ static double first_out_of_reach(const vi_structure *s, const vi_flight *flight,
 
 bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u)
 {
-    if (!vi_structure_grows(s->model)) {
-        return false;
-    }
     if (s->model->displacement_limit > 0.0) {
         const double passed = flight_beyond(s, flight, *u);
         s->state->unbounded = passed < HUGE_VAL ? VI_BEYOND_LIMIT : VI_BOUNDED;
@@ -219,7 +216,7 @@ bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const v
 
 bool vi_unbounded_drift(const vi_structure *s, const vi_drift *drift, double *u)
 {
-    if (!vi_structure_grows(s->model) || !(s->model->displacement_limit > 0.0)) {
+    if (!(s->model->displacement_limit > 0.0)) {
         return false;
     }
     const double passed = drift->rooted ? HUGE_VAL : drift_beyond(s, drift, *u);
