@@ -200,7 +200,8 @@ static double first_out_of_reach(const vi_structure *s, const vi_flight *flight,
     return high;
 }
 
-bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u)
+bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets,
+                         double *u)
 {
     if (s->model->displacement_limit > 0.0) {
         const double passed = flight_beyond(s, flight, *u);
