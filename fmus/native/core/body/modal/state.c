@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "body/landing.h"
-#include "body/modal/growth.h"
+#include "modes/growth.h"
 
 /* ---- the model ---- */
 
@@ -65,7 +65,9 @@ void vi_structure_prepare(vi_structure_model *model)
         model->fastest = vi_max(model->fastest, rate);
     }
     model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
-    model->growth = VI_GROWING ? vi_growth_of(model) : 0.0;
+    model->growth = VI_GROWING ? vi_growth_of(vi_structure_modes(model), model->mode,
+                                              model->coupled ? (const double (*)[VI_MODES])model->coupling : NULL)
+                               : 0.0;
 }
 
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)

@@ -78,9 +78,8 @@ static bool is_simple(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
     const vi_structure_state *state = s->state;
-    if (vi_structure_sines(model) > 0 || vi_structure_stops_move(model) || model->coupled || model->varies
-        || state->exchange.on || s->record->periods
-        || state->follow_energies) {
+    if (vi_structure_sines(model) > 0 || vi_structure_stops_move(model) || vi_structure_grows(model) || model->coupled
+        || model->varies || state->exchange.on || s->record->periods || state->follow_energies) {
         return false;
     }
     for (int k = 0; k < model->contacts; ++k) {
