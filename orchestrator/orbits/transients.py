@@ -281,6 +281,10 @@ def _refuse(study: Transients) -> None:
 
 def _with_the_first_mode(scene: Scene) -> Scene:
     """Return a scene without a force as a scene with zero force, with the period of its first mode on a spring."""
+    if scene.moving_stop:
+        raise UsageError(
+            f"{scene.source}: {scene.moving_stop}: expected stops that stand still, got one that moves."
+        )
     if scene.has_several_forces:
         got = forces_in_words(scene.forces)
         raise UsageError(f"{scene.source}: forcing: expected one sine, or no force, got {got}.")

@@ -13,6 +13,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.forcing_clock import signals_of, sines_of
 from vibroimpact.orchestrator.scene.forcing_models import ConstantForcing, Force, Forcing, SignalForcing
+from vibroimpact.orchestrator.scene.models import StopTable
 
 Floats = NDArray[np.float64]
 _BASE = "base_acceleration"
@@ -40,6 +41,11 @@ def force_integers(scene: Scene) -> dict[str, int]:
             f"signal[{number}].table_count": count,
         }
         first += count
+    for number, stop in enumerate(scene.stops, start=1):
+        if isinstance(stop, StopTable) and stop.motion_times is not None:
+            count = len(stop.motion_times)
+            found |= {f"stop[{number}].table_start": first, f"stop[{number}].table_count": count}
+            first += count
     return found
 
 
@@ -61,14 +67,14 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
     turned = 0.0
     if clock is not None:
         turned = 0.0 if begins_anew else clock.phase / clock.angular_frequency
-        first = sines_of(scene.forces)[0]
-        found |= _row("mode.forcing", "", body.load(first))
         found |= {
             "forcing.amplitude": 0.0,
             "forcing.angular_frequency": clock.angular_frequency,
             "forcing.phase": clock.phase if begins_anew else 0.0,
         }
-        found |= _amplitude_of_clock(first) if clock.periods == 1 else {}
+        for first in sines_of(scene.forces)[:1]:
+            found |= _row("mode.forcing", "", body.load(first))
+            found |= _amplitude_of_clock(first) if clock.periods == 1 else {}
     for number, force in enumerate(further_forces(scene), start=1):
         frequency, phase = (
             (force.angular_frequency, force.phase) if isinstance(force, Forcing) else (0.0, 0.0)
@@ -79,7 +85,7 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
             f"sine[{number}].phase": phase - turned * frequency,
             **_row("mode.sine", f"{number},", body.load(force)),
         }
-    return found | _signal_floats(scene, body)
+    return found | _signal_floats(scene, body) | _table_floats(scene)
 
 
 def _signal_floats(scene: Scene, body: StructureBody) -> dict[str, float]:
@@ -93,6 +99,18 @@ def _signal_floats(scene: Scene, body: StructureBody) -> dict[str, float]:
         for name, column in zip(("time", "value"), signal.rows, strict=True):
             found |= {f"table.{name}[{row}]": value for row, value in enumerate(column, start=before + 1)}
         before += len(signal.rows[0])
+    return found
+
+
+def _table_floats(scene: Scene) -> dict[str, float]:
+    """Return the tables of moving stops, behind those of the signals."""
+    found: dict[str, float] = {}
+    before = sum(len(signal.rows[0]) for signal in signals_of(scene.forces))
+    for stop in scene.stops:
+        if isinstance(stop, StopTable) and stop.motion_times is not None and stop.motion_values is not None:
+            for name, column in (("time", stop.motion_times), ("value", stop.motion_values)):
+                found |= {f"table.{name}[{row}]": value for row, value in enumerate(column, start=before + 1)}
+            before += len(stop.motion_times)
     return found
 
 

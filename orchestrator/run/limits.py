@@ -53,6 +53,7 @@ LIMITS = {
     "forces": Limit(),
     "quasi-periodic": Limit(orbits="sines with a common period, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
+    "motion": Limit(lanes=True, orbits="stops that stand still"),
     "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
     "distance": Limit(lanes=True, orbits=_NONE),
@@ -95,6 +96,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("quasi-periodic", "forcing", "sines without one")
     if not scene.stops:
         yield Seen("stop", "stop", "none")
+    if scene.moving_stop:
+        yield Seen("motion", scene.moving_stop, "a stop that moves")
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')

@@ -33,19 +33,19 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
         oscillator, else the values of `state_variables`. A state beyond a rigid stop that has moved is put back, see
         `free_state`. None: the scene's own start.
     """
-    body, forcing = scene.body, None if scene.has_several_forces else scene.forcing
+    body, forcing = scene.body, None if scene.lists_forces else scene.forcing
     parameters = named_numbers(body, body.size) | body.fmu_floats(forcing, scene.stops, scene.sensor)
     parameters |= contact_floats(scene)
     if forcing is not None:
         parameters |= named_numbers(forcing)
-    if scene.has_several_forces:
+    if scene.lists_forces:
         parameters |= force_floats(scene, begins_anew=start is None)
     if scene.exciter is not None:
         parameters |= _exciter_floats(scene, scene.exciter, parameters)
     parameters |= named_numbers(scene.execution)
     if start is not None:
         parameters |= dict(zip(scene.body.start_names, free_state(scene, start, parameters), strict=True))
-        if scene.period is not None and not scene.has_several_forces:
+        if scene.period is not None and not scene.lists_forces:
             parameters["forcing.phase"] = 0.0
     return parameters
 
@@ -57,7 +57,7 @@ def exported_floats(scene: Scene) -> dict[str, float]:
     inertial force and adds the base to the accelerations itself; an export has the base.
     """
     parameters = float_parameters(scene, None)
-    forcing = None if scene.has_several_forces else scene.forcing
+    forcing = None if scene.lists_forces else scene.forcing
     if forcing is None or forcing.kind != "base_acceleration" or scene.body.KNOWS_BASE:
         return parameters
     forces = [name for name in parameters if name.startswith("forcing.amplitude")]
@@ -91,7 +91,7 @@ def integer_parameters(scene: Scene) -> dict[str, int]:
     """Return the integer, enumeration and Boolean (`bool`) parameters of the body's FMU."""
     refuse_unknown_modes(scene)
     parameters = {"impact_limit": scene.execution.impact_limit}
-    if scene.has_several_forces:
+    if scene.lists_forces:
         parameters |= scene.body.fmu_integers(None, scene.stops) | force_integers(scene)
     else:
         parameters |= scene.body.fmu_integers(scene.forcing, scene.stops)
@@ -144,7 +144,10 @@ def contact_floats(scene: Scene) -> dict[str, float]:
     parameters: dict[str, float] = {}
     for k, stop in enumerate(scene.stops, start=1):
         port = f"contact[{k}]"
-        parameters |= {name.replace("contact[k]", port): value for name, value in named_numbers(stop).items()}
+        parameters |= {
+            name.replace("contact[k]", port).replace("stop[k]", f"stop[{k}]"): value
+            for name, value in named_numbers(stop).items()
+        }
     return parameters
 
 

@@ -49,7 +49,7 @@ def runs_attributes(attrs: Mapping[Any, Any]) -> dict[str, Any]:
 
 def _clock(scene: Scene) -> dict[str, int]:
     """Return the periods of the first of several sines in a forcing period, 0 without a common period."""
-    clock = scene.clock if scene.has_several_forces else None
+    clock = scene.clock if scene.lists_forces else None
     return {} if clock is None else {CLOCK_PERIODS: clock.periods if clock.is_common else 0}
 
 

@@ -19,7 +19,13 @@ from vibroimpact.orchestrator.scene.body_models import (
 )
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
-from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sines_of, sweeps_frequencies
+from vibroimpact.orchestrator.scene.forcing_clock import (
+    Clock,
+    clock_of,
+    sines_of,
+    sines_of_stops,
+    sweeps_frequencies,
+)
 from vibroimpact.orchestrator.scene.forcing_models import (
     FORCING_MODELS,
     Force,
@@ -202,20 +208,26 @@ class Draft(DraftTables):
         return not is_one_sine(self.forces)
 
     @property
+    def has_moving_stops(self) -> bool:
+        """Whether a stop moves: the body then runs as a structure."""
+        return any(stop is not None and stop.moves for stop in self.stops)
+
+    @property
     def simulated_body(self) -> Body | None:
         """The body in the form that runs: a structure under several forces; None where it is invalid."""
         body = self.body
-        if body is None or isinstance(body, StructureBody) or not self.has_several_forces:
+        alone = not self.has_several_forces and not self.has_moving_stops
+        if body is None or isinstance(body, StructureBody) or alone:
             return body
         return BodyAlone.model_construct(names=("body",), parts=(body,), links=(), observed=())
 
     @property
     def clock(self) -> Clock | None:
         """The clock of valid forces; None without one, and where a frequency is missing, 0 or infinite."""
-        sines = sines_of(self.forces)
+        sines = [*sines_of(self.forces), *sines_of_stops(self.stops)]
         if any(not 0.0 < sine.angular_frequency < math.inf for sine in sines):
             return None
-        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.axes))
+        return clock_of(self.forces, self.stops, sweeps_frequencies=sweeps_frequencies(self.axes))
 
     @property
     def is_structure(self) -> bool:
@@ -315,6 +327,12 @@ class Draft(DraftTables):
         spans = [
             self.frequency_span(key) for key, force, _ in self.written_forces() if isinstance(force, Forcing)
         ]
+        moved = (
+            self.span(f"stop[{number}].motion_angular_frequency")
+            for number, stop in enumerate(self.stops, start=1)
+            if stop is not None and stop.motion_angular_frequency > 0.0
+        )
+        spans += [span for span in moved if span is not None]
         if not spans:
             return 0.0, 0.0
         clock = self.clock

@@ -9,6 +9,7 @@ from fractions import Fraction
 from math import lcm
 
 from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing, Signal, SignalForcing
+from vibroimpact.orchestrator.scene.models import Stop, StopTable
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MOST_PERIODS = 64
@@ -54,22 +55,31 @@ def sines_of(forces: Sequence[Force | None]) -> list[Forcing]:
     return [force for force in forces if isinstance(force, Forcing)]
 
 
-def is_frequency(key: str) -> bool:
-    """Return whether a key of a scene is the frequency of a force.
-
-    >>> is_frequency("forcing[2].angular_frequency"), is_frequency("forcing.amplitude")
-    (True, False)
-    """
-    return key.startswith("forcing") and key.endswith("frequency")
-
-
 def signals_of(forces: Sequence[Force | None]) -> list[Signal]:
     """Return the forces that are neither sines nor constants, in their order."""
     return [force for force in forces if isinstance(force, SignalForcing)]
 
 
+def sines_of_stops(stops: Sequence[Stop | None]) -> list[Forcing]:
+    """Return the motions of stops that are sines, as forces without an amplitude."""
+    moving = [stop for stop in stops if isinstance(stop, StopTable) and stop.motion_angular_frequency > 0.0]
+    return [
+        Forcing(amplitude=0.0, angular_frequency=stop.motion_angular_frequency, phase=stop.motion_phase)
+        for stop in moving
+    ]
+
+
+def is_frequency(key: str) -> bool:
+    """Return whether a key of a scene is the frequency of a force or of a moving stop.
+
+    >>> is_frequency("forcing[2].angular_frequency"), is_frequency("forcing.amplitude")
+    (True, False)
+    """
+    return key.startswith(("forcing", "stop[")) and key.endswith("frequency")
+
+
 def sweeps_frequencies(axes: Sequence[SweepAxis]) -> bool:
-    """Return whether a sweep varies the frequency of a force.
+    """Return whether a sweep varies the frequency of a force, or of the motion of a stop.
 
     >>> sweeps_frequencies([SweepAxis("forcing[2].frequency", (1.0, 2.0))])
     True
@@ -77,8 +87,12 @@ def sweeps_frequencies(axes: Sequence[SweepAxis]) -> bool:
     return any(is_frequency(axis.key) for axis in axes)
 
 
-def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False) -> Clock | None:
+def clock_of(
+    forces: Sequence[Force | None], stops: Sequence[Stop | None] = (), *, sweeps_frequencies: bool = False
+) -> Clock | None:
     """Return the clock of some forces; None without a sine, and for a single force of frequency 0.
+
+    Sines of moving stops count behind those of forces. A stop that drifts repeats with no period.
 
     A sweep over a frequency has the first sine as its clock, as points have other common periods or none. So have
     sines beside another signal, which repeats with no period.
@@ -91,11 +105,11 @@ def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False
     >>> clock_of([one, Forcing(amplitude=1.0, angular_frequency=2.0**0.5)]).is_common
     False
     """
-    sines = sines_of(forces)
+    sines = [*sines_of(forces), *sines_of_stops(stops)]
     if not sines:
         return None
     first = sines[0]
-    if signals_of(forces):
+    if signals_of(forces) or any(isinstance(stop, StopTable) and stop.drifts for stop in stops):
         return Clock(first.angular_frequency, first.phase, is_common=False)
     if len(sines) == 1:
         frequency = first.angular_frequency
@@ -108,7 +122,7 @@ def clock_of(forces: Sequence[Force | None], *, sweeps_frequencies: bool = False
     exact = [ratio for ratio, error in ratios if error <= ROUNDING]
     near = tuple(
         (number, ratio.numerator, ratio.denominator)
-        for number, (ratio, error) in zip(_numbers(forces)[1:], ratios, strict=True)
+        for number, (ratio, error) in zip(_numbers(forces)[1:], ratios, strict=False)
         if ROUNDING < error <= NEAR
     )
     periods = lcm(*(ratio.denominator for ratio in exact))

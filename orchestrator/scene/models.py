@@ -93,8 +93,18 @@ def location_rule(doc: str, default: str) -> Rule:
     return Rule(hint=hint, doc=doc, default=default)
 
 
+MOST_KNOTS = 8192
+"""Most numbers of the tables of a scene, for which the FMU Structure is compiled."""
+MOTION_KEYS = (
+    *("velocity", "motion_amplitude", "motion_angular_frequency", "motion_phase"),
+    *("motion_times", "motion_values"),
+)
+"""Keys of a stop that moves."""
+_Knots = Annotated[tuple[Finite, ...], Field(strict=False, min_length=2, max_length=MOST_KNOTS)]
+
+
 class StopTable(SceneTable):
-    """Base of `[[stop]]`: the place of a stop."""
+    """Base of `[[stop]]`: the place of a stop, and its motion."""
 
     between: ClassVar[tuple[str, ...]] = ()
 
@@ -125,6 +135,67 @@ class StopTable(SceneTable):
             default="required there",
         ),
     ] = None
+    velocity: Annotated[
+        Finite,
+        Rule(
+            unit="m/s",
+            fmu="stop[k].velocity",
+            told_if_given=True,
+            doc="the stop moves by velocity times time; its other motions are added",
+        ),
+    ] = 0.0
+    motion_amplitude: Annotated[
+        Finite,
+        Rule(
+            unit="m",
+            fmu="stop[k].amplitude",
+            told_if_given=True,
+            doc="the stop moves by motion_amplitude cos(motion_angular_frequency time + motion_phase)",
+        ),
+    ] = 0.0
+    motion_angular_frequency: Annotated[
+        NotNegative,
+        Rule(
+            unit="rad/s",
+            fmu="stop[k].angular_frequency",
+            told_if_given=True,
+            doc="> 0 with a motion_amplitude",
+            default="required there",
+        ),
+    ] = 0.0
+    motion_phase: Annotated[
+        Finite, Rule(unit="rad", fmu="stop[k].phase", told_if_given=True, doc="at time 0")
+    ] = 0.0
+    motion_times: Annotated[
+        _Knots | None,
+        Rule(
+            "an array of 2 ascending numbers or more",
+            unit="s",
+            sweepable=False,
+            doc="instants of motion_values; before the first and after the last the stop keeps its velocity",
+            default="no table",
+        ),
+    ] = None
+    motion_values: Annotated[
+        _Knots | None,
+        Rule(
+            "an array of as many numbers as motion_times",
+            unit="m",
+            sweepable=False,
+            doc="the stop moves by the natural cubic spline through them",
+            default="no table",
+        ),
+    ] = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether a motion of the stop is given, which may be 0."""
+        return not self.model_fields_set.isdisjoint(MOTION_KEYS)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the stop has a motion that is no sine."""
+        return self.velocity != 0.0 or self.motion_times is not None
 
 
 class ContactTable(SceneTable):
@@ -137,6 +208,7 @@ class ContactTable(SceneTable):
     mass: ClassVar[None] = None
     location: ClassVar[None] = None
     at: ClassVar[None] = None
+    moves: ClassVar[bool] = False
 
     between: Annotated[
         tuple[Point, ...],

@@ -50,7 +50,7 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import ContactTable, Execution, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import MOTION_KEYS, ContactTable, Execution, Record, SceneTable, Stop
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
@@ -101,6 +101,9 @@ class Parts(SceneTable):
                     del table["at"]  # so that campaigns of versions without it go on
                 if table.get("signal") == "sine":
                     del table["signal"]
+            for table, stop in zip(parts["contacts"], self.stops, strict=True):
+                for key in () if stop.moves else MOTION_KEYS:
+                    table.pop(key, None)
             return document | {"body": parts["bodies"][0], "stops": parts["contacts"], "general": None}
         document["record"]["time_series"] = None
         return document | {"body": None, "stops": [], "general": self._components_document()}
@@ -192,6 +195,17 @@ class Parts(SceneTable):
         return not is_one_sine(self.forces)
 
     @property
+    def moving_stop(self) -> str:
+        """The key of the first stop that moves; empty where none does."""
+        moving = (key for key, stop in zip(self.stop_keys, self.stops, strict=True) if stop.moves)
+        return next(moving, "")
+
+    @property
+    def lists_forces(self) -> bool:
+        """Whether the component Structure has the body with a list of forces: several, or beside a moving stop."""
+        return self.has_several_forces or bool(self.moving_stop)
+
+    @property
     def forcing(self) -> Forcing | None:
         """The only force, a sine; None without forces.
 
@@ -214,7 +228,7 @@ class Parts(SceneTable):
     @property
     def clock(self) -> Clock | None:
         """The clock of the forces, whose periods records count; None without a sine, and under a constant force."""
-        return clock_of(self.forces, sweeps_frequencies=sweeps_frequencies(self.sweep))
+        return clock_of(self.forces, self.stops, sweeps_frequencies=sweeps_frequencies(self.sweep))
 
     @property
     def period(self) -> float | None:

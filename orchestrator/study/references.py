@@ -224,7 +224,7 @@ def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
 
 def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Observation | None:
     """Return the observation with impacts from the closed form of P(1,1); None where the motion is another one."""
-    if scene.period is None or len(observation.impacts) < 2 or scene.has_several_forces:
+    if scene.period is None or len(observation.impacts) < 2 or scene.lists_forces:
         return None
     if not all_rigid(scene.stops):
         return None

@@ -155,12 +155,15 @@ def _units_agree(draft: Draft) -> Iterator[Problem]:
 
 def _several_forces(draft: Draft) -> Iterator[Problem]:
     """Forces that the component Structure has: their numbers, their sines, and what is simulated with one sine."""
+    if draft.has_moving_stops and not draft.has_several_forces and not draft.is_structure:
+        yield from _keys_of_one_sine(draft, "it beside a moving stop")
     if not draft.has_several_forces:
         return
     for rule in (_numbers_are_few, _sines_have_periods, _forces_have_room, signal_problems):
         yield from rule(draft)
     if not draft.is_structure:
-        yield from _keys_of_one_sine(draft)
+        several = "it beside several forces" if len(draft.forces) > 1 else "it beside a force that is no sine"
+        yield from _keys_of_one_sine(draft, several)
 
 
 def _numbers_are_few(draft: Draft) -> Iterator[Problem]:
@@ -192,18 +195,18 @@ def _forces_have_room(draft: Draft) -> Iterator[Problem]:
         yield Problem("forcing", f"at most {most} sines and constants in all", f"{sines + constants}", hint)
 
 
-def _keys_of_one_sine(draft: Draft) -> Iterator[Problem]:
-    """Yield the tables and keys of one body that only a force of one sine goes with."""
+def _keys_of_one_sine(draft: Draft, several: str) -> Iterator[Problem]:
+    """Yield the tables and keys of one body that only a force of one sine, and stops that stand still, go with."""
     from vibroimpact.orchestrator.scene.rules.structure import keys_left_out  # few scenes need it
 
     beside = "beside [forcing] with one sine"
-    several = "it beside several forces" if len(draft.forces) > 1 else "it beside a force that is no sine"
     for name in ("sensor", *CHAIN_TABLES, "replay"):
         if name in draft.document:
             yield Problem(name, f"[{name}] {beside}", several, "Remove it, or all forces but one sine.")
     if draft.written("execution").get("how") == "coupled":
-        hint = "Several forces are in one FMU, with all contacts inside."
-        yield Problem("execution.how", '"auto" or "fused" beside several forces', '"coupled"', hint)
+        hint = "They are in one FMU, with all contacts inside."
+        expected = f'"auto" or "fused" {several.removeprefix("it ")}'
+        yield Problem("execution.how", expected, '"coupled"', hint)
     for key in keys_left_out(draft):
         if key != "observed_mass":
             yield Problem(f"body.{key}", f"{key} {beside}", several, f"Remove {key}.")

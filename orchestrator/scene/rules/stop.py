@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body, StructureBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.laws import LAWS
-from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, Stop
-from vibroimpact.orchestrator.scene.problems import Problem, quoted
+from vibroimpact.orchestrator.scene.models import LAWS_THAT_YIELD, OwnStop, Stop
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems
 
 
@@ -58,6 +58,8 @@ def stops_leave_room(draft: Draft) -> Iterator[Problem]:
         one, other = draft.stops[first], draft.stops[second]
         if one is None or other is None or draft.body.place_of(one) != draft.body.place_of(other):
             continue
+        if one.moves or other.moves:
+            continue  # a run ends where moving stops leave no room
         if one.side == other.side:
             yield from _same_side_problems(draft, first, second, one.side)
         else:
@@ -112,8 +114,8 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
     Only the FMU of a bent beam has the start displacement at a stop, so the FMU refuses a wrong start itself.
     """
     for index, stop in enumerate(draft.stops):
-        if stop is None or not LAWS[stop.law].is_rigid:
-            continue
+        if stop is None or not LAWS[stop.law].is_rigid or stop.moves:
+            continue  # the FMU knows where a moving stop is at the start
         key, start = _start(draft, stop)
         if start is None:
             continue
@@ -141,6 +143,50 @@ def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
         return key, None
     key = f"{key}[{body.place_of(stop)}]" if body.PLACE else key
     return key, draft.span(key)
+
+
+def motions_are_whole(draft: Draft) -> Iterator[Problem]:
+    """A motion of a stop has its frequency, or a table with ascending instants; no run continues it."""
+    for number, stop in enumerate(draft.stops, start=1):
+        if stop is not None and stop.moves:
+            yield from _sine_problems(draft, stop, f"stop[{number}]")
+            yield from _table_problems(stop, f"stop[{number}]")
+    moving = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.moves), 0)
+    if not moving:
+        return
+    for axis in draft.axes:
+        if axis.continuation:
+            hint = "A stop moves from time 0 on, so that the end of a run is no start of the next."
+            key = key_path(("sweep", axis.key, "path"))
+            yield Problem(key, f'"independent" beside the moving stop[{moving}]', "a continuation", hint)
+
+
+def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]:
+    amplitude = draft.span(f"{where}.motion_amplitude") or (0.0, 0.0)
+    frequency = draft.span(f"{where}.motion_angular_frequency") or (0.0, 0.0)
+    if any(amplitude) and frequency[0] == 0.0:
+        hint = "The stop moves by motion_amplitude cos(motion_angular_frequency time + motion_phase)."
+        yield Problem(
+            f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint
+        )
+
+
+def _table_problems(stop: OwnStop, where: str) -> Iterator[Problem]:
+    times, values = stop.motion_times, stop.motion_values
+    if times is None and values is None:
+        return
+    if times is None or values is None:
+        missing = "motion_times" if times is None else "motion_values"
+        yield Problem(f"{where}.{missing}", "an array of 2 numbers or more", "nothing", f"Add {missing}.")
+        return
+    if len(times) != len(values):
+        got = f"{len(values)} beside {len(times)} motion_times"
+        yield Problem(f"{where}.motion_values", "as many numbers as motion_times", got)
+    for place, (before, after) in enumerate(pairwise(times), start=2):
+        if after <= before:
+            expected = f"more than the instant before, {quoted(before)}"
+            yield Problem(f"{where}.motion_times[{place}]", expected, quoted(after))
+            return
 
 
 def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
@@ -208,6 +254,7 @@ STOP_RULES = (
     stops_are_on_the_body,
     stops_leave_room,
     start_is_on_the_free_side,
+    motions_are_whole,
     a_surface_that_lags_is_fused,
     residual_vectors_have_stops_that_yield,
     modes_that_are_found_converge,

@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.forcing import ALONE
+from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 Span = tuple[float, float]
@@ -35,6 +36,7 @@ def structure_problems(draft: Draft) -> Iterator[Problem]:
     """Yield the problems between the tables of several bodies; of their points only if the bodies are valid."""
     yield from _tables_of_one_body(draft)
     yield from _keys_of_one_body(draft)
+    yield from motions_are_whole(draft)
     too_many = list(_counts_are_few(draft))
     yield from too_many
     if too_many or not isinstance(draft.body, StructureBody):
@@ -120,6 +122,7 @@ class _Limit(NamedTuple):
     is_upper: bool
     is_rigid: bool
     span: Span
+    moves: bool = False
 
 
 class _Points:
@@ -193,7 +196,7 @@ class _Points:
             span = draft.span(f"stop[{number}].position")
             if stop is not None and stop.at is not None and span is not None:
                 point = self._body.point(stop.at)
-                yield _Limit(f"stop[{number}]", (point,), stop.side == "upper", LAWS[stop.law].is_rigid, span)
+                yield _Limit(f"stop[{number}]", (point,), stop.side == "upper", LAWS[stop.law].is_rigid, span, stop.moves)
         for number, contact in enumerate(draft.meetings, start=1):
             span = draft.span(f"contact[{number}].clearance")
             if contact is None or span is None:
@@ -221,7 +224,7 @@ class _Points:
 
 def _contacts_leave_room(draft: Draft, points: _Points) -> Iterator[Problem]:
     for one, other in combinations(points.limits(), 2):
-        if one.points != other.points:
+        if one.points != other.points or one.moves or other.moves:
             continue
         if one.is_upper == other.is_upper:
             yield from _hidden(one, other)
@@ -247,7 +250,7 @@ def _hidden(one: _Limit, other: _Limit) -> Iterator[Problem]:
 def _start_is_on_the_free_side(draft: Draft, points: _Points) -> Iterator[Problem]:
     for limit in points.limits():
         spans = [points.start(point) for point in limit.points]
-        if not limit.is_rigid or any(span is None for span in spans):
+        if not limit.is_rigid or limit.moves or any(span is None for span in spans):
             continue
         known = [span for span in spans if span is not None]
         low, high = known[0] if len(known) == 1 else (known[0][0] - known[1][1], known[0][1] - known[1][0])

@@ -136,7 +136,7 @@ def _no_transient(scene: Scene) -> Mapping[str, Any]:
 
 def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
     """Return a scene that starts with a state at forcing phase 0; None where such a scene is invalid."""
-    if scene.has_several_forces:
+    if scene.lists_forces:
         return None  # its state is of modes, which the table of the body does not have
     changes: dict[str, Any] = dict(_no_transient(scene))
     free = free_state(scene, state)

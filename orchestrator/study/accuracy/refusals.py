@@ -68,6 +68,11 @@ def refuse_several_bodies(scene: Scene) -> None:
             f"{scene.source}: forcing: expected one sine, under which a body has other ways to be simulated, got "
             f"{forces_in_words(scene.forces)}. They run fused, and are exact between impacts."
         )
+    if scene.moving_stop:
+        raise UsageError(
+            f"{scene.source}: {scene.moving_stop}: expected stops that stand still, beside which a body has other ways "
+            "to be simulated, got a stop that moves. It runs fused, and is exact between impacts."
+        )
     if scene.is_one_body and isinstance(scene.body, StructureBody):
         raise UsageError(
             f"{scene.source}: body: expected one body, which has other ways to be simulated, got several. "
