@@ -77,7 +77,8 @@ def _energy_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
     balance = energy - energy[0] - (work - work[0]) + (loss - loss[0]) + (contact - contact[0])
     ways = (np.abs(np.diff(each)).sum() for each in (energy, work, loss, contact))
     power = any(each.get("law") in POWER for each in _limits(tables))
-    allowed = (TURNOVER_POWER if power else TURNOVER) * (energy.max() + sum(ways)) + 1e-14
+    size = float((kinetic + np.abs(potential)).max())
+    allowed = (TURNOVER_POWER if power else TURNOVER) * (size + sum(ways)) + 1e-14
     worst = float(np.abs(balance).max())
     return None if worst <= allowed else f"energy off by {worst:.3g}, of {allowed:.3g} allowed"
 
