@@ -7,7 +7,7 @@ from typing import Any
 
 import mpmath as mp
 import pytest
-from support.exact_impacts import DIGITS, ExactBody, ExactMotion, ExactStop
+from support.exact_impacts import DIGITS, ExactBody, ExactMotion, ExactSine, ExactStop, diagonal
 from support.exact_modes import beam_root, beam_shape
 
 import vibroimpact as vi
@@ -16,23 +16,16 @@ from vibroimpact.orchestrator.study.accuracy.study import studied_scene
 from vibroimpact.orchestrator.study.references import reference_of
 
 
-def mass(tables: dict[str, Any]) -> ExactBody:
-    """Return the oscillator of a scene."""
+def mass(tables: dict[str, Any]) -> tuple[ExactBody, list[mp.mpf]]:
+    """Return the oscillator of a scene, and the row of its displacement."""
     body, forcing = tables["body"], tables["forcing"]
-    with mp.workdps(DIGITS):
-        m = mp.mpf(body["mass"])
-        start = [mp.mpf(body.get(f"{name}_start", 0.0)) * mp.sqrt(m) for name in ("displacement", "velocity")]
-        return ExactBody(
-            [mp.sqrt(mp.mpf(body["stiffness"]) / m)],
-            [mp.mpf(body["damping"]) / m],
-            [mp.mpf(forcing["amplitude"]) / mp.sqrt(m)],
-            [1 / mp.sqrt(m)],
-            forcing["angular_frequency"],
-            start,
-        )
+    sine = ExactSine([forcing["amplitude"]], forcing["angular_frequency"])
+    matrices = ([[body[name]]] for name in ("mass", "damping", "stiffness"))
+    start = ([body.get(f"{name}_start", 0.0)] for name in ("displacement", "velocity"))
+    return ExactBody(*matrices, [sine], *start), [mp.mpf(1)]
 
 
-def beam(tables: dict[str, Any]) -> ExactBody:
+def beam(tables: dict[str, Any]) -> tuple[ExactBody, list[mp.mpf]]:
     """Return the clamped-free beam of a scene, forced and stopped at its tip, from the textbook's shapes."""
     body, forcing = tables["body"], tables["forcing"]
     modes = range(1, body["modes"] + 1)
@@ -41,14 +34,10 @@ def beam(tables: dict[str, Any]) -> ExactBody:
         rate = mp.sqrt(mp.mpf(body["flexural_rigidity"]) / (line * length**4))
         natural = [beam_root("clamped_free", j) ** 2 * rate for j in modes]
         shape = [beam_shape("clamped_free", j, 1.0, 0) / mp.sqrt(line * length) for j in modes]
-        return ExactBody(
-            natural,
-            [2 * mp.mpf(body["damping_ratio"]) * w for w in natural],
-            [mp.mpf(forcing["amplitude"]) * n for n in shape],
-            shape,
-            forcing["angular_frequency"],
-            [mp.mpf(0)] * (2 * len(natural)),
-        )
+        damping = [2 * mp.mpf(body["damping_ratio"]) * w for w in natural]
+        sine = ExactSine([mp.mpf(forcing["amplitude"]) * n for n in shape], forcing["angular_frequency"])
+        matrices = map(diagonal, ([1.0] * len(shape), damping, [w * w for w in natural]))
+        return ExactBody(*matrices, [sine], [0.0] * len(shape), [0.0] * len(shape)), shape
 
 
 def oscillator(stop: dict[str, Any], **changes: Any) -> dict[str, Any]:
@@ -117,8 +106,8 @@ def test_the_estimated_error_of_a_reference_holds_in_40_digits(name: str) -> Non
     assert not reference.chaotic
     assert ("closed form" in reference.name) == (name == "orbit")
     law = {key: value for key, value in tables["stop"][0].items() if key != "law"}
-    body = beam(tables) if "kind" in tables["body"] else mass(tables)
-    motion = ExactMotion(body, ExactStop(**law))
+    body, row = beam(tables) if "kind" in tables["body"] else mass(tables)
+    motion = ExactMotion(body, [ExactStop(row, **law)])
     # from time 0: such a run has all impacts, and the study compares only the recorded ones
     whole = scene.with_values(
         {
@@ -129,22 +118,18 @@ def test_the_estimated_error_of_a_reference_holds_in_40_digits(name: str) -> Non
     hits = vi.run(whole, progress=False).vibroimpact.impacts()
     sticks = vi.run(whole, progress=False).vibroimpact.sticks()
     end = float(sticks.stick_start.min()) if sticks.stick_start.size else math.inf
-    exact = [
-        motion.hit(float(hit.impact_time), float(hit.impact_duration))
-        for hit in (hits.isel(impact=k) for k in range(hits.sizes["impact"]))
-        if float(hit.impact_time) < end
-    ]
+    exact = [motion.next_impact() for _ in range(int((hits.impact_time < end).sum()))]
     own = reference.observation.impacts
     own = own[own[:, 0] < end]
     assert 0 < len(own) <= len(exact)
     exact = exact[-len(own) :]
-    times = [abs(time - mp.mpf(hit[0])) for hit, (time, _) in zip(own, exact, strict=True)]
-    speeds = [abs(velocity - mp.mpf(hit[1])) for hit, (_, velocity) in zip(own, exact, strict=True)]
+    times = [abs(each.time - mp.mpf(hit[0])) for hit, each in zip(own, exact, strict=True)]
+    speeds = [abs(each.velocity - mp.mpf(hit[1])) for hit, each in zip(own, exact, strict=True)]
     assert float(max(times)) / reference.scales.time <= reference.error["impact_time"]
     assert float(max(speeds)) / own[:, 1].max() <= reference.error["impact_velocity"]
     final = reference.observation.final
     if end == math.inf and final[0] < law["position"]:
-        displacement, velocity = motion.at(reference.scales.window[1])
+        displacement, velocity = (mp.fdot(row, each) for each in motion.at(reference.scales.window[1]))
         size = reference.observation.displacement_range
         rate = 2.0 * math.pi / reference.scales.time
         off = max(abs(final[0] - displacement) / size, abs(final[1] - velocity) / (size * rate))

@@ -1,6 +1,8 @@
 """Random scenes of several bodies of every kind: energy balances, every run ends, nothing is beyond a rigid stop.
 
-Scenes of free oscillators that meet only each other run as components, too: the first impacts are the same.
+Scenes of free oscillators that meet only each other run as components, too: the first impacts are the same. Odd seeds
+have forces of any signals, moving stops and growing motions. Their events stay the same where the run is cut or sampled
+at another rate.
 """
 
 from __future__ import annotations
@@ -9,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from support.cut_recordings import problem_of_cuts
+from support.drawn_forces import forced_structure, stop_motion
 from support.drawn_structures import ENERGIES, drawn_structure
 
 import vibroimpact as vi
@@ -29,26 +33,40 @@ ROUNDING, IMPACT_LIMIT = 1e-11, 2
 POWER = ("hertz", "hunt_crossley")
 #: Impacts that two forms share before their rounding parts them, and the largest difference of their times.
 SHARED, APART = 6, 1e-8
+#: Another rate of samples, 1/s, and impacts in all below which rounding is not multiplied to `FINAL` of the state.
+OTHER_RATE, FEW, FINAL = 2.3, 12, 1e-7
+#: Slowest impact, m/s, that cannot be one of those that rounding makes a touch or none.
+FAINT = 1e-5
+ERROR, UNBOUNDED = 3, 6
+CRUSHED = "expected room between their stops"
+"""End of a run between stops of which one moves onto the other."""
 
 
 def check(seed: int) -> str | None:
     """Return the fault of the scene of a seed."""
-    tables = drawn_structure(seed)
+    is_forced = bool(seed % 2)
+    tables = forced_structure(seed) if is_forced else drawn_structure(seed)
     scene = Scene.from_dict(tables)
     found = vi.run(scene)
-    outcome = int(found.outcome)
-    if outcome > 2:
-        return f"outcome {outcome}: {found.message.item()}"
     return (
-        _energy_problem(tables, found)
-        or _room_problem(scene, found)
+        _outcome_problem(tables, found)
+        or _energy_problem(tables, found)
+        or _room_problem(tables, scene, found)
         or _extremes_problem(scene, found)
-        or _components_problem(tables, found)
+        or (_repeats_problem(seed, scene, found) if is_forced else _components_problem(tables, found))
     )
 
 
+def _outcome_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
+    outcome, message = int(found.outcome), str(found.message.item())
+    moves = any(stop_motion(stop, np.ones(1)).any() for stop in tables.get("stop", []))
+    if outcome < ERROR or outcome == UNBOUNDED or (outcome == ERROR and moves and CRUSHED in message):
+        return None
+    return f"outcome {outcome}: {message}"
+
+
 def _limits(tables: dict[str, Any]) -> list[dict[str, Any]]:
-    return [*tables.get("stop", []), *tables["contact"]]
+    return [*tables.get("stop", []), *tables.get("contact", [])]
 
 
 def _energy_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
@@ -59,16 +77,18 @@ def _energy_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
     balance = energy - energy[0] - (work - work[0]) + (loss - loss[0]) + (contact - contact[0])
     ways = (np.abs(np.diff(each)).sum() for each in (energy, work, loss, contact))
     power = any(each.get("law") in POWER for each in _limits(tables))
-    allowed = (TURNOVER_POWER if power else TURNOVER) * (energy.max() + sum(ways)) + 1e-14
+    size = float((kinetic + np.abs(potential)).max())
+    allowed = (TURNOVER_POWER if power else TURNOVER) * (size + sum(ways)) + 1e-14
     worst = float(np.abs(balance).max())
     return None if worst <= allowed else f"energy off by {worst:.3g}, of {allowed:.3g} allowed"
 
 
-def _room_problem(scene: Scene, found: xr.Dataset) -> str | None:
-    for k, stop in enumerate(scene.stops, start=1):
+def _room_problem(tables: dict[str, Any], scene: Scene, found: xr.Dataset) -> str | None:
+    for k, (stop, table) in enumerate(zip(scene.stops, _limits(tables), strict=True), start=1):
         way = found[f"contact_displacement_{k}"].values
         sign = 1.0 if stop.side == "upper" else -1.0
-        beyond = float((sign * (way - stop.position)).max(initial=0.0))
+        place = stop.position + stop_motion(table, found.time.values)
+        beyond = float((sign * (way - place)).max(initial=0.0))
         if stop.law == "restitution" and beyond > BEYOND * (1.0 + np.abs(way).max(initial=0.0)):
             return f"{beyond:.3g} beyond {scene.stop_keys[k - 1]}"
     return None
@@ -86,6 +106,23 @@ def _extremes_problem(scene: Scene, found: xr.Dataset) -> str | None:
         if way.max() > high + ROUNDING or way.min() < low - ROUNDING:
             return f"{label_of(observed)}: samples from {way.min()} to {way.max()}, extremes {low} and {high}"
     return None
+
+
+def _repeats_problem(seed: int, scene: Scene, found: xr.Dataset) -> str | None:
+    """Return the difference between the run and one of another rate, or one that is cut."""
+    if int(found.outcome) not in (0, 1):
+        return None
+    other = vi.run(scene.with_values({"record.time_series.rate": OTHER_RATE}))
+    if int(other.outcome) != int(found.outcome):
+        return f"outcome {int(found.outcome)}, at another rate {int(other.outcome)}: {other.message.item()}"
+    speeds = found.impact_velocity.values
+    if found.sizes["impact"] + found.sizes["stick"] < FEW and not (speeds < FAINT).any():
+        one, again = found.final_state.values, other.final_state.values
+        if not np.allclose(one, again, rtol=0.0, atol=FINAL * (np.abs(one).max() + 1e-3)):
+            return f"final state {one.tolist()}, at another rate {again.tolist()}"
+    share = np.random.default_rng(seed).random()
+    problem = problem_of_cuts(scene, "fused", share, float(found.time[-1]) if found.sizes["sample"] else 1.0)
+    return None if problem is None else f"cut: {problem}"
 
 
 def _components_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:

@@ -143,7 +143,10 @@ def difference(parts: Sequence[Events], edges: Sequence[float], whole: Events, a
             times = part[rows_of][:, TIME]
             if not ((times >= begin - ROOM) & (times <= end + ROOM)).all():
                 return f"{name} at {times.tolist()} of a recording from {begin:.17g} to {end:.17g} s"
-        both, all_rows = np.concatenate([part[rows_of] for part in parts]), whole[rows_of]
+        both, all_rows = (
+            rows[np.lexsort((rows[:, number], rows[:, TIME]))]  # events at one instant have no order
+            for rows in (np.concatenate([part[rows_of] for part in parts]), whole[rows_of])
+        )
         if len(both) != len(all_rows):
             counts = " + ".join(str(len(part[rows_of])) for part in parts)
             return f"{name}: {counts} for {len(all_rows)}"

@@ -1,143 +1,271 @@
-"""Impacts of linear bodies in 40 digits, on a rigid or a Kelvin-Voigt stop: flights and contacts by their own modes.
+"""Impacts of linear bodies in 40 digits, from their matrices: no modes, nothing of the package.
 
-The secant method finds the time of each event in any number of digits, starting from the time in a run. So the
-reference checks the numbers of a run, not the list of its impacts. No eigenvalue may be double.
+Displacements, velocities, the time and each sine are one linear system z' = A z. Its flow over a step is a matrix
+exponential. Where a gap may close within a step, the Taylor series of the gap has the instant as its root.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count, pairwise
 
 import mpmath as mp
+import numpy as np
+from scipy.optimize import brentq
 
 DIGITS = 70
 """Working digits: 40 are left where a stop is grazed."""
+STEP = 0.5
+"""Step times the fastest rate: gaps have at most one peak in it."""
+PARTS = 16
+"""Parts of a step between which the sign of a gap is looked at."""
+MOST_ROUNDS = 80
+"""Rounds of Newton's method, one digit each at a graze at least."""
+
+Number = float | mp.mpf
+Row = list[mp.mpf]
+
+
+@dataclass(frozen=True)
+class ExactSine:
+    """Forces on the coordinates, forces cos(angular_frequency t + phase); constant with the frequency 0."""
+
+    forces: Sequence[Number]
+    angular_frequency: Number = 0.0
+    phase: Number = 0.0
 
 
 @dataclass(frozen=True)
 class ExactBody:
-    """Modal equations q'' + damping q' + natural^2 q = force cos(angular_frequency t), one row for each mode.
+    """The equations of motion mass x'' + damping x' + stiffness x = sum of the sines.
 
     Attributes
     ----------
-    natural, damping, force : sequence of mpf
-    shape : sequence of mpf
-        Shape of the observed point in front of the stop: its displacement is shape . q.
-    angular_frequency : float
-    start : sequence of mpf
-        Modal displacements, then modal velocities.
+    mass, damping, stiffness : sequence of sequence of mpf, shape (n, n)
+    sines : sequence of ExactSine
+    displacement, velocity : sequence of mpf, shape (n,)
+        Start at time 0.
     """
 
-    natural: Sequence[mp.mpf]
-    damping: Sequence[mp.mpf]
-    force: Sequence[mp.mpf]
-    shape: Sequence[mp.mpf]
-    angular_frequency: float
-    start: Sequence[mp.mpf]
+    mass: Sequence[Sequence[Number]]
+    damping: Sequence[Sequence[Number]]
+    stiffness: Sequence[Sequence[Number]]
+    sines: Sequence[ExactSine]
+    displacement: Sequence[Number]
+    velocity: Sequence[Number]
 
 
 @dataclass(frozen=True)
 class ExactStop:
-    """An upper stop: rigid where its stiffness is 0."""
+    """A limit of row . x from above, position + speed t + amplitude cos(angular_frequency t + phase).
 
-    position: float
-    restitution: float = 0.0
-    stiffness: float = 0.0
-    damping: float = 0.0
+    It is rigid where its stiffness is 0. The row of a lower stop, and its position, have the other sign. The row of two
+    points that hit each other is the difference of theirs.
+    """
+
+    row: Sequence[Number]
+    position: Number
+    restitution: Number = 0.0
+    stiffness: Number = 0.0
+    damping: Number = 0.0
+    speed: Number = 0.0
+    amplitude: Number = 0.0
+    angular_frequency: Number = 0.0
+    phase: Number = 0.0
 
 
-class _Piece:
-    """A linear equation of motion, solved: state' = matrix state + constant + Re(force exp(i w t))."""
+@dataclass(frozen=True)
+class ExactImpact:
+    """An impact, or the touch-down on a stop that yields; `contact` counts from 1."""
 
-    def __init__(self, matrix: mp.matrix, constant: mp.matrix, force: mp.matrix, w: mp.mpf) -> None:
-        self._rates, self._vectors = mp.eig(matrix)
-        self._inverse = self._vectors**-1
-        self._rest = -mp.lu_solve(matrix, constant)
-        self._steady = mp.lu_solve(1j * w * mp.eye(matrix.rows) - matrix, force)
-        self._w = w
+    time: mp.mpf
+    velocity: mp.mpf
+    contact: int
 
-    def _forced(self, time: mp.mpf) -> mp.matrix:
-        wave = self._steady * mp.expj(self._w * time)
-        return self._rest + wave.apply(mp.re)
 
-    def flow(self, state: mp.matrix, start: mp.mpf, time: mp.mpf) -> mp.matrix:
-        """Return the state at `time` from the state at `start`."""
-        free = self._inverse * (state - self._forced(start))
-        grown = mp.matrix([mp.exp(a * (time - start)) * x for a, x in zip(self._rates, free, strict=True)])
-        return self._forced(time) + (self._vectors * grown).apply(mp.re)
+def diagonal(numbers: Sequence[Number]) -> list[list[Number]]:
+    """Return a diagonal matrix.
+
+    >>> diagonal([1.0, 2.0])
+    [[1.0, 0.0], [0.0, 2.0]]
+    """
+    return [[a if i == j else 0.0 for j in range(len(numbers))] for i, a in enumerate(numbers)]
+
+
+class _Flow:
+    """A linear system z' = A z: its flow over one step, and Taylor series within it."""
+
+    def __init__(self, matrix: list[Row]) -> None:
+        self.matrix = matrix
+        rates = np.linalg.eigvals(np.array([[float(a) for a in row] for row in matrix]))
+        self.step = mp.mpf(STEP / max(1e-3, float(np.abs(rates).max())))
+        size = len(matrix)
+        columns = [
+            self.moved([mp.mpf(i == j) for i in range(size)], self.step) for j in range(size)
+        ]
+        self._over = [list(row) for row in zip(*columns, strict=True)]
+
+    def series(self, z: Row, time: mp.mpf) -> list[Row]:
+        """Return the Taylor terms of the states at parts of `time`, in powers of the part."""
+        terms, least = [z], mp.mpf(10) ** -(DIGITS + 5) * max(map(abs, z))
+        for k in count(1):
+            terms.append([mp.fdot(row, terms[-1]) * time / k for row in self.matrix])
+            if k > 3 and max(map(abs, terms[-1])) <= least:
+                return terms
+        raise AssertionError
+
+    def moved(self, z: Row, time: mp.mpf) -> Row:
+        """Return the state after a time of a step at most."""
+        return [mp.fsum(each) for each in zip(*self.series(z, time), strict=True)]
+
+    def step_on(self, z: Row) -> Row:
+        """Return the state after one step."""
+        return [mp.fdot(row, z) for row in self._over]
 
 
 class ExactMotion:
-    """A body with a stop, followed from time 0."""
+    """A body with its stops, followed from time 0, impact by impact."""
 
-    def __init__(self, body: ExactBody, stop: ExactStop) -> None:
+    def __init__(self, body: ExactBody, stops: Sequence[ExactStop]) -> None:
         with mp.workdps(DIGITS):
-            n, self._stop = len(body.natural), stop
-            self._shape, self._position = mp.matrix(body.shape).T, mp.mpf(stop.position)
-            w = mp.mpf(body.angular_frequency)
-            free = mp.zeros(2 * n)
-            for j in range(n):
-                free[j, n + j] = mp.mpf(1)
-                free[n + j, j] = -(mp.mpf(body.natural[j]) ** 2)
-                free[n + j, n + j] = -mp.mpf(body.damping[j])
-            force, push = mp.zeros(2 * n, 1), mp.zeros(2 * n, 1)
-            for j in range(n):
-                force[n + j], push[n + j] = mp.mpf(body.force[j]), mp.mpf(body.shape[j])
-            gap, rate = self._row(0, n), self._row(n, n)
-            k, c = mp.mpf(stop.stiffness), mp.mpf(stop.damping)
-            self._gap, self._rate, self._pressing = gap, rate, k * gap + c * rate
-            self._free = _Piece(free, mp.zeros(2 * n, 1), force, w)
-            if k:
-                self._pressed = _Piece(free - push * self._pressing, push * k * self._position, force, w)
-            self._push = push
-            self.time, self.state = mp.mpf(0), mp.matrix(body.start)
+            self._n, self._stops, self._pressed = len(body.displacement), stops, frozenset[int]()
+            self._flows: dict[frozenset[int], _Flow] = {}
+            waves = [*body.sines, *(stop for stop in stops if stop.amplitude)]
+            self._inverse = mp.matrix(body.mass) ** -1
+            self._free = self._matrix(body, [mp.mpf(wave.angular_frequency) for wave in waves])
+            self.time = mp.mpf(0)
+            self.z = [mp.mpf(x) for x in (*body.displacement, *body.velocity, 1, 0)]
+            self.z += [f(mp.mpf(wave.phase)) for wave in waves for f in (mp.cos, mp.sin)]
+            self._gaps = [self._gap(stop, waves) for stop in stops]
+            self._rates = [_times(gap, self._free) for gap in self._gaps]
 
-    def _row(self, first: int, n: int) -> mp.matrix:
-        row = mp.zeros(1, 2 * n)
-        for j in range(n):
-            row[first + j] = self._shape[j]
+    def _matrix(self, body: ExactBody, frequencies: Sequence[mp.mpf]) -> list[Row]:
+        n, size, inverse = self._n, 2 * self._n + 2 + 2 * len(frequencies), self._inverse
+        springs, dashpots = inverse * mp.matrix(body.stiffness), inverse * mp.matrix(body.damping)
+        found = [[mp.mpf(0)] * size for _ in range(size)]
+        for i in range(n):
+            found[i][n + i] = mp.mpf(1)
+            found[n + i][: 2 * n] = [-m[i, j] for m in (springs, dashpots) for j in range(n)]
+        for k, sine in enumerate(body.sines):
+            for i, pull in enumerate(inverse * mp.matrix(sine.forces)):
+                found[n + i][2 * n + 2 + 2 * k] = pull
+        found[2 * n + 1][2 * n] = mp.mpf(1)
+        for k, w in enumerate(frequencies, start=n + 1):
+            found[2 * k][2 * k + 1], found[2 * k + 1][2 * k] = -w, w
+        return found
+
+    def _gap(self, stop: ExactStop, waves: Sequence[ExactSine | ExactStop]) -> Row:
+        """Return the row of the state that is how far a point is beyond its stop."""
+        row = [mp.mpf(0)] * len(self.z)
+        row[: self._n] = [mp.mpf(a) for a in stop.row]
+        row[2 * self._n], row[2 * self._n + 1] = -mp.mpf(stop.position), -mp.mpf(stop.speed)
+        if stop.amplitude:
+            row[2 * self._n + 2 + 2 * waves.index(stop)] = -mp.mpf(stop.amplitude)
         return row
 
-    def hit(self, near: float, duration: float = 0.0) -> tuple[mp.mpf, mp.mpf]:
-        """Advance past the impact closest to a time; return time and velocity of this impact.
+    def _force(self, k: int) -> Row:
+        """Return the row of the state that is the force of a stop that yields."""
+        stop = self._stops[k]
+        c, d = mp.mpf(stop.stiffness), mp.mpf(stop.damping)
+        return [c * gap + d * rate for gap, rate in zip(self._gaps[k], self._rates[k], strict=True)]
 
-        Parameters
-        ----------
-        near : float
-            Time of the impact in a run, s.
-        duration : float
-            Duration of the contact in that run, for a compliant stop, s.
-        """
+    def _kick(self, k: int) -> Row:
+        """Return the velocities that a unit impulse away from a stop makes."""
+        return [-a for a in self._inverse * mp.matrix([mp.mpf(a) for a in self._stops[k].row])]
+
+    @property
+    def _flow(self) -> _Flow:
+        if self._pressed not in self._flows:
+            matrix = [list(row) for row in self._free]
+            for k in self._pressed:
+                force = self._force(k)
+                for i, kick in enumerate(self._kick(k)):
+                    matrix[self._n + i] = [a + kick * b for a, b in zip(matrix[self._n + i], force, strict=True)]
+            self._flows[self._pressed] = _Flow(matrix)
+        return self._flows[self._pressed]
+
+    def next_impact(self, end: Number = 1e9) -> ExactImpact | None:
+        """Go on to the next impact, or touch-down, and through it; None where it is after `end`."""
         with mp.workdps(DIGITS):
-            self._go_on(self._free, lambda x: (self._gap * x)[0] - self._position, near)
-            time, velocity = self.time, (self._rate * self.state)[0]
-            if self._stop.stiffness:
-                k = mp.mpf(self._stop.stiffness)
-                self._go_on(
-                    self._pressed,
-                    lambda x: (self._pressing * x)[0] - k * self._position,
-                    float(time) + duration,
-                )
-            else:
-                mobility = (self._rate * self._push)[0]
-                self.state -= self._push * ((1 + mp.mpf(self._stop.restitution)) * velocity / mobility)
-            return time, velocity
+            while self.time < end:
+                flow, found = self._flow, None
+                time = min(flow.step, mp.mpf(end) - self.time)
+                after = flow.step_on(self.z) if time == flow.step else flow.moved(self.z, time)
+                events = [(self._first_rise(row, time, after), k) for k, row in self._watched()]
+                found = min((each for each in events if each[0] is not None), default=None)
+                if found is None:
+                    self.z, self.time = after, self.time + time
+                    continue
+                part, k = found
+                self.z, self.time = flow.moved(self.z, part * time), self.time + part * time
+                if k in self._pressed:
+                    self._pressed -= {k}
+                    continue
+                return self._meet(k)
+        return None
 
-    def at(self, time: float) -> tuple[mp.mpf, mp.mpf]:
-        """Return displacement and velocity of the point in front of the stop; no impact may lie in between."""
-        with mp.workdps(DIGITS):
-            state = self._free.flow(self.state, self.time, mp.mpf(time))
-            return (self._gap * state)[0], (self._rate * state)[0]
+    def _watched(self) -> list[tuple[int, Row]]:
+        """Return the rows whose rise through 0 is an event: gaps, and forces that end, with the sign changed."""
+        return [
+            (k, [-a for a in self._force(k)] if k in self._pressed else gap) for k, gap in enumerate(self._gaps)
+        ]
 
-    def _go_on(self, piece: _Piece, quantity: Callable[[mp.matrix], mp.mpf], near: float) -> None:
-        """Advance to the zero of a quantity of the state."""
-        start, state = self.time, self.state
+    def _first_rise(self, row: Row, time: mp.mpf, after: Row) -> mp.mpf | None:
+        """Return the part of a step after which a row of the state first rises through 0; None if it does not."""
+        rate = _times(row, self._flow.matrix)
+        start, slope = mp.fdot(row, self.z), mp.fdot(rate, self.z)
+        size = mp.fsum(abs(a * b) for a, b in zip(row, self.z, strict=True))
+        leaves = abs(start) <= mp.mpf(10) ** -(DIGITS - 12) * size and slope < 0
+        peaks = slope > 0 > mp.fdot(rate, after)
+        if mp.fdot(row, after) < 0 and not peaks and not leaves:
+            return None
+        series = [mp.fdot(row, term) for term in self._flow.series(self.z, time)]
+        series = series[1:] if leaves else series  # divided by the time: without the root at its start
+        return _rise_of(series[::-1])
 
-        def at(time: mp.mpf) -> mp.mpf:
-            return quantity(piece.flow(state, start, time))
+    def _meet(self, k: int) -> ExactImpact:
+        velocity, stop = mp.fdot(self._rates[k], self.z), self._stops[k]
+        if stop.stiffness:
+            self._pressed |= {k}
+        else:
+            kick = self._kick(k)
+            mobility = -mp.fdot([mp.mpf(a) for a in stop.row], kick)
+            impulse = (1 + mp.mpf(stop.restitution)) * velocity / mobility
+            for i, each in enumerate(kick, start=self._n):
+                self.z[i] += impulse * each
+        return ExactImpact(self.time, velocity, k + 1)
 
-        guess = mp.mpf(near)
-        apart = mp.mpf(10) ** -12 * (guess - start)
-        self.time = mp.findroot(at, (guess, guess + apart), tol=mp.mpf(10) ** (-2 * 45), maxsteps=60)
-        self.state = piece.flow(state, start, self.time)
+    def at(self, time: Number) -> tuple[Row, Row]:
+        """Go on to a time, without an impact in between; return displacements and velocities."""
+        found = self.next_impact(time)
+        assert found is None, found
+        return self.z[: self._n], self.z[self._n : 2 * self._n]
+
+
+def _times(row: Row, matrix: list[Row]) -> Row:
+    return [mp.fdot(row, column) for column in zip(*matrix, strict=True)]
+
+
+def _rise_of(series: list[mp.mpf]) -> mp.mpf | None:
+    """Return the first rise through 0 of a polynomial between 0 and 1, highest power first, by Newton from floats."""
+    rough = np.poly1d([float(a) for a in series])
+    places = np.linspace(0.0, 1.0, PARTS + 1)
+    values, slopes = rough(places), rough.deriv()(places)
+    for k, (low, high) in enumerate(pairwise(places)):
+        if values[k] >= 0.0:
+            continue
+        if values[k + 1] < 0.0 and slopes[k] > 0.0 > slopes[k + 1]:
+            high = brentq(rough.deriv(), low, high)
+        if rough(high) >= 0.0:
+            return _newton(series, mp.mpf(brentq(rough, low, high, xtol=1e-16)))
+    return None
+
+
+def _newton(series: list[mp.mpf], root: mp.mpf) -> mp.mpf:
+    for _ in range(MOST_ROUNDS):
+        value, slope = mp.polyval(series, root, derivative=True)
+        root -= value / slope
+        if abs(value / slope) < mp.mpf(10) ** -(DIGITS - 20):
+            return root
+    raise AssertionError(f"no root near {root}")
