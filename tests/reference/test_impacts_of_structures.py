@@ -11,9 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 import mpmath as mp
-import numpy as np
 import pytest
-from support.exact_impacts import DIGITS, ExactBody, ExactImpact, ExactMotion, ExactSine, ExactStop, diagonal
+from support.exact_impacts import ExactBody, ExactImpact, ExactMotion, ExactSine, ExactStop, diagonal
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.scene import Scene
@@ -47,8 +46,11 @@ def forces(sines: Sequence[Sine], where: int, size: int) -> list[ExactSine]:
 def force_tables(sines: Sequence[Sine], **place: str) -> list[dict[str, Any]]:
     return [
         place
-        | ({"amplitude": amplitude, "angular_frequency": frequency, "phase": phase} if frequency else
-           {"signal": "constant", "amplitude": amplitude})
+        | (
+            {"amplitude": amplitude, "angular_frequency": frequency, "phase": phase}
+            if frequency
+            else {"signal": "constant", "amplitude": amplitude}
+        )
         for amplitude, frequency, phase in sines
     ]
 
@@ -116,7 +118,9 @@ def test_an_impact_pair_of_free_or_sprung_masses(stiffness: float, law: dict[str
     masses, own, link = [1.0, 0.4], [stiffness, 0.5 * stiffness], 1.5
     springs = [[own[0] + link, -link], [-link, own[1] + link]]
     sines = [(0.4, 1.3, 0.0), (0.2, 0.7, 2.0)]
-    body = ExactBody(diagonal(masses), diagonal([0.0] * 2), springs, forces(sines, 0, 2), [0.0] * 2, [0.0, -0.3])
+    body = ExactBody(
+        diagonal(masses), diagonal([0.0] * 2), springs, forces(sines, 0, 2), [0.0] * 2, [0.0, -0.3]
+    )
     bodies = [
         {"name": name, "mass": m, "stiffness": k, "velocity_start": v}
         for name, m, k, v in zip("ab", masses, own, (0.0, -0.3), strict=True)

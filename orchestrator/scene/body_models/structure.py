@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.scene.body_models.points import (
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import DAMPING, Finite, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import DAMPING, Finite, SceneTable, Stop, StopTable
 from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
@@ -275,10 +275,12 @@ class StructureBody(BodyTable):
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
         """Return the number of modes and of further observed points, and whether the damping couples the modes.
 
-        A motion that grows ends where it can meet no stop any more, since nothing else acts on the bodies of a scene.
+        A motion that grows ends where it can meet no stop any more, if the stops stand still: nothing else acts on the
+        bodies of a scene.
         """
+        still = not any(isinstance(stop, StopTable) and stop.moves for stop in stops)
         further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
-        return {"modes": self.size, "coupled": self.is_coupled, "ends_unbounded": True, **further}
+        return {"modes": self.size, "coupled": self.is_coupled, "ends_unbounded": still, **further}
 
 
 class BodyAlone(StructureBody):

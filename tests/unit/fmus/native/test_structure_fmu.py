@@ -527,7 +527,7 @@ def test_an_export_of_fmi_2_ends_the_simulation_in_its_way(tmp_path: Path) -> No
         structure=structure_file({name: np.array(value) for name, value in FALLING.items()}, coupled=False),
     )
     with ComponentFmu(table, version="2.0") as fmu:
-        with pytest.raises(FMICallException, match="fmi2DoStep|discard|2"):
+        with pytest.raises(FMICallException, match="fmi2DoStep"):
             fmu.step(10.0)
         assert "displacement_limit, 50 m" in fmu.messages[-1]
 

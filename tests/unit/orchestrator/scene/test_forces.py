@@ -240,7 +240,7 @@ def test_a_force_at_all_points_is_a_force_on_each_mass() -> None:
     assert whole == pytest.approx([sum(numbers[f"mode.sine[{k},{i}]"] for k in (1, 2, 3)) for i in (1, 2, 3)])
     one = scene(body=bodies, stop=[], forcing=SINE | {"at": "all"})
     assert [float_parameters(one, None)[f"mode.force[{i}]"] for i in (1, 2, 3)] == whole
-    with pytest.raises(SceneError, match='forcing.at: expected "all" for oscillators and chains'):
+    with pytest.raises(SceneError, match=r'forcing\.at: expected "all" for oscillators and chains'):
         scene(body=[*bodies, BEAM | {"name": "c"}], stop=[], forcing=SINE | {"at": "all"})
 
 
