@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import ALONE, keys_left_out
-from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole
+from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole, start_shift
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 Span = tuple[float, float]
@@ -114,6 +114,7 @@ class _Limit(NamedTuple):
     is_rigid: bool
     span: Span
     moves: bool = False
+    shift: float | None = 0.0
 
 
 class _Points:
@@ -209,6 +210,7 @@ class _Points:
                     LAWS[stop.law].is_rigid,
                     span,
                     stop.moves,
+                    start_shift(draft, number - 1),
                 )
         for number, contact in enumerate(draft.meetings, start=1):
             span = draft.span(f"contact[{number}].clearance")
@@ -263,11 +265,12 @@ def _hidden(one: _Limit, other: _Limit) -> Iterator[Problem]:
 def _start_is_on_the_free_side(draft: Draft, points: _Points) -> Iterator[Problem]:
     for limit in points.limits():
         spans = [points.start(point) for point in limit.points]
-        if not limit.is_rigid or limit.moves or any(span is None for span in spans):
+        if not limit.is_rigid or limit.shift is None or any(span is None for span in spans):
             continue
         known = [span for span in spans if span is not None]
         low, high = known[0] if len(known) == 1 else (known[0][0] - known[1][1], known[0][1] - known[1][0])
         bound, start = (limit.span[0], high) if limit.is_upper else (limit.span[1], low)
+        bound += limit.shift
         if start > bound if limit.is_upper else start < bound:
             relation = "<=" if limit.is_upper else ">="
             expected = f"a start on the free side (displacement {relation} {quoted(bound)})"
