@@ -7,23 +7,58 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PPoly
 
 from vibroimpact.analysis.dataset.clock import CLOCK_PERIODS
 from vibroimpact.analysis.dataset.schema import scene_of
 
+Floats = NDArray[np.float64]
+_MOTION = (
+    "velocity",
+    "motion_amplitude",
+    "motion_angular_frequency",
+    "motion_phase",
+    "motion_times",
+    "motion_values",
+)
 _ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
 
 
 class ShownStop(NamedTuple):
-    """A stop or contact of a scene: position (m), side (+1 upper, -1 lower), and the points that it limits."""
+    """A stop or contact of a scene: position (m), side (+1 upper, -1 lower), the points that it limits, its motion."""
 
     position: float
     side: float
     point: float | str | tuple[str, ...] | None
+    motion: Mapping[str, Any] = {}
+
+    def course(self, time: Floats) -> tuple[Floats, Floats]:
+        """Return position (m) and velocity (m/s) of the stop at instants (s)."""
+        speed, amplitude, w, phase = (
+            float(self.motion.get(key, 0.0))
+            for key in ("velocity", "motion_amplitude", "motion_angular_frequency", "motion_phase")
+        )
+        angle = w * time + phase
+        place = self.position + speed * time + amplitude * np.cos(angle)
+        rate = speed - amplitude * w * np.sin(angle)
+        if "motion_times" in self.motion:
+            spline = _spline(self.motion["motion_times"], self.motion["motion_values"])
+            place, rate = place + spline(time), rate + spline(time, 1)
+        return place, rate
+
+
+def _spline(times: Sequence[float], values: Sequence[float]) -> PPoly:
+    """Return the natural cubic spline, which goes on in straight lines before its first and after its last instant."""
+    inner = CubicSpline(times, values, bc_type="natural")
+    first, last = inner(times[0], 1), inner(times[-1], 1)
+    before, after = [0.0, 0.0, first, values[0] - first], [0.0, 0.0, last, values[-1]]
+    return PPoly(np.column_stack([before, inner.c, after]), [times[0] - 1.0, *times, times[-1] + 1.0])
 
 
 def table(scene: dict[str, Any], name: str) -> dict[str, Any]:
@@ -44,9 +79,11 @@ def column_of(key: str, names: Sequence[str]) -> str | None:
 
 
 def stops(dataset: xr.Dataset) -> list[ShownStop]:
-    """Return the stops of the scene, then the contacts of its bodies; empty if positions were swept or are unknown."""
+    """Return the stops of the scene, then the contacts of its bodies; empty if places were swept or are unknown."""
     scene = scene_of(dataset.attrs)
     places = (".position", ".side", ".location", ".mass", ".clearance")
+    if any(key.startswith("stop") and key.endswith(_MOTION) for key in swept_keys(scene)):
+        return []
     if any(key.endswith(places) for key in swept_keys(scene)):
         return []
     contacts = scene.get("contact", []) if "body" in scene else []
@@ -66,7 +103,10 @@ def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
         point = written.get("mass", len(body["masses"]))
     elif body.get("kind") == "beam":
         point = written.get("location", 1.0)
-    return ShownStop(float(written["position"]), -1.0 if written.get("side") == "lower" else 1.0, point)
+    side = -1.0 if written.get("side") == "lower" else 1.0
+    return ShownStop(
+        float(written["position"]), side, point, {key: written[key] for key in _MOTION if key in written}
+    )
 
 
 def contact_label(dataset: xr.Dataset, number: int) -> str:
@@ -102,18 +142,23 @@ def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
     return [stop for stop in found if stop.point == observed]
 
 
-def limits(dataset: xr.Dataset, name: str) -> list[float]:
-    """Return the positions (m) of the stops that a sampled displacement may meet."""
+def limits(dataset: xr.Dataset, name: str) -> list[ShownStop]:
+    """Return the stops that a sampled displacement may meet."""
     if name == "displacement":
-        return [stop.position for stop in observed_stops(dataset)]
+        return observed_stops(dataset)
     element = _ELEMENT.fullmatch(name)
     if element is None:
         return []
     number, found = int(element[2]), stops(dataset)
     if element[1]:
-        return [stop.position for place, stop in enumerate(found, start=1) if place == number]
+        return [stop for place, stop in enumerate(found, start=1) if place == number]
     is_chain = table(scene_of(dataset.attrs), "body").get("kind") == "chain"
-    return [stop.position for stop in found if is_chain and stop.point == number]
+    return [stop for stop in found if is_chain and stop.point == number]
+
+
+def fixed_positions(stops: Sequence[ShownStop]) -> list[float]:
+    """Return the positions of the stops that stand still, m, each once, ascending."""
+    return sorted({stop.position for stop in stops if not stop.motion})
 
 
 def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:

@@ -33,7 +33,7 @@ from vibroimpact.analysis.figures.page import (
     title,
     unit_symbol,
 )
-from vibroimpact.analysis.figures.scene_text import contact_label, limits, swept_keys, table
+from vibroimpact.analysis.figures.scene_text import contact_label, fixed_positions, limits, swept_keys, table
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
@@ -84,7 +84,7 @@ def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
         axis.set_ylabel(f"{words.replace('displacement', 'velocity')} ({speed})")
         if len(lines) > 1:
             legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
-    for position in sorted({place for orbit in orbits for place in limits(dataset, orbit.name)}):
+    for position in fixed_positions([stop for orbit in orbits for stop in limits(dataset, orbit.name)]):
         axes[0].axvline(position, **STOP_LINE)
     return figure
 

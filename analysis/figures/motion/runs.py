@@ -31,13 +31,21 @@ from vibroimpact.analysis.figures.page import (
     legend_above,
     legend_outside,
 )
-from vibroimpact.analysis.figures.scene_text import ShownStop, contact_label, observed_stops, stops
+from vibroimpact.analysis.figures.scene_text import (
+    ShownStop,
+    contact_label,
+    fixed_positions,
+    observed_stops,
+    stops,
+)
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 
 #: Number of impacts above which their marks are small.
 _MOST_LARGE_MARKS = 100
+#: Instants at which the motion of a stop is drawn.
+_INSTANTS_OF_A_STOP = 1000
 
 
 def draw_run(dataset: xr.Dataset, view: View) -> Figure:
@@ -80,7 +88,10 @@ def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
         drawn(axis, rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
         size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8
         axis.plot(inside[:, columns[0]], inside[:, columns[1]], markersize=size, label=words_of_marks, **dots)
-    for position in sorted({stop.position for stop in observed_stops(dataset)}):
+    for moving in (stop for stop in observed_stops(dataset) if stop.motion):
+        instants = np.linspace(*np.clip(part, *samples["time"].values[[0, -1]]), _INSTANTS_OF_A_STOP)
+        above.plot(instants, moving.course(instants)[0], **STOP_LINE)
+    for position in fixed_positions(observed_stops(dataset)):
         above.axhline(position, **STOP_LINE)
         below.axvline(position, **STOP_LINE, label="stop")
     middle.sharex(above)
@@ -101,10 +112,13 @@ def _impact_points(dataset: xr.Dataset, run: int | None) -> Floats:
     if hits is None or hits.sizes["impact"] == 0 or int(hits["impact_contact"].max()) > len(known):
         return np.empty((0, 3))
     hits = hits.isel(impact=[known[contact - 1] in seen for contact in hits["impact_contact"].values])
-    place = np.array([(stop.position, stop.side) for stop in known])[hits["impact_contact"].values - 1]
-    return np.column_stack(
-        [hits["impact_time"].values, place[:, 0], place[:, 1] * hits["impact_velocity"].values]
-    )
+    time, contact = hits["impact_time"].values, hits["impact_contact"].values
+    place, velocity = np.empty_like(time), np.empty_like(time)
+    for number, stop in enumerate(known, start=1):
+        own = contact == number
+        place[own], of_stop = stop.course(time[own])
+        velocity[own] = stop.side * hits["impact_velocity"].values[own] + of_stop
+    return np.column_stack([time, place, velocity])
 
 
 def _with_impacts(samples: xr.Dataset, marks: Floats, part: tuple[float, float]) -> tuple[Floats, Floats]:
@@ -152,8 +166,8 @@ def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> No
     period = np.arange(1, run.sizes["period"] + 1)
     axis.plot(period, run["displacement_max"].values, "^", color=MARK, markersize=2.5, label="largest")
     axis.plot(period, run["displacement_min"].values, "v", color=LINE, markersize=2.5, label="smallest")
-    for stop in observed:
-        axis.axhline(stop.position, **STOP_LINE, label="stop")
+    for position in fixed_positions(observed):
+        axis.axhline(position, **STOP_LINE, label="stop")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("recorded forcing period (-)")
     axis.set_ylabel(label(run["final_displacement"].rename("displacement")))

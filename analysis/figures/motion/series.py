@@ -25,7 +25,7 @@ from vibroimpact.analysis.figures.page import (
     title,
     unit_symbol,
 )
-from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
+from vibroimpact.analysis.figures.scene_text import fixed_positions, forcing_rate, in_scene_order, limits
 from vibroimpact.analysis.figures.window import SHOWN_PERIODS, View, Window
 from vibroimpact.fmus.errors import DatasetError
 
@@ -76,7 +76,7 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, variables in zip(axes, panels.values(), strict=True):
         lines = _draw_lines(axis, samples["time"].values, variables)
-        _draw_stops(axis, dataset, variables)
+        _draw_stops(axis, dataset, samples["time"].values, variables)
         marks = _draw_instants(axis, kind, instants)
         peaks = _draw_peaks(axis, dataset, view.run, part, variables)
         # The legend of the marks appears once, above the first panel.
@@ -206,7 +206,7 @@ def _draw_lines(axis: Axes, time: Floats, variables: list[xr.DataArray]) -> list
     return lines
 
 
-def _draw_stops(axis: Axes, dataset: xr.Dataset, variables: list[xr.DataArray]) -> None:
+def _draw_stops(axis: Axes, dataset: xr.Dataset, time: Floats, variables: list[xr.DataArray]) -> None:
     """Draw the stops that displacements may meet; with several displacements, each in its colour.
 
     A stop farther away than the width of the motion would compress it, and is not drawn.
@@ -214,7 +214,13 @@ def _draw_stops(axis: Axes, dataset: xr.Dataset, variables: list[xr.DataArray]) 
     for place, variable in enumerate(variables):
         colour = COLOURS[place % len(COLOURS)] if len(variables) > 1 else STOP
         low, high = float(variable.min()), float(variable.max())
-        for position in limits(dataset, str(variable.name)):
+        found = limits(dataset, str(variable.name))
+        for stop in found:
+            if stop.motion:
+                axis.plot(
+                    time, stop.course(time)[0], color=colour, linestyle=(0, (5, 3)), linewidth=0.6, zorder=0
+                )
+        for position in fixed_positions(found):
             if low - (high - low) <= position <= high + (high - low):
                 axis.axhline(position, color=colour, linestyle=(0, (5, 3)), linewidth=0.6, zorder=0)
 

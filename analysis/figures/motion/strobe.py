@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
-from vibroimpact.analysis.figures.scene_text import observed_stops
+from vibroimpact.analysis.figures.scene_text import fixed_positions, observed_stops
 from vibroimpact.analysis.figures.sweep.diagrams import draw_diagram, one_value, varied
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
@@ -32,10 +32,10 @@ def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(75)
     axis = figure.subplots()
     draw_section(axis, chosen.isel(run=0))
-    for stop in observed_stops(dataset):
+    for position in fixed_positions(observed_stops(dataset)):
         low, high = axis.get_xlim()
-        if low <= stop.position <= high:
-            axis.axvline(stop.position, **STOP_LINE)
+        if low <= position <= high:
+            axis.axvline(position, **STOP_LINE)
     return figure
 
 

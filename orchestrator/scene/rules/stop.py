@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 
@@ -125,13 +126,19 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
             (_position(draft, index)[0], start[1]) if upper else (_position(draft, index)[1], start[0])
         )
         limit += shift
-        if displacement > limit if upper else displacement < limit:
+        if is_beyond(displacement, limit, shift, upper=upper):
             relation = "<=" if upper else ">="
             expected = (
                 f"a start on the free side of stop[{index + 1}] (displacement {relation} {quoted(limit)})"
             )
             got = f"{quoted(displacement)}{draft.worst('stop', 'body.displacement_start')}"
             yield Problem(key, expected, got, "Start on the stop or away from it, or move the stop.")
+
+
+def is_beyond(start: float, limit: float, shift: float, *, upper: bool) -> bool:
+    """Return whether a start is beyond a stop, by more than the rounding of the stop's motion."""
+    beyond = start - limit if upper else limit - start
+    return beyond > 4.0 * sys.float_info.epsilon * abs(shift)
 
 
 def start_shift(draft: Draft, index: int) -> float | None:
@@ -144,7 +151,8 @@ def start_shift(draft: Draft, index: int) -> float | None:
     if stop.motion_times is not None or any(low != high for low, high in spans):
         return None
     (amplitude, _), (phase, _) = spans
-    return amplitude * math.cos(phase)
+    shift = amplitude * math.cos(phase)
+    return shift if abs(shift) > sys.float_info.epsilon * abs(amplitude) else 0.0
 
 
 def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:

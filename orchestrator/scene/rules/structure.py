@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import ALONE, keys_left_out
-from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole, start_shift
+from vibroimpact.orchestrator.scene.rules.stop import is_beyond, motions_are_whole, start_shift
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 Span = tuple[float, float]
@@ -271,7 +271,7 @@ def _start_is_on_the_free_side(draft: Draft, points: _Points) -> Iterator[Proble
         low, high = known[0] if len(known) == 1 else (known[0][0] - known[1][1], known[0][1] - known[1][0])
         bound, start = (limit.span[0], high) if limit.is_upper else (limit.span[1], low)
         bound += limit.shift
-        if start > bound if limit.is_upper else start < bound:
+        if is_beyond(start, bound, limit.shift, upper=limit.is_upper):
             relation = "<=" if limit.is_upper else ">="
             expected = f"a start on the free side (displacement {relation} {quoted(bound)})"
             got = f"{quoted(start)}{draft.worst('stop', 'contact', 'body')}"

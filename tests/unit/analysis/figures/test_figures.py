@@ -18,7 +18,7 @@ import vibroimpact as vi
 from vibroimpact.analysis import figures, open_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.derived import largest_impact_velocity
-from vibroimpact.analysis.figures.scene_text import limits
+from vibroimpact.analysis.figures.scene_text import fixed_positions, limits
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.running import run_scene
 
@@ -397,7 +397,21 @@ def test_a_stop_at_another_point_than_the_observed_one_is_not_drawn_as_its_limit
         (chain.format(1), []),
     ):
         dataset = dataset_of([record(1.0)], coordinates={}, attrs={"scene": text})
-        assert limits(dataset, "displacement") == shown
+        assert fixed_positions(limits(dataset, "displacement")) == shown
+
+
+def test_a_stop_that_moves_is_drawn_on_its_way() -> None:
+    motion = "velocity = 0.5\nmotion_amplitude = 0.1\nmotion_angular_frequency = 2.0\nmotion_phase = 0.3\n"
+    table = "motion_times = [0.0, 1.0, 2.0]\nmotion_values = [0.0, 1.0, 0.0]\n"
+    text = f"[body]\nmass = 1.0\n[[stop]]\nposition = 1.0\n{motion}{table}"
+    dataset = dataset_of([record(1.0)], coordinates={}, attrs={"scene": text})
+    (stop,) = limits(dataset, "displacement")
+    assert fixed_positions([stop]) == []
+    place, velocity = stop.course(np.array([1.0, 3.0]))
+    angle = np.array([2.3, 6.3])
+    # the spline has no slope in the middle, and -1.5 from its end on
+    assert place == pytest.approx(1.0 + np.array([0.5 + 1.0, 1.5 - 1.5]) + 0.1 * np.cos(angle), abs=1e-12)
+    assert velocity == pytest.approx(0.5 - 0.2 * np.sin(angle) + np.array([0.0, -1.5]), abs=1e-12)
 
 
 def test_a_logarithmic_sweep_has_a_logarithmic_axis_in_diagrams_and_maps() -> None:
