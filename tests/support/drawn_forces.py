@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +59,10 @@ def _lone_body(random: np.random.Generator) -> Tables:
     body: Tables = {"mass": number(random, 0.1, 3.0), "stiffness": stiffness}
     body["damping"] = pick(random, 0.0, 0.05) if stiffness else 0.0
     if count > 1:
-        springs = {"stiffnesses": numbers(random, 0.1, 5.0, count), "dampings": [pick(random, 0.0, 0.05)] * count}
+        springs = {
+            "stiffnesses": numbers(random, 0.1, 5.0, count),
+            "dampings": [pick(random, 0.0, 0.05)] * count,
+        }
         body = {"kind": "chain", "masses": numbers(random, 0.1, 2.0, count)} | springs
     stops = [
         {"side": side, "position": sign * number(random, 0.02, 0.5)} | law_of(random)
@@ -188,7 +190,9 @@ def _move(random: np.random.Generator, stop: Tables, used: Sequence[float]) -> N
 def _duration(random: np.random.Generator, tables: Tables) -> Tables:
     """Return the keys of a duration: in periods of a clock, if a force or a stop has a sine."""
     clocks = [force["angular_frequency"] for force in tables["forcing"] if force["signal"] == "sine"]
-    clocks += [stop["motion_angular_frequency"] for stop in tables.get("stop", []) if stop.get("motion_amplitude")]
+    clocks += [
+        stop["motion_angular_frequency"] for stop in tables.get("stop", []) if stop.get("motion_amplitude")
+    ]
     if not clocks:
         return {"transient_time": pick(random, 0.0, 1.3), "recorded_time": LENGTH}
     periods = max(1, round(LENGTH * clocks[0] / (2.0 * math.pi) / 2.0))

@@ -101,9 +101,7 @@ class _Flow:
         rates = np.linalg.eigvals(np.array([[float(a) for a in row] for row in matrix]))
         self.step = mp.mpf(STEP / max(1e-3, float(np.abs(rates).max())))
         size = len(matrix)
-        columns = [
-            self.moved([mp.mpf(i == j) for i in range(size)], self.step) for j in range(size)
-        ]
+        columns = [self.moved([mp.mpf(i == j) for i in range(size)], self.step) for j in range(size)]
         self._over = [list(row) for row in zip(*columns, strict=True)]
 
     def series(self, z: Row, time: mp.mpf) -> list[Row]:
@@ -181,7 +179,9 @@ class ExactMotion:
             for k in self._pressed:
                 force = self._force(k)
                 for i, kick in enumerate(self._kick(k)):
-                    matrix[self._n + i] = [a + kick * b for a, b in zip(matrix[self._n + i], force, strict=True)]
+                    matrix[self._n + i] = [
+                        a + kick * b for a, b in zip(matrix[self._n + i], force, strict=True)
+                    ]
             self._flows[self._pressed] = _Flow(matrix)
         return self._flows[self._pressed]
 
@@ -208,7 +208,8 @@ class ExactMotion:
     def _watched(self) -> list[tuple[int, Row]]:
         """Return the rows whose rise through 0 is an event: gaps, and forces that end, with the sign changed."""
         return [
-            (k, [-a for a in self._force(k)] if k in self._pressed else gap) for k, gap in enumerate(self._gaps)
+            (k, [-a for a in self._force(k)] if k in self._pressed else gap)
+            for k, gap in enumerate(self._gaps)
         ]
 
     def _first_rise(self, row: Row, time: mp.mpf, after: Row) -> mp.mpf | None:
