@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.scene import Scene
 
 ROUNDING = 1e-15
 """Change of the start that stands for the rounding of a run."""
-PARTED, EVENTS, FACTOR = 1e-9, 40, 20.0
+PARTED, EVENTS, FACTOR = 1e-9, 14, 20.0
 """Difference from which on chaos has parted two motions; most events; factor on what the change of the start makes."""
 CLOSED, SUM = 1e-11, 1e-12
 """Largest relative error against a closed form of a cavity, and of the sum of motions in the millionth period."""
@@ -101,8 +101,12 @@ def assert_events(body: ExactBody, stops: Sequence[ExactStop], tables: dict[str,
 def test_two_masses_of_one_chain_that_hit_each_other(sines: list[Sine]) -> None:
     masses, springs, dashpots = [1.0, 0.5, 0.7], [1.0, 0.8, 0.5], [0.03, 0.01, 0.02]
     body = ExactBody(
-        *(diagonal(masses), chain_matrix(dashpots), chain_matrix(springs)),
-        *(forces(sines, 0, 3), [0.0] * 3, [0.0] * 3),
+        diagonal(masses),
+        chain_matrix(dashpots),
+        chain_matrix(springs),
+        forces(sines, 0, 3),
+        [0.0] * 3,
+        [0.0] * 3,
     )
     stops = [ExactStop([1, -1, 0], 0.05, 0.7), ExactStop([0, -1, 1], 0.1, 0.6)]
     contacts = [
@@ -113,11 +117,12 @@ def test_two_masses_of_one_chain_that_hit_each_other(sines: list[Sine]) -> None:
     record = {"recorded_periods": 8}
     forcing = force_tables(sines, at="chain.1")
     tables = {"body": [chain], "contact": contacts, "forcing": forcing, "record": record}
-    assert_events(body, stops, tables, 15)
+    assert_events(body, stops, tables, 10)
 
 
-@pytest.mark.parametrize("stiffness", [0.0, 2.0])
-@pytest.mark.parametrize("law", [{"restitution": 0.8}, {"stiffness": 300.0, "damping": 0.5}])
+@pytest.mark.parametrize(
+    ("stiffness", "law"), [(0.0, {"restitution": 0.8}), (2.0, {"stiffness": 300.0, "damping": 0.5})]
+)
 def test_an_impact_pair_of_free_or_sprung_masses(stiffness: float, law: dict[str, float]) -> None:
     """Two free masses that a spring joins, or each with its own, hit each other on one side."""
     masses, own, link = [1.0, 0.4], [stiffness, 0.5 * stiffness], 1.5
@@ -142,8 +147,12 @@ def test_an_impact_pair_of_free_or_sprung_masses(stiffness: float, law: dict[str
 def test_a_ball_in_the_cavity_of_an_oscillator_under_two_sines() -> None:
     sines = [(0.3, 1.05, 0.0), (0.1, 1.05 * GOLDEN, 0.4)]
     body = ExactBody(
-        *(diagonal([1.0, 0.1]), diagonal([0.04, 0.0]), diagonal([1.0, 0.0])),
-        *(forces(sines, 0, 2), [0.0, 0.0], [0.0, 0.2]),
+        diagonal([1.0, 0.1]),
+        diagonal([0.04, 0.0]),
+        diagonal([1.0, 0.0]),
+        forces(sines, 0, 2),
+        [0.0] * 2,
+        [0.0, 0.2],
     )
     stops = [ExactStop([1, -1], 0.3, 0.6), ExactStop([-1, 1], 0.3, 0.6)]
     tables = {
@@ -157,7 +166,7 @@ def test_a_ball_in_the_cavity_of_an_oscillator_under_two_sines() -> None:
         ],
         **{"forcing": force_tables(sines, at="frame"), "record": {"recorded_periods": 10}},
     }
-    assert_events(body, stops, tables, 12)
+    assert_events(body, stops, tables, 10)
 
 
 def test_a_ball_under_its_weight_on_a_shaken_table_that_rises() -> None:
@@ -186,8 +195,8 @@ def test_a_ball_that_meets_both_ends_of_its_cavity_in_turn_has_a_closed_form(
 ) -> None:
     """Two impacts a period at equal distance h = pi / w, in the cavity of an undamped frame with mass and stiffness 1.
 
-    The ball flies with the speed u, which its impacts turn: the frame gains 2 mu u, mu = mass. After an impact at t0 the
-    frame moves by A cos(w t) + mu u (sin s - tan(h / 2) cos s) with s = t - t0. Here A = force / (1 - w^2), and
+    The ball flies with the speed u, which its impacts turn: the frame gains 2 mu u, mu = mass. After an impact at t0
+    the frame moves by A cos(w t) + mu u (sin s - tan(h / 2) cos s) with s = t - t0. Here A = force / (1 - w^2), and
     x(t + h) = -x(t). The ball crosses the room d to either side: u h = 2 x(t0) + 2 d. Restitution of the relative speed
     gives the other of two equations:
 
