@@ -22,7 +22,7 @@ AGREEMENT = {"fused": 1e-5, "coupled": 1e-3}
 stop of another FMU, a cut also changes the steps of a contact."""
 ROOM = 1e-12
 """Time from a border within which an event counts as on it, s: `body/landing.c` for coupled runs, else rounding."""
-EARLIEST = 1e-6
+EARLIEST = 1e-3
 """Earliest cut, s: a touch without speed at the start is a row where its contact goes on at the cut."""
 MOST_EVENTS = 40
 """Number of events of a run beyond which chaos may have multiplied rounding by any factor."""

@@ -171,7 +171,7 @@ def _noise(random: np.random.Generator) -> Tables:
     band = [low, low + number(random, 1.0, 20.0)]
     density = {"density": [[band[0], 0.1], [band[1], number(random, 0.1, 1.0)]]}
     noise: Tables = {"seed": int(random.integers(1000))}
-    return noise | pick(random, {"band": band}, density)
+    return noise | dict(pick(random, {"band": band}, density))
 
 
 def _move(random: np.random.Generator, stop: Tables, used: Sequence[float]) -> None:
