@@ -17,10 +17,9 @@ def refuse_quasi_periodic(attrs: Mapping[Any, Any], study: str) -> None:
     Examples
     --------
     >>> refuse_quasi_periodic({"clock_periods": 2}, "classify")
-    >>> refuse_quasi_periodic({"clock_periods": 0}, "classify")
+    >>> refuse_quasi_periodic({"clock_periods": 0}, "classify")  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
-    vibroimpact.fmus.errors.DatasetError: classify: expected forces with a common period, got forces without one. Their \
-motion does not repeat.
+    vibroimpact.fmus.errors.DatasetError: classify: expected forces with a common period, got forces without one.
     """
     if attrs.get(CLOCK_PERIODS, 1) == 0:
         raise DatasetError(

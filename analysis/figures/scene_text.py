@@ -140,7 +140,8 @@ def _first_sine(scene: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return the key and the table of the first sine of a scene; an empty table where it has none."""
     forces = scene.get("forcing")
     if not isinstance(forces, list):
-        return "forcing", table(scene, "forcing")
+        forcing = table(scene, "forcing")
+        return "forcing", forcing if forcing.get("signal", "sine") == "sine" else {}
     for number, force in enumerate(forces, start=1):
         if force.get("signal", "sine") == "sine":
             return f"forcing[{number}]", force

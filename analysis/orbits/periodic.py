@@ -9,11 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.trigonometric import TURN, SumOfSines
+from vibroimpact.analysis.orbits.trigonometric import SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
+TURN = 2.0 * np.pi
 MOST_STEPS = 60
 """Number of Newton steps after which the search for an orbit fails."""
 MOST_HALVINGS = 12
@@ -181,7 +182,8 @@ def least_speed(body: ImpactingBody) -> float:
 
     Impulses on a body without a spring balance each other. A single impact then has the speed of rounding.
     """
-    return TOUCHES * body.scale * body.angular_frequency if body.loose else 0.0
+    fastest = max(body.harmonics) * body.angular_frequency
+    return TOUCHES * body.scale * fastest if body.loose else 0.0
 
 
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:

@@ -72,6 +72,8 @@ class SumOfSines:
             monotonic = np.abs(slope) > half * bend + steep
             found += self._crossings(place[maybe & monotonic], parts)
             place = place[maybe & ~monotonic]
+            if not place.size:
+                return sorted(found)
             if 0.5 * half**2 * bend <= rounding:
                 break
             place = np.concatenate([2.0 * place, 2.0 * place + 1.0])
@@ -88,6 +90,8 @@ class SumOfSines:
         rising = self.at(low)[0] < 0.0
         # the end of the turn has the value of its start, so that a zero between two parts counts once
         crosses = rising != (self.at(np.mod(place + 1.0, parts) * (TURN / parts))[0] < 0.0)
+        if not crosses.any():
+            return []
         low, high, rising = low[crosses], high[crosses], rising[crosses]
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)

@@ -175,7 +175,7 @@ def sines_of(names: Iterable[str]) -> list[int]:
 
 
 def without_arrays(numbers: Numbers) -> tuple[dict[str, float], dict[str, Floats]]:
-    """Return the parameters that are variables of their own, and the arrays `mode.NAME` of the others.
+    """Return the parameters that are variables of their own, and the arrays `mode.NAME`, `table.NAME` of the others.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def without_arrays(numbers: Numbers) -> tuple[dict[str, float], dict[str, Floats
     >>> single, arrays["mode.force"].tolist()
     ({'forcing.phase': 0.5}, [1.0, 2.0])
     """
-    single = {name: value for name, value in numbers.items() if not name.startswith("mode.")}
+    single = {name: value for name, value in numbers.items() if not name.startswith(("mode.", "table."))}
     elements: dict[str, dict[tuple[int, ...], float]] = {}
     for name, value in numbers.items():
         if name not in single:

@@ -15,8 +15,8 @@ from vibroimpact.fmus.errors import VibroimpactError
 
 OF_THE_RUN = (
     *("forcing.", "contact_tolerance", "force", "displacement_start", "velocity_start", "modal_"),
-    "displacement_limit",
-    *("mode.displacement_start", "mode.velocity_start", "mode.sine", "sine["),
+    *("displacement_limit", "mode.displacement_start", "mode.velocity_start"),
+    *("mode.sine", "sine[", "mode.signal", "signal[", "table."),
 )
 """Prefixes of parameter names that do not change the modes."""
 OF_A_STOP = (".position", ".restitution", ".yield_velocity")

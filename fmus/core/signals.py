@@ -83,8 +83,8 @@ class Signal:
     seed : int
         Seed of a random signal, 0 to 2^64 - 1.
     places, values : array_like, shape (row,)
-        Instants of a table, s after `start`, and values there. For a random signal angular frequencies, rad/s, and its
-        one-sided density, s/rad; without them the density is the same in all the band, with variance 1.
+        Instants of a table, s after `start`, and values there. Of a random signal: angular frequencies, rad/s, and its
+        one-sided density, s/rad. Without them the density is the same in all the band, with variance 1.
 
     Raises
     ------

@@ -216,7 +216,7 @@ def sizes(component: ComponentDescription) -> dict[str, int]:
     modes = blocks.get("mode", blocks.get("mass"))
     largest = {"VI_MODES": modes or 0, "VI_PORTS": blocks.get("contact", 0)}
     arrays = {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
-    # the constants remove loops over modes from a body with only one, further loads and moving stops from bodies without
+    # the constants remove loops over modes from a body with only one, and loads and motions from bodies without
     constants = {f"VI_{block.upper()}S": blocks.get(block, 0) for block in ("sine", "signal")}
     constants["VI_ONLY_MODES"] = 0 if modes is not None else 1
     constants["VI_GROWING"] = int(component.growing)

@@ -18,6 +18,7 @@ from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase
 from vibroimpact.orchestrator.hard_cases.finding import CASES as FINDING
+from vibroimpact.orchestrator.hard_cases.growing import CASES as GROWING
 from vibroimpact.orchestrator.hard_cases.impacts import CASES as IMPACTS
 from vibroimpact.orchestrator.hard_cases.limits import CASES as LIMITS
 from vibroimpact.orchestrator.hard_cases.places import CASES as PLACES
@@ -28,7 +29,7 @@ from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
 
 CASES: tuple[HardCase, ...] = (
     *(*FINDING, *IMPACTS, *PLACES, *RESTS),
-    *(*YIELDING, *SEVERAL, *SCALES, *LIMITS),
+    *(*YIELDING, *SEVERAL, *GROWING, *SCALES, *LIMITS),
 )
 """In the order of docs/hard_cases.md."""
 _ONLY = Argument("only")

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
-from vibroimpact.analysis.dataset.columns import RunColumns, joined
+from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.analysis.orbits.basins import Ends, Floats
 from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.forces import phases_of_new_start
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
@@ -42,8 +42,38 @@ class _Closing(Exception):
     """Ends a thread whose work is no longer needed."""
 
 
+class _OneByOne:
+    """Runs states of a scene one by one, for bodies that neither lanes nor the loop in C can follow."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._runners: dict[tuple[int, int], PointRunner] = {}
+
+    def close(self) -> None:
+        """Close the runners."""
+        for runner in self._runners.values():
+            runner.close()
+
+    def _runner(self, periods: tuple[int, int]) -> PointRunner:
+        """Return the runner that records some periods after a transient."""
+        if periods not in self._runners:
+            record = dict(zip(("record.transient_periods", "record.recorded_periods"), periods, strict=True))
+            self._runners[periods] = PointRunner(self._scene.with_values(record), execution="fused")
+        return self._runners[periods]
+
+    def run(self, state: Floats, periods: tuple[int, int], *, first: bool) -> RunRecord:
+        """Return the record of a run from a state, at time 0 (first) or where the phase of the clock is 0."""
+        try:
+            return self._runner(periods).run({}, tuple(state.tolist()), at_time_0=first)
+        except ComponentError as problem:
+            return empty_record(self._scene, Outcome.error, str(problem), 0.0)
+
+
 class BodyFlow:
-    """Follows many states of a scene's body in lanes, or by the loop in C, on one thread per processor."""
+    """Follows many states of a scene's body in lanes, or by the loop in C, on one thread per processor.
+
+    Bodies that neither can follow, such as several with moving stops, run one by one.
+    """
 
     def __init__(self, scene: Scene, workers: int | None = None) -> None:
         self.scene = scene
@@ -53,17 +83,21 @@ class BodyFlow:
         count = self._pool._max_workers
         self._closing = False
         self._runners: list[PointRunner] = []
+        self._alone: list[_OneByOne] = []
         self._bare = [self._loop(bare) for _ in range(count)]
         self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = scene.body.start_names
 
-    def _loop(self, record: dict[str, Any]) -> PointLoop:
+    def _loop(self, record: dict[str, Any]) -> PointLoop | _OneByOne:
         limits = {"execution.how": "auto", "execution.deadline": DEADLINE}
         scene = self.scene.with_values({"record": record, **limits})
         by_lanes = self.scene.execution.how == "auto" and may_go_by_lanes(scene)
         self._runners.append(PointRunner(scene, execution="lanes" if by_lanes else "fused"))
         loop = self._runners[-1].loop
+        if loop is None and not scene.is_measured:
+            self._alone.append(_OneByOne(scene))
+            return self._alone[-1]
         if loop is None:
             raise UsageError(
                 f"{self.scene.source}: basins: expected a body without a measuring chain, got one with it."
@@ -76,6 +110,8 @@ class BodyFlow:
         self._pool.shutdown(cancel_futures=True)
         for runner in self._runners:
             runner.close()
+        for alone in self._alone:
+            alone.close()
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
         """Return the states after some forcing periods: see `analysis.orbits.basins.Flow`."""
@@ -111,7 +147,7 @@ class BodyFlow:
         return block_features(owner, np.zeros_like(owner), impacts, shape, periods)[:, 0]
 
     def _run(
-        self, loops: Sequence[PointLoop], states: Floats, periods: tuple[int, int], *, first: bool
+        self, loops: Sequence[PointLoop | _OneByOne], states: Floats, periods: tuple[int, int], *, first: bool
     ) -> list[RunColumns]:
         parts = [part for part in np.array_split(states, len(loops)) if len(part)]
         jobs = [
@@ -120,7 +156,12 @@ class BodyFlow:
         ]
         return [job.result() for job in jobs]
 
-    def _run_part(self, loop: PointLoop, states: Floats, periods: tuple[int, int], first: bool) -> RunColumns:
+    def _run_part(
+        self, loop: PointLoop | _OneByOne, states: Floats, periods: tuple[int, int], first: bool
+    ) -> RunColumns:
+        if isinstance(loop, _OneByOne):
+            return columns_of([self._run_alone(loop, state, periods, first=first) for state in states])
+
         def refused(place: int, _: object) -> tuple[RunRecord, None]:
             return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
 
@@ -137,6 +178,13 @@ class BodyFlow:
                 done.append(run_loop(loop, points, None, over, refused)[0])
             states = states[len(done[-1]) :]
         return joined(done)
+
+    def _run_alone(
+        self, loop: _OneByOne, state: Floats, periods: tuple[int, int], *, first: bool
+    ) -> RunRecord:
+        if self._closing:
+            raise _Closing
+        return loop.run(state, periods, first=first)
 
     def _prepared(
         self, loop: PointLoop, states: Floats, periods: tuple[int, int], *, first: bool

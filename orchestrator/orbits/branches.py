@@ -32,7 +32,7 @@ from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.forcing_clock import is_frequency, sines_of
+from vibroimpact.orchestrator.scene.forcing_clock import is_frequency, sines_of, sines_of_stops
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
 HISTORY = "periodic orbits followed by vibroimpact"
@@ -332,7 +332,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
         return kept[value]
 
     impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
-    if len(sines_of(scene.forces)) > 1 and is_frequency(parameter):
+    if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
             "got the frequency of one of them."

@@ -208,7 +208,7 @@ def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) ->
         near = recorded_orbit(body, impacts[int(runs["run_id"].values[place])])
         return orbit_energies(near.orbit), near.distance
     except (OrbitError, UsageError) as problem:
-        return str(problem).removeprefix("orbit: "), np.nan
+        return str(problem).removeprefix("orbit: ").removeprefix("energies: ").rstrip("."), np.nan
 
 
 def _of_one(found: OrbitEnergies, distance: float, attrs: Mapping[str, Any], units: UnitSystem) -> xr.Dataset:

@@ -85,6 +85,9 @@ def force_floats(scene: Scene, *, begins_anew: bool = True) -> dict[str, float]:
             f"sine[{number}].phase": phase - turned * frequency,
             **_row("mode.sine", f"{number},", body.load(force)),
         }
+    for number, stop in enumerate(scene.stops, start=1):
+        if isinstance(stop, StopTable) and stop.moves:
+            found[f"stop[{number}].phase"] = stop.motion_phase - turned * stop.motion_angular_frequency
     return found | _signal_floats(scene, body) | _table_floats(scene)
 
 
@@ -116,7 +119,7 @@ def _table_floats(scene: Scene) -> dict[str, float]:
 
 def phases_of_new_start(scene: Scene) -> dict[str, float]:
     """Return the phases of the sines, by variable name, where time 0 is where the phase of the clock is 0."""
-    if not scene.has_several_forces:
+    if not scene.lists_forces:
         return {"forcing.phase": 0.0}
     floats = force_floats(scene, begins_anew=False)
     return {name: value for name, value in floats.items() if name.endswith(".phase")}

@@ -180,8 +180,8 @@ class BodyDriver(RecordedBody):
         step to a sample; the default is every step. `outputs` are variables of the body, read at each sample. With
         `recording` the body records as set by `record`; without it, it records nothing from the first call on.
 
-        ImpactLimitReached, UnboundedMotion, DeadlineReached: the run ends early; the error has its samples. ComponentError: the body
-        fails, or touches the exciter.
+        ImpactLimitReached, UnboundedMotion, DeadlineReached: the run ends early; the error has its samples.
+        ComponentError: the body fails, or touches the exciter.
         """
         if recording:
             self._held = None  # the next block without a record switches the record off

@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.scene.body_models.growing import GROWING_KEYS
 from vibroimpact.orchestrator.scene.forcing_clock import signals_of
 from vibroimpact.orchestrator.scene.forcing_models import Forcing, forces_in_words
 from vibroimpact.orchestrator.scene.keys import MODES
-from vibroimpact.orchestrator.scene.models import AMPLITUDE
+from vibroimpact.orchestrator.scene.models import AMPLITUDE, StopTable
 from vibroimpact.orchestrator.scene.scene import Scene
 
 MOST_SENSORS = 4
@@ -49,11 +49,12 @@ LIMITS = {
     "body": Limit(
         lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
     ),
+    "drift": Limit(orbits="stops that stand still or move as sines, which orbits are periodic with"),
     "forcing": Limit(orbits="a harmonic force, which orbits are periodic with"),
-    "forces": Limit(),
+    "signals": Limit(orbits="sines and constant forces, which orbits are periodic with"),
     "quasi-periodic": Limit(orbits="sines with a common period, which orbits are periodic with"),
     "stop": Limit(orbits="a restitution stop"),
-    "motion": Limit(lanes=True, orbits="stops that stand still"),
+    "motion": Limit(lanes=True),
     "law": Limit(orbits='"restitution": impacts without duration'),
     "yield_velocity": Limit(orbits=_NONE),
     "distance": Limit(lanes=True, orbits=_NONE),
@@ -88,10 +89,13 @@ def seen(scene: Scene) -> Iterator[Seen]:
     """Yield the features of a scene that have a row in the table of limits."""
     if not scene.is_lone_body:
         yield Seen("body", "body", "a scene of components" if scene.replay is None else "a replay")
+    for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
+        if isinstance(stop, StopTable) and stop.drifts:
+            yield Seen("drift", key, "a velocity or a table of its motion")
+    if signals_of(scene.forces):
+        yield Seen("signals", "forcing", forces_in_words(scene.forces))
     if scene.period is None:
         yield Seen("forcing", "forcing", "none")
-    if scene.has_several_forces:
-        yield Seen("forces", "forcing", forces_in_words(scene.forces))
     if scene.clock is not None and not scene.clock.is_common:
         yield Seen("quasi-periodic", "forcing", "sines without one")
     if not scene.stops:

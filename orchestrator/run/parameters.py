@@ -161,7 +161,9 @@ def free_state(
     if scene.body.IS_STRUCTURE:
         from vibroimpact.orchestrator.run.carried_state import on_free_side  # few scenes need it
 
-        return on_free_side(body_points(scene, floats), scene.stops, state)
+        known = {} if floats is None else floats
+        phases = [known.get(f"stop[{k}].phase", 0.0) for k in range(1, len(scene.stops) + 1)]
+        return on_free_side(body_points(scene, floats), scene.stops, state, phases)
     displacement, velocity = state
     for stop in scene.stops:
         sign = 1.0 if stop.side == "upper" else -1.0

@@ -130,7 +130,13 @@ class PointRunner(Runner):
             self.driver.close()
             self._open(scene)
 
-    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
+    def run(
+        self,
+        values: Mapping[str, float],
+        start: tuple[float, ...] | None = None,
+        *,
+        at_time_0: bool = False,
+    ) -> RunRecord:
         """Run one point.
 
         Parameters
@@ -140,6 +146,8 @@ class PointRunner(Runner):
         start : tuple of float or None
             State carried over at forcing phase 0, see `parameters.float_parameters`; None: the scene's own
             start state.
+        at_time_0 : bool
+            Whether the start is a state at time 0, where the forces have their own phases.
 
         Raises
         ------
@@ -150,7 +158,8 @@ class PointRunner(Runner):
         scene = self.scene.at(values) if values else self.scene
         self._reopen_if_other(scene)
         plan = self._plan.at(scene) if values else self._plan
-        run = _Run(scene, self.driver, plan, without_padding(start, len(state_variables(scene)) // 2))
+        state = without_padding(start, len(state_variables(scene)) // 2)
+        run = _Run(scene, self.driver, plan, state, at_time_0=at_time_0)
         outcome, message = run.run()
         message = message or "; ".join(self.driver.warnings)
         record = run.record(outcome, message, time.perf_counter() - began)
@@ -222,12 +231,20 @@ class _Run:
     """One run: the times of its recording, and its record."""
 
     def __init__(
-        self, scene: Scene, driver: RecordedBody, plan: TimeSeriesPlan, start: tuple[float, ...] | None
+        self,
+        scene: Scene,
+        driver: RecordedBody,
+        plan: TimeSeriesPlan,
+        start: tuple[float, ...] | None,
+        *,
+        at_time_0: bool,
     ) -> None:
         self.scene = scene
         self.driver = driver
         self.plan = plan
-        self.parameters = float_parameters(scene, start)
+        self.parameters = float_parameters(scene, None if at_time_0 else start)
+        if at_time_0 and start is not None:
+            self.parameters |= dict(zip(scene.body.start_names, start, strict=True))
         self.samples: list[NDArray[np.float64]] = []  # blocks of rows: time, then the variables
         self.begin_time, self.end_time = recorded_window(scene, self.parameters)
         self.measured: MeasuredRun | None = None

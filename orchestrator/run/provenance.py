@@ -12,6 +12,7 @@ from vibroimpact.analysis.dataset.provenance import program_attributes, versions
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.run.summary import in_one_line
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.forcing_models import RandomForcing
 
 
 def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
@@ -54,9 +55,11 @@ def _clock(scene: Scene) -> dict[str, int]:
 
 
 def _seed(scene: Scene) -> str:
-    """Return the seed of a dataset and its random quantities, in words: the noise of sampled channels."""
+    """Return the seeds of a dataset and their quantities, in words: of random forces, and of sampled channels."""
     if not scene.is_one_body:
         return "none of the scene's own; an FMU may have one among its parameters"
-    if scene.noise is None or not scene.channels:
-        return "none: nothing in the scene is random"
-    return f"{scene.noise.seed}: noise of {', '.join(scene.channels)}"
+    forces = zip(scene.forcing_keys, scene.forces, strict=True)
+    seeds = [f"{force.seed}: {key}" for key, force in forces if isinstance(force, RandomForcing)]
+    if scene.noise is not None and scene.channels:
+        seeds.append(f"{scene.noise.seed}: noise of {', '.join(scene.channels)}")
+    return "; ".join(seeds) or "none: nothing in the scene is random"

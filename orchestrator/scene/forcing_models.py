@@ -70,7 +70,8 @@ class ForcingTable(SceneTable):
         Point | None,
         replace(
             POINT_RULE,
-            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`',
+            doc='several bodies: the point where a `"force"` acts, such as `"frame"` or `"beam.tip"`; `"all"`: '
+            "each mass, with the same amplitude",
             default="required there",
         ),
     ] = None
@@ -224,11 +225,13 @@ class PulseForcing(SignalForcing):
         Rule(doc='`"half_sine"`, `"triangle"` with equal flanks, or `"trapezoid"` with `rise`'),
     ]
     rise: Annotated[
-        NotNegative,
+        NotNegative | None,
         Rule(
-            unit="s", doc="of a trapezoid: its rise and its fall, up to half of the duration; 0: a rectangle"
+            unit="s",
+            doc="of a trapezoid: its rise and its fall, up to half of the duration; 0: a rectangle",
+            default="0",
         ),
-    ] = 0.0
+    ] = None
 
     @property
     def kind_number(self) -> int:
@@ -237,7 +240,7 @@ class PulseForcing(SignalForcing):
 
     def numbers(self) -> dict[str, float]:
         """Return start, duration and rise."""
-        return {"start": self.start, "duration": self.duration, "rise": self.rise}
+        return {"start": self.start, "duration": self.duration, "rise": self.rise or 0.0}
 
     def values_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the shape of the pulse, and 0 outside."""
@@ -245,7 +248,7 @@ class PulseForcing(SignalForcing):
         inside = (part >= 0.0) & (part <= 1.0)
         if self.shape == "half_sine":
             return np.where(inside, np.sin(math.pi * np.clip(part, 0.0, 1.0)), 0.0)
-        rise = 0.5 if self.shape == "triangle" else self.rise / self.duration
+        rise = 0.5 if self.shape == "triangle" else (self.rise or 0.0) / self.duration
         flank = np.minimum(part, 1.0 - part)
         return np.where(inside, np.minimum(flank / rise, 1.0) if rise > 0.0 else 1.0, 0.0)
 
@@ -407,7 +410,7 @@ def is_one_sine(forces: Sequence[Force | None]) -> bool:
     >>> is_one_sine([]), is_one_sine([sine]), is_one_sine([sine, sine])
     (True, True, False)
     """
-    return not forces or (len(forces) == 1 and isinstance(forces[0], Forcing | None))
+    return not forces or (len(forces) == 1 and (forces[0] is None or forces[0].signal == "sine"))
 
 
 def forcing_keys(forces: Sequence[Any]) -> tuple[str, ...]:

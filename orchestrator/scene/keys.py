@@ -82,14 +82,20 @@ class Key(NamedTuple):
         >>> numeric_key("forcing.amplitude").among(2).owner, numeric_key("forcing[1].amplitude").among(1).owner
         ('forcing[1]', 'forcing')
         """
-        if self.table != "forcing" or (self.place or 0) > 0:
+        place = 0 if forces > 1 else None
+        if self.table != "forcing" or (self.place or 0) > 0 or self.place == place:
             return self
-        return self._replace(place=0 if forces > 1 else None)
+        return self._replace(place=place)
 
     def typed(self, value: float) -> float:
         """Return a number in the type of its field: int for whole numbers."""
-        fields = [field_of(m, self.name) for m in _MODELS[self.table] if self.name in known_keys(m)]
-        return int(value) if any(map(is_whole, fields)) else value
+        return int(value) if _is_whole(self.table, self.name) else value
+
+
+@lru_cache(maxsize=256)
+def _is_whole(table: str, name: str) -> bool:
+    """Return whether a number of a table is whole."""
+    return any(is_whole(field_of(model, name)) for model in _MODELS[table] if name in known_keys(model))
 
 
 @lru_cache(maxsize=256)

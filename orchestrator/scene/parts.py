@@ -6,6 +6,7 @@ for each FMU, connections between them, and contacts of any two.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from itertools import chain
@@ -50,7 +51,14 @@ from vibroimpact.orchestrator.scene.measuring_models import (
     Noise,
     Sensor,
 )
-from vibroimpact.orchestrator.scene.models import MOTION_KEYS, ContactTable, Execution, Record, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import (
+    MOTION_KEYS,
+    ContactTable,
+    Execution,
+    Record,
+    SceneTable,
+    Stop,
+)
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
@@ -233,6 +241,11 @@ class Parts(SceneTable):
     @property
     def period(self) -> float | None:
         """Period of the clock, s: the forcing period 2 pi / angular_frequency under one sine; None without a clock."""
+        if len(self.forces) == 1 and isinstance(
+            self.forces[0], Forcing
+        ):  # it is asked for at each point of a sweep
+            frequency = self.forces[0].angular_frequency
+            return None if frequency == 0.0 else 2.0 * math.pi / frequency
         clock = self.clock
         return None if clock is None else clock.period
 
@@ -401,7 +414,13 @@ class Parts(SceneTable):
             return self._component_numbers().numbers()
         tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
         found = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
-        return ((key, number) for key, number in found if not is_left_out(key))
+        standing = {
+            f"{key}.{motion}"
+            for key, stop in zip(self.stop_keys, self.stops, strict=True)
+            if not stop.moves
+            for motion in MOTION_KEYS
+        }
+        return ((key, number) for key, number in found if not (is_left_out(key) or key in standing))
 
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables with numbers, by their name in keys."""

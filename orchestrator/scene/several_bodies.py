@@ -72,7 +72,9 @@ def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _may_grow(body: dict[str, Any], document: Mapping[str, Any], owner: str) -> bool:
-    return has_negative(body) or sweeps_negative(document.get("sweep"), owner)
+    """Return whether a body that may have negative springs or dashpots, which a beam may not, has one."""
+    negative = has_negative(body) or sweeps_negative(document.get("sweep"), owner)
+    return negative and body.get("kind") != "beam"
 
 
 def _with_named_body(document: dict[str, Any]) -> dict[str, Any]:

@@ -47,7 +47,10 @@ def _parts(document: Mapping[str, Any]) -> str:
         said = [f"bodies {', '.join(str(body['name']) for body in document['body'])}"]
     else:
         said = [str(document["body"].get("kind", "oscillator"))]
-    said += ["forced"] if "forcing" in document else []
+    forces = document.get("forcing")
+    said += (
+        [f"{len(forces)} forces"] if isinstance(forces, list) else ["forced"] if "forcing" in document else []
+    )
     said += ["driven by recordings"] if "replay" in document else []
     for name in ("link", "stop", "contact", "connection"):
         count = len(document.get(name, ()))

@@ -170,15 +170,17 @@ def yielding(periods: int, stiffness: float) -> Columns:
     return points
 
 
-class FusedYielding:
-    """The Oscillator FMU on the orbit of `yielding`, in one step."""
+class FusedOrbit:
+    """The orbit of bench_fused in one step, in a scene with some changes of its text."""
 
     PERIODS = 20_000
 
-    def __init__(self, stiffness: float) -> None:
-        law = f'law = "kelvin_voigt"\nstiffness = {stiffness}\ndamping = {2.0 * VOIGT_RATIO * math.sqrt(stiffness)}'
+    def __init__(self, changes: dict[str, str]) -> None:
         text = SCENE.format_map({**vars(bench_fused), "velocity": -0.5, "impacts": self.PERIODS})
-        self._runner = PointRunner(parse_scene(text.replace("restitution = 0.7", law), "bench_lanes.toml"))
+        for before, after in changes.items():
+            assert before in text
+            text = text.replace(before, after)
+        self._runner = PointRunner(parse_scene(text, "bench_lanes.toml"))
 
     def seconds(self) -> float:
         """Return seconds per impact."""
@@ -188,6 +190,21 @@ class FusedYielding:
         assert record.impacts is not None
         assert len(record.impacts) == 1
         return seconds / self.PERIODS
+
+
+def fused_yielding(stiffness: float) -> FusedOrbit:
+    """Return the Oscillator FMU on the orbit of `yielding`."""
+    damping = 2.0 * VOIGT_RATIO * math.sqrt(stiffness)
+    law = f'law = "kelvin_voigt"\nstiffness = {stiffness}\ndamping = {damping}'
+    return FusedOrbit({"restitution = 0.7": law})
+
+
+def fused_sines(further: int) -> FusedOrbit:
+    """Return the Structure FMU under the sine of the orbit and further ones; without one, under a constant of 0."""
+    forces = [f"amplitude = {0.1 / k}\nangular_frequency = {k + 1}.0" for k in range(1, further + 1)]
+    forces = forces or ['signal = "constant"\namplitude = 0.0']
+    tables = "".join(f"[[forcing]]\n{each}\n" for each in forces)
+    return FusedOrbit({"[forcing]": "[[forcing]]", "[[stop]]": f"{tables}[[stop]]"})
 
 
 def cases(periods: int) -> dict[str, Case]:
@@ -224,9 +241,11 @@ def measure(periods: int, repetitions: int) -> tuple[dict[str, float], dict[str,
     clock, fused, off = Clock(), Fused(100_000), {}
     timed: dict[str, Callable[[], float]] = {"fused Oscillator": lambda: fused.run()[0]}
     for stiffness in STIFFNESSES:
-        timed[f"fused Oscillator, Kelvin-Voigt stop of stiffness {stiffness:g}"] = FusedYielding(
+        timed[f"fused Oscillator, Kelvin-Voigt stop of stiffness {stiffness:g}"] = fused_yielding(
             stiffness
         ).seconds
+    timed["fused Structure, one sine"] = fused_sines(0).seconds
+    timed["fused Structure, three sines"] = fused_sines(2).seconds
 
     def timed_other(other: Peer | Other) -> float:
         seconds, *off[other.name] = other.run()

@@ -128,6 +128,21 @@ CHOSEN = {
         "double added = law->damping_slope * amplitude;",
         "double added = law->damping_slope * (1.0 + 1e-9) * amplitude;",
     ),
+    "the rate of a chirp has 16 digits only": (
+        "core/signals/chirp.c",
+        "return (vi_chirp){logarithmic, phase, angular_frequency, vi_twofold_quotient(change, twofold(duration))};",
+        "return (vi_chirp){logarithmic, phase, angular_frequency, twofold(change.high / duration)};",
+    ),
+    "the density of a random force is one percent off at the end of its band": (
+        "core/signals/random.c",
+        "return sqrt(value * PI / r->interval) / (square * square);",
+        "return sqrt(value * PI / r->interval) / square;",
+    ),
+    "a flight over intervals of a random force takes a sixteenth of its bound": (
+        "core/body/modal/structure/random_flight.c",
+        "bound += fabs(shape[j]) * most[j];",
+        "bound += 0.0625 * fabs(shape[j]) * most[j];",
+    ),
 }
 """For each fault: the file, a text that occurs once in it, and the text in its place."""
 CASES, SECONDS = len(CHOSEN), 900.0

@@ -136,8 +136,9 @@ static void couple(uint64_t *seed, orbit_case *drawn)
     for (int k = 0; k < body->harmonics; ++k) {
         rate[k] = body->order[k] * body->angular_frequency;
     }
-    CHECK(vi_door_orbit_couple(modes, body->harmonics, rate, body->natural, damping, body->cosine, body->sine, &coupling,
-                               &work) == 0,
+    CHECK(vi_door_orbit_couple(modes, body->harmonics, rate, body->natural, damping, body->cosine, body->sine,
+                               &coupling, &work)
+              == 0,
           "%d modes", modes);
     body->coupling = &coupling;
 }
@@ -384,7 +385,8 @@ static void check_wave(const orbit_case *drawn)
     CHECK(vi_door_orbit_wave(&drawn->body, &one, &level, cosine, sine) == VI_ORBIT_DONE, "wave");
     for (phase = 0.0; phase < TURN; phase += 0.7) {
         double velocity, distance, slopes[2], sum = level, size = fabs(level);
-        CHECK(vi_door_orbit(&drawn->body, &one, &velocity, &distance, &slopes[0], &slopes[1]) == VI_ORBIT_DONE, "impact");
+        CHECK(vi_door_orbit(&drawn->body, &one, &velocity, &distance, &slopes[0], &slopes[1]) == VI_ORBIT_DONE,
+              "impact");
         for (int k = 0; k < drawn->body.harmonics; ++k) {
             const double angle = drawn->order[k] * phase;
             sum += cosine[k] * cos(angle) + sine[k] * sin(angle);
@@ -478,7 +480,7 @@ static void check_refusals(uint64_t *seed)
     REFUSED(bad.sine[0] = (double)NAN);
     REFUSED(bad.stop_cosine[0] = (double)INFINITY);
     REFUSED(bad.body.contacts = 0);
-    REFUSED(bad.body.contacts = VI_PORTS + 1);
+    REFUSED(bad.body.contacts = VI_ORBIT_CONTACTS + 1);
     REFUSED(bad.body.angular_frequency = 0.0);
     REFUSED(bad.body.angular_frequency = (double)NAN);
     REFUSED(bad.natural[0] = 0.0; bad.damping_ratio[0] = 0.1);

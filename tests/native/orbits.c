@@ -10,14 +10,14 @@
 
 static const double TURN = 6.283185307179586;
 
-enum { HARMONICS = 3 };
+enum { HARMONICS = 3, CONTACTS = 8 };
 
 typedef struct {
     double natural[VI_MODES], damping_ratio[VI_MODES], held[VI_MODES];
     double order[HARMONICS], cosine[HARMONICS * VI_MODES], sine[HARMONICS * VI_MODES];
-    double stop_cosine[HARMONICS * VI_PORTS], stop_sine[HARMONICS * VI_PORTS];
-    double shape[VI_PORTS * VI_MODES], impulse[VI_PORTS * VI_MODES];
-    double direction[VI_PORTS], position[VI_PORTS], restitution[VI_PORTS];
+    double stop_cosine[HARMONICS * CONTACTS], stop_sine[HARMONICS * CONTACTS];
+    double shape[CONTACTS * VI_MODES], impulse[CONTACTS * VI_MODES];
+    double direction[CONTACTS], position[CONTACTS], restitution[CONTACTS];
     double phase[VI_ORBIT_IMPACTS];
     int32_t contact[VI_ORBIT_IMPACTS];
     vi_orbit_body body;
@@ -29,7 +29,7 @@ typedef struct {
 
 static void draw(sample *s, uint64_t *seed, int most_modes)
 {
-    const int modes = 1 + (int)choice(seed, (unsigned)most_modes), contacts = 1 + (int)choice(seed, VI_PORTS);
+    const int modes = 1 + (int)choice(seed, (unsigned)most_modes), contacts = 1 + (int)choice(seed, CONTACTS);
     for (int j = 0; j < modes; ++j) {
         s->natural[j] = pow(10.0, uniform(seed, -1.0, 1.5));
         s->damping_ratio[j] = choice(seed, 4) ? uniform(seed, 0.0, 0.2) : uniform(seed, 0.9, 3.0);
@@ -172,7 +172,8 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
         s.natural[0] = s.damping_ratio[0] = 0.0;
     }
     const int end = vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster);
-    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT || end == VI_ORBIT_ADRIFT, "end %d", end);
+    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT || end == VI_ORBIT_ADRIFT,
+          "end %d", end);
     if (end != VI_ORBIT_DONE) {
         return;
     }
@@ -203,8 +204,8 @@ static void check_body(uint64_t *seed, int most_modes, bool invariants, bool cou
     if (invariants && expected > -12.0 && slowest > 1e-3) {
         const double exact = exp(expected), size = determinant_bound(2 * modes, monodromy);
         const double found = determinant(2 * modes, monodromy);
-        CHECK(fabs(found - exact) <= 1e-6 * exact + 1e-13 * size,
-              "%d modes: determinant %.17g, not %.17g", modes, found, exact);
+        CHECK(fabs(found - exact) <= 1e-6 * exact + 1e-13 * size, "%d modes: determinant %.17g, not %.17g", modes,
+              found, exact);
     }
 }
 
@@ -225,7 +226,7 @@ static void check_refusals(uint64_t *seed)
     s.train.impacts = 1;
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_ADRIFT, "a mode adrift");
     draw(&s, seed, 3);
-    s.contact[0] = (int32_t)VI_PORTS;
+    s.contact[0] = (int32_t)VI_ORBIT_CONTACTS;
     CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "no contact");
     draw(&s, seed, 3);
     s.phase[0] = NAN;

@@ -1,5 +1,6 @@
 /* Random bodies of up to 64 modes with up to VI_PORTS stops of every law, including extreme ones. They stay finite, are
  * never beyond a rigid stop, never go back in time, and always end their steps. Stops only push. */
+#include "body/modal/loads.h"
 #include "body/modal/modal_scan.h"
 #include "body/modal/power_tables.h"
 #include "body/modal/pressed_flow.h"
@@ -30,7 +31,53 @@ static vi_record record;
 static vi_pressed_cache pressed;
 static vi_scan scan;
 static vi_power_tables power;
-static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power, {0, NULL, NULL, NULL}};
+static vi_signal_loads loads;
+static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power, &loads, {0, NULL, NULL, NULL}};
+
+#if VI_SIGNALS > 0
+
+enum { LOADS = 3 };
+
+static double amplitude[LOADS], load_force[LOADS][VI_MODES];
+
+/* Up to three signals of time: a random one, a chirp and a pulse. */
+static void make_loads(uint64_t *seed, double root)
+{
+    const double rate = pow(10.0, uniform(seed, 0.0, 4.0));
+    loads.count = (int32_t)choice(seed, LOADS + 1);
+    loads.amplitude = amplitude;
+    loads.force = (const double (*)[VI_MODES])load_force;
+    for (int k = 0; k < loads.count; ++k) {
+        amplitude[k] = k == 0 || choice(seed, 2) == 0 ? uniform(seed, -1.0, 1.0) : 0.0;
+        for (int j = 0; j < model.modes; ++j) {
+            load_force[k][j] = root * uniform(seed, -1.0, 1.0);
+        }
+        loads.signal[k] = (vi_signal){
+            .kind = k == 0 ? VI_RANDOM : k == 1 ? VI_CHIRP_LINEAR : VI_HALF_SINE, .start = uniform(seed, -1.0, 10.0) / rate,
+            .duration = k == 0 ? 0.0 : uniform(seed, 1.0, 50.0) / rate, .end_angular_frequency = rate,
+            .seed = next_random(seed), .random = &loads.random[k], .transform = &loads.transform};
+        vi_signal_prepare(&loads.signal[k]);
+    }
+}
+
+static void remove_loads(void)
+{
+    loads.count = 0;
+}
+
+#else
+
+static void make_loads(uint64_t *seed, double root)
+{
+    (void)seed;
+    (void)root;
+}
+
+static void remove_loads(void)
+{
+}
+
+#endif
 
 static void make_modes(uint64_t *seed, double root)
 {
@@ -90,6 +137,12 @@ static void make(uint64_t *seed)
     record.extrema = choice(seed, 4) == 0;
     vi_structure_prepare(&model);
     vi_structure_start(&body, (vi_instant){0, 0.0, 0.0});
+    if (VI_SIGNALS > 0 && choice(seed, 4) == 0) {
+        make_loads(seed, root);
+    } else {
+        remove_loads();
+    }
+    vi_structure_load(&body);
 }
 
 /* Largest rate of the body with all its stops pressed; a coupled motion is followed in pieces of about 1 / rate. */
@@ -136,6 +189,7 @@ static void one_event_too_many_is_said(void)
         make(&seed);
     } while (model.modes != 1 || model.contacts != 2);
     vi_structure_mode(&model, 0, 0.0, 0.0, 0.0, 0.0);
+    remove_loads();
     for (int k = 0; k < 2; ++k) {
         model.shape[k][0] = model.impulse[k][0] = 1.0;
         contacts[k].law = vi_contact_law_rigid(0.5);

@@ -75,11 +75,8 @@ def three_modes() -> ImpactingBody:
     """Return a body of three modes under three sines and a constant force, on a stop that moves with three sines."""
     stop = Contact(np.array(SHAPE), 1.0, POSITION, 0.7, dict(zip(ORDERS, MOTION, strict=True)))
     further = {order: np.array(force) for order, force in zip(ORDERS, FORCES, strict=True)}
-    return ImpactingBody(
-        *(np.array(each) for each in (NATURAL, RATIOS, (0.0, 0.0, 0.0), HELD)),
-        *(CLOCK, 0.0, (stop,), np.array(SHAPE)),
-        further=further,
-    )
+    natural, ratios, held, shape = (np.array(each) for each in (NATURAL, RATIOS, HELD, SHAPE))
+    return ImpactingBody(natural, ratios, np.zeros(3), held, CLOCK, 0.0, (stop,), shape, further=further)
 
 
 class InFortyDigits:

@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from support.component_fmu import ComponentFmu
 
-MODES, CONTACTS = 64, 32
+MODES, CONTACTS, SINES, SIGNALS, TABLE_ROWS = 64, 32, 15, 8, 8192
 #: Shapes of the arrays of a Structure that have not one number for each mode.
 SHAPES = {
     "mode.contact_shape": (CONTACTS, MODES),
     "mode.damping": (MODES, MODES),
-    "mode.sine": (15, MODES),
-    "mode.signal": (8, MODES),
-    "table.time": (8192,),
-    "table.value": (8192,),
+    "mode.sine": (SINES, MODES),
+    "mode.signal": (SIGNALS, MODES),
+    "table.time": (TABLE_ROWS,),
+    "table.value": (TABLE_ROWS,),
 }
 Arrays = Mapping[str, ArrayLike]
 
@@ -47,7 +47,7 @@ def structure_fmu(
     for name, values in arrays.items():
         set_array(fmu, name, values)
     if initialize:
-        fmu.initialize()
+        fmu.initialize(fmu.time)
     return fmu
 
 

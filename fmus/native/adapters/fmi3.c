@@ -246,8 +246,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     if (result == VI_STEP_UNBOUNDED) {
         *terminateSimulation = true;
+        *earlyReturn = it->early_return_allowed && *lastSuccessfulTime < end;
         vi_instance_warn(it, "fmi3DoStep", "%s", it->message);
-        return fmi3Discard;
+        return it->early_return_allowed ? fmi3OK : fmi3Discard;
     }
     if (result == VI_STEP_UNFINISHED && !it->early_return_allowed) {
         log_message(it, fmi3Discard, "logStatusWarning",

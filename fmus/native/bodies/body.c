@@ -6,6 +6,7 @@
 #include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body/modal/structure/moved_stops.h"
 #include "body/modal/structure/unbounded.h"
 #include "body_check.h"
 #include "body_exchange.h"
@@ -107,7 +108,7 @@ static bool move_stops(const void *self, vi_body *c)
         return true;
     }
     form->find_stops(self, motion);
-    return vi_stop_motions_change(&parts, motion, &c->stop_refused);
+    return vi_structure_move_stops(&parts, motion, &c->stop_refused);
 }
 
 static void drive(void *self, vi_body *c)
@@ -127,6 +128,7 @@ static void drive(void *self, vi_body *c)
     if (good) {
         const vi_structure parts = vi_body_parts(c);
         vi_structure_drive(&parts, force, c->forcing_angular_frequency);
+        vi_stop_motions_count_by(&c->model);
         if (form->drive_further != NULL) {
             form->drive_further(self, false);
         }
@@ -368,7 +370,7 @@ static vi_step_result advance(vi_body *c, vi_instant target, const vi_step_reque
     const vi_structure parts = vi_body_parts(c);
     c->state.follow_energies = c->record_energies;
     const vi_step_result result = vi_structure_advance(&parts, target, request);
-    if (result == VI_STEP_STANDSTILL) {
+    if (result == VI_STEP_STANDSTILL && !vi_stop_motions_complain(&parts, message)) {
         vi_structure_complain(&parts, message);
     }
     if (result == VI_STEP_UNBOUNDED) {

@@ -20,6 +20,9 @@ static void defaults(void *self)
     modal_structure *s = self;
     s->modes = 1;
     s->modes_described = VI_MODES;
+    for (int k = 0; k < VI_PORTS; ++k) {
+        s->stop[k].first = 1;
+    }
     for (int j = 0; j < VI_MODES; ++j) { /* an oscillator of mass 1 and stiffness 1 */
         s->natural[j] = s->body.model.observed[j] = s->forcing[j] = s->force_shape[j] = 1.0;
         s->base[j] = -1.0;

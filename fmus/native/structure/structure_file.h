@@ -1,8 +1,8 @@
 /* The modes of a structure in the file structure.bin of an FMU's resources, which a tool without arrays cannot set.
  *
  * Little-endian: the eight letters VISTRUC2, then as int64 the numbers of modes, contacts, sines, signals and rows of
- * tables, and 1 or 0: does the damping couple the modes? Then as float64 the arrays of variables.toml in their order, for
- * these numbers only.
+ * tables. A sixth number is 1 where the damping couples the modes, else 0. The arrays of variables.toml follow as float64
+ * in their order, for these numbers only.
  */
 #ifndef VIBROIMPACT_STRUCTURE_FILE_H
 #define VIBROIMPACT_STRUCTURE_FILE_H

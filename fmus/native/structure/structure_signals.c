@@ -63,6 +63,22 @@ void vi_structure_check_amplitudes(const vi_structure_signals *signals, char mes
     }
 }
 
+/* Complain of two cubic tables that share rows but are not the same table: a row has one second derivative. */
+static void check_shared_rows(const vi_structure_signals *signals, int k, char *message)
+{
+    const vi_structure_signal *one = &signals->signal[k];
+    for (int i = 0; i < k; ++i) {
+        const vi_structure_signal *other = &signals->signal[i];
+        const bool cubic = one->kind == VI_TABLE_CUBIC && other->kind == VI_TABLE_CUBIC;
+        const bool same = one->table_start == other->table_start && one->table_count == other->table_count;
+        if (cubic && !same && one->table_start < other->table_start + other->table_count
+            && other->table_start < one->table_start + one->table_count) {
+            vi_complain(message, "signal[%d].table_start: expected all rows of signal[%d], or none of them, for two cubic"
+                                 " tables, got some", k + 1, i + 1);
+        }
+    }
+}
+
 void vi_structure_check_signals(const vi_structure_signals *signals, int modes, char message[VI_MESSAGE_LENGTH])
 {
     for (int k = 0; k < used(signals); ++k) {
@@ -77,6 +93,7 @@ void vi_structure_check_signals(const vi_structure_signals *signals, int modes, 
         }
         const vi_signal signal = signal_of(signals, k);
         vi_check_signal(message, name, &signal);
+        check_shared_rows(signals, k, message);
     }
 }
 

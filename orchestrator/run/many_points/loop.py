@@ -190,7 +190,7 @@ class PointLoop:
             end = np.full(len(points), record.transient_time + record.recorded_time)
             return PreparedPoints(points.first, table, begin, end, columns, forced, False, scene)
         if self.chained:
-            columns["forcing.phase"][~points.first] = 0.0
+            _begin_at_phase_0(columns, ~points.first)
         with np.errstate(over="ignore", invalid="ignore"):  # the body refuses an infinite period
             begin, end = forced_window(self.scene.record, columns["forcing.phase"], angular_frequency)
         periods = self._periods(forced)
@@ -234,6 +234,16 @@ class PointLoop:
             chosen = np.flatnonzero(which.reshape(-1) == number)
             others = {key: values[chosen] for key, values in points.values.items() if key not in own}
             yield chosen, others | dict(zip(own, body.tolist(), strict=True))
+
+
+def _begin_at_phase_0(columns: dict[str, Floats], later: NDArray[np.bool_]) -> None:
+    """Let some points begin where the phase of the clock is 0; further sines have their phases of that instant."""
+    frequency = columns["forcing.angular_frequency"][later]
+    turned = columns["forcing.phase"][later] / frequency
+    for name in [name for name in columns if name.startswith("sine[") and name.endswith("].phase")]:
+        own = columns[f"{name.removesuffix('phase')}angular_frequency"][later]
+        columns[name][later] -= turned * own
+    columns["forcing.phase"][later] = 0.0
 
 
 def _place(name: str, names: Sequence[str]) -> int:

@@ -14,6 +14,7 @@ BODY_MODELS: dict[str, type[OneBody]] = {"oscillator": OscillatorBody, "chain": 
 
 __all__ = [
     "BODY_MODELS",
+    "PART_MODELS",
     "BeamBody",
     "Body",
     "BodyAlone",
@@ -21,7 +22,6 @@ __all__ = [
     "LinkTable",
     "OneBody",
     "OscillatorBody",
-    "PART_MODELS",
     "Rayleigh",
     "StructureBody",
 ]

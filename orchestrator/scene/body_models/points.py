@@ -13,6 +13,8 @@ from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 
 GROUND = "ground"
 """Name of the point that does not move, for links."""
+ALL = "all"
+"""Name of all masses together, for forces, unless a body has this name."""
 BODY_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 
 OneBody = OscillatorBody | ChainBody | BeamBody

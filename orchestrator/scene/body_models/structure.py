@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, 
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.growing import has_negative
 from vibroimpact.orchestrator.scene.body_models.points import (
+    ALL,
     GROUND,
     OneBody,
     PointOfBody,
@@ -23,7 +24,7 @@ from vibroimpact.orchestrator.scene.body_models.points import (
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.forcing_models import Force, Forcing
 from vibroimpact.orchestrator.scene.measuring_models import Sensor
-from vibroimpact.orchestrator.scene.models import DAMPING, Finite, SceneTable, Stop
+from vibroimpact.orchestrator.scene.models import DAMPING, Finite, SceneTable, Stop, StopTable
 from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Observed, Point
 from vibroimpact.orchestrator.scene.sampled_names import each_of
 
@@ -220,16 +221,20 @@ class StructureBody(BodyTable):
 
     def _load_at_point(self, force: Force) -> NDArray[np.float64]:
         assert force.at is not None, "the rules of scenes refuse it"
+        if force.at == ALL and ALL not in self.names:
+            return self.assembly.in_modes(np.ones(self.size))
         return self.assembly.in_modes(self._shape_of(force.at))
 
     def fmu_floats(self, forcing: Forcing | None, stops: Stops, sensor: Sensor | None) -> dict[str, float]:
         """Return the modes, their start, their shapes at contacts, and their loads, mass-normalised, SI."""
         assembly = self.assembly
         observed = self._shape_of(self.first_observed(stops))
-        forced = self._shape_of((forcing and forcing.at) or self.limited_point(stops))
         participation = np.concatenate([part.participation for part in assembly.parts])
         base = -assembly.modal(participation)
-        force = assembly.in_modes(forced)
+        if forcing is not None and forcing.at is not None:
+            force = self._load_at_point(forcing)
+        else:
+            force = assembly.in_modes(self._shape_of(self.limited_point(stops)))
         rows = {
             "angular_frequency": assembly.frequencies,
             "observed_shape": assembly.in_modes(observed),
@@ -270,10 +275,12 @@ class StructureBody(BodyTable):
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
         """Return the number of modes and of further observed points, and whether the damping couples the modes.
 
-        A motion that grows ends where it can meet no stop any more, since nothing else acts on the bodies of a scene.
+        A motion that grows ends where it can meet no stop any more, if the stops stand still: nothing else acts on the
+        bodies of a scene.
         """
+        still = not any(isinstance(stop, StopTable) and stop.moves for stop in stops)
         further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}
-        return {"modes": self.size, "coupled": self.is_coupled, "ends_unbounded": True, **further}
+        return {"modes": self.size, "coupled": self.is_coupled, "ends_unbounded": still, **further}
 
 
 class BodyAlone(StructureBody):

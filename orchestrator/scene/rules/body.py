@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from vibroimpact.orchestrator.scene.body_models import Body
+from vibroimpact.orchestrator.scene.body_models.structure import NOT_IN_STRUCTURES
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
@@ -17,6 +18,7 @@ from vibroimpact.orchestrator.scene.sampled_names import (
     variable_hint,
 )
 
+ALONE = "beside one body alone"
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
 FREQUENCY_KEYS = ("frequency", "mass_per_length")
@@ -132,6 +134,15 @@ def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
             yield Problem(
                 "record.time_series.variables", "each variable once", f"{quoted(name)} {times} times"
             )
+
+
+def keys_left_out(part: Draft) -> Iterator[str]:
+    """Yield the written keys of a body that it cannot have in a structure."""
+    keeps_modes = part.body is not None and part.body.KEEPS_MODES and part.body.IS_STRUCTURE
+    for key in part.written("body"):
+        has_modes = key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes))
+        if key in NOT_IN_STRUCTURES and key != "poisson_ratio" and not has_modes:
+            yield key
 
 
 BODY_RULES = (

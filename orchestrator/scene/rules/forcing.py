@@ -17,10 +17,9 @@ from vibroimpact.orchestrator.scene.forcing_models import (
 )
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
-from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems, size_problem
+from vibroimpact.orchestrator.scene.rules.body import ALONE, fixed_point_problems, keys_left_out, size_problem
 from vibroimpact.orchestrator.scene.rules.signals import signal_problems
 
-ALONE = "beside one body alone"
 _MOST = {"sine": MOST_SINES, "constant": MOST_CONSTANTS}
 
 
@@ -197,8 +196,6 @@ def _forces_have_room(draft: Draft) -> Iterator[Problem]:
 
 def _keys_of_one_sine(draft: Draft, several: str) -> Iterator[Problem]:
     """Yield the tables and keys of one body that only a force of one sine, and stops that stand still, go with."""
-    from vibroimpact.orchestrator.scene.rules.structure import keys_left_out  # few scenes need it
-
     beside = "beside [forcing] with one sine"
     for name in ("sensor", *CHAIN_TABLES, "replay"):
         if name in draft.document:

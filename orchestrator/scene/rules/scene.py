@@ -96,10 +96,13 @@ def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
 def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
     body, stiffness = draft.body, draft.span("body.stiffness")
     ratio = getattr(body, "damping_ratio", None)
-    if ratio is not None and stiffness and stiffness[0] == 0.0:
+    if ratio is not None and stiffness and stiffness[0] <= 0.0:
         hint = "The ratio is to 2 sqrt(stiffness mass); give damping instead."
         yield Problem(
-            "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
+            "body.damping_ratio",
+            "a stiffness > 0 beside a damping_ratio",
+            f"a stiffness of {stiffness[0]:g}",
+            hint,
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 
@@ -114,15 +115,16 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
     Only the FMU of a bent beam has the start displacement at a stop, so the FMU refuses a wrong start itself.
     """
     for index, stop in enumerate(draft.stops):
-        if stop is None or not LAWS[stop.law].is_rigid or stop.moves:
-            continue  # the FMU knows where a moving stop is at the start
-        key, start = _start(draft, stop)
-        if start is None:
+        if stop is None or not LAWS[stop.law].is_rigid:
+            continue
+        (key, start), shift = _start(draft, stop), start_shift(draft, index)
+        if start is None or shift is None:
             continue
         upper = stop.side == "upper"
         limit, displacement = (
             (_position(draft, index)[0], start[1]) if upper else (_position(draft, index)[1], start[0])
         )
+        limit += shift
         if displacement > limit if upper else displacement < limit:
             relation = "<=" if upper else ">="
             expected = (
@@ -130,6 +132,19 @@ def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
             )
             got = f"{quoted(displacement)}{draft.worst('stop', 'body.displacement_start')}"
             yield Problem(key, expected, got, "Start on the stop or away from it, or move the stop.")
+
+
+def start_shift(draft: Draft, index: int) -> float | None:
+    """Return the displacement of a stop from its position at time 0, m; None where only the FMU knows it."""
+    stop = draft.stops[index]
+    if stop is None or not stop.moves:
+        return 0.0
+    names = ("motion_amplitude", "motion_phase")
+    spans = [draft.span(f"stop[{index + 1}].{name}") or (0.0, 0.0) for name in names]
+    if stop.motion_times is not None or any(low != high for low, high in spans):
+        return None
+    (amplitude, _), (phase, _) = spans
+    return amplitude * math.cos(phase)
 
 
 def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
@@ -151,14 +166,12 @@ def motions_are_whole(draft: Draft) -> Iterator[Problem]:
         if stop is not None and stop.moves:
             yield from _sine_problems(draft, stop, f"stop[{number}]")
             yield from _table_problems(stop, f"stop[{number}]")
-    moving = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.moves), 0)
-    if not moving:
-        return
+    drifting = next((number for number, stop in enumerate(draft.stops, start=1) if stop and stop.drifts), 0)
     for axis in draft.axes:
-        if axis.continuation:
-            hint = "A stop moves from time 0 on, so that the end of a run is no start of the next."
+        if drifting and axis.continuation:
+            hint = "It moves on from time 0, so that the end of a run is no start of the next."
             key = key_path(("sweep", axis.key, "path"))
-            yield Problem(key, f'"independent" beside the moving stop[{moving}]', "a continuation", hint)
+            yield Problem(key, f'"independent" beside a stop[{drifting}] that drifts', "a continuation", hint)
 
 
 def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]:
@@ -166,9 +179,7 @@ def _sine_problems(draft: Draft, stop: OwnStop, where: str) -> Iterator[Problem]
     frequency = draft.span(f"{where}.motion_angular_frequency") or (0.0, 0.0)
     if any(amplitude) and frequency[0] == 0.0:
         hint = "The stop moves by motion_amplitude cos(motion_angular_frequency time + motion_phase)."
-        yield Problem(
-            f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint
-        )
+        yield Problem(f"{where}.motion_angular_frequency", "a number > 0 with a motion_amplitude", "0", hint)
 
 
 def _table_problems(stop: OwnStop, where: str) -> Iterator[Problem]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.body_models.base import NoPoint
 from vibroimpact.orchestrator.scene.body_models.points import (
+    ALL,
     GROUND,
     OneBody,
     PointOfBody,
@@ -17,7 +18,6 @@ from vibroimpact.orchestrator.scene.body_models.points import (
 )
 from vibroimpact.orchestrator.scene.body_models.structure import (
     MOST_LINKS,
-    NOT_IN_STRUCTURES,
     label_of,
 )
 from vibroimpact.orchestrator.scene.draft import Draft
@@ -25,8 +25,8 @@ from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted
-from vibroimpact.orchestrator.scene.rules.forcing import ALONE
-from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole
+from vibroimpact.orchestrator.scene.rules.body import ALONE, keys_left_out
+from vibroimpact.orchestrator.scene.rules.stop import motions_are_whole, start_shift
 from vibroimpact.orchestrator.scene.several_bodies import of_part
 
 Span = tuple[float, float]
@@ -81,15 +81,6 @@ def _keys_of_one_body(draft: Draft) -> Iterator[Problem]:
                 yield Problem(f"stop[{number}].{key}", f"{key} {ALONE}", "it beside [[body]]", hint)
 
 
-def keys_left_out(part: Draft) -> Iterator[str]:
-    """Yield the written keys of a body that it cannot have in a structure."""
-    keeps_modes = part.body is not None and part.body.KEEPS_MODES and part.body.IS_STRUCTURE
-    for key in part.written("body"):
-        has_modes = key == "modes" and (part.body is None or (keeps_modes and not part.finds_modes))
-        if key in NOT_IN_STRUCTURES and key != "poisson_ratio" and not has_modes:
-            yield key
-
-
 def _counts_are_few(draft: Draft) -> Iterator[Problem]:
     if not draft.parts:
         yield Problem("body", "one [[body]] table or more", "none", "Add [[body]] with a name.")
@@ -123,6 +114,7 @@ class _Limit(NamedTuple):
     is_rigid: bool
     span: Span
     moves: bool = False
+    shift: float | None = 0.0
 
 
 class _Points:
@@ -155,9 +147,24 @@ class _Points:
                 hint = f'For example at = "{self._body.names[-1]}".'
                 yield Problem(f"stop[{number}].at", "the point that it limits", "nothing", hint)
         for key, force, _ in draft.written_forces():
-            if force is not None and force.at is not None:
+            if force is not None and force.at == ALL and ALL not in self._body.names:
+                yield from self._all_masses(f"{key}.at")
+            elif force is not None and force.at is not None:
                 yield from self._problem(f"{key}.at", force.at)
         yield from self._observed()
+
+    def _all_masses(self, where: str) -> Iterator[Problem]:
+        """Yield the problem of a force on all masses where a body has none of its own."""
+        beams = [
+            name
+            for name, part in zip(self._body.names, self._body.parts, strict=True)
+            if part.PLACE == "location"
+        ]
+        if beams:
+            hint = 'A base that moves loads all points: kind = "base_acceleration".'
+            yield Problem(
+                where, '"all" for oscillators and chains', f"it beside the beam {quoted(beams[0])}", hint
+            )
 
     def _observed(self) -> Iterator[Problem]:
         """Yield the problems of observed points: not there, the same twice in a pair, or listed twice."""
@@ -196,7 +203,15 @@ class _Points:
             span = draft.span(f"stop[{number}].position")
             if stop is not None and stop.at is not None and span is not None:
                 point = self._body.point(stop.at)
-                yield _Limit(f"stop[{number}]", (point,), stop.side == "upper", LAWS[stop.law].is_rigid, span, stop.moves)
+                yield _Limit(
+                    f"stop[{number}]",
+                    (point,),
+                    stop.side == "upper",
+                    LAWS[stop.law].is_rigid,
+                    span,
+                    stop.moves,
+                    start_shift(draft, number - 1),
+                )
         for number, contact in enumerate(draft.meetings, start=1):
             span = draft.span(f"contact[{number}].clearance")
             if contact is None or span is None:
@@ -250,11 +265,12 @@ def _hidden(one: _Limit, other: _Limit) -> Iterator[Problem]:
 def _start_is_on_the_free_side(draft: Draft, points: _Points) -> Iterator[Problem]:
     for limit in points.limits():
         spans = [points.start(point) for point in limit.points]
-        if not limit.is_rigid or limit.moves or any(span is None for span in spans):
+        if not limit.is_rigid or limit.shift is None or any(span is None for span in spans):
             continue
         known = [span for span in spans if span is not None]
         low, high = known[0] if len(known) == 1 else (known[0][0] - known[1][1], known[0][1] - known[1][0])
         bound, start = (limit.span[0], high) if limit.is_upper else (limit.span[1], low)
+        bound += limit.shift
         if start > bound if limit.is_upper else start < bound:
             relation = "<=" if limit.is_upper else ">="
             expected = f"a start on the free side (displacement {relation} {quoted(bound)})"

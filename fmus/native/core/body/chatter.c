@@ -47,8 +47,8 @@ static tail sum_tail(const vi_bounces *b)
     const double relative = (fabs(b->slope) / b->pressure + fabs(b->drag)) * t;
     const double bend = fabs(b->bend) * t * t / b->pressure, dragged = b->drag * t / 3.0;
     tail sum;
-    /* 3.1 to second order in t; for r near 1, where t is long, drag g turns t into ln(1 + g t/3)/(g/3); g of a
-     * motion that grows may be negative */
+    /* 3.1 to second order in t; for r near 1, where t is long, drag g turns t into ln(1 + g t/3)/(g/3). A motion that
+     * grows may have g < 0. */
     sum.duration = (dragged != 0.0 && dragged > -0.5 ? t * (log1p(dragged) / dragged) : t) - t * t / 3.0 * (b->slope / b->pressure);
     sum.error = t * (relative * relative + bend);
     sum.complete = relative + bend < 0.25 && t * b->moving < 0.5;

@@ -23,9 +23,9 @@ static bool is_finite(int count, const double values[])
 
 static bool is_body(const vi_orbit_body *body)
 {
-    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS
-                && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS && body->angular_frequency > 0.0
-                && isfinite(body->angular_frequency);
+    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1
+                && body->contacts <= VI_ORBIT_CONTACTS && body->harmonics >= 1 && body->harmonics <= VI_ORBIT_HARMONICS
+                && body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
     for (int k = 0; good && k < body->harmonics; ++k) {
         good = body->order[k] >= 1.0 && body->order[k] == floor(body->order[k])
                && is_finite(body->modes, body->cosine + (ptrdiff_t)k * body->modes)
@@ -36,7 +36,8 @@ static bool is_body(const vi_orbit_body *body)
     for (int j = 0; good && j < body->modes; ++j) {
         good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
                && isfinite(body->damping_ratio[j] + body->held[j])
-               && (body->natural[j] > 0.0 || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
+               && (body->natural[j] > 0.0
+                   || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
         good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0
@@ -354,18 +355,30 @@ void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3])
 {
     const vi_orbit_body *body = response->body;
     const int32_t contact = response->train->contact[i];
+    const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
     const double phase = response->train->phase[i], direction = body->direction[contact];
-    vi_orbit_gap gap;
-    vi_orbit_steady_gap(response, contact, &gap);
+    double level = 0.0, stop[3];
+    for (int j = 0; j < body->modes; ++j) {
+        level += shape[j] * response->level[j];
+    }
     at[0] = at[1] = at[2] = 0.0;
     for (int k = 0; k < body->harmonics; ++k) {
+        const double *along = response->steady_cos[k], *across = response->steady_sin[k];
         const double w = body->order[k] * body->angular_frequency, angle = body->order[k] * phase;
-        const double x = gap.cosine[k] * cos(angle) + gap.sine[k] * sin(angle);
+        const double c = cos(angle), s = sin(angle);
+        double x = 0.0, v = 0.0;
+        for (int j = 0; j < body->modes; ++j) {
+            x += shape[j] * (along[j] * c + across[j] * s);
+            v += shape[j] * (w * (across[j] * c - along[j] * s));
+        }
         at[0] += x;
-        at[1] += direction * w * (gap.sine[k] * cos(angle) - gap.cosine[k] * sin(angle));
+        at[1] += direction * v;
         at[2] -= direction * w * w * x;
     }
-    at[0] = direction * (at[0] + gap.level - body->position[contact]);
+    vi_orbit_stop(body, contact, phase, stop);
+    at[0] = direction * (at[0] - stop[0] + level - body->position[contact]);
+    at[1] -= direction * stop[1];
+    at[2] -= direction * stop[2];
 }
 
 /* Modal force of all sines at a phase of the clock. */

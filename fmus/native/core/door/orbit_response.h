@@ -9,8 +9,8 @@
 #include "motion/flow.h"
 #include "sizes.h"
 
-/* Most impacts of an orbit; states of a body. */
-enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_STATES = 2 * VI_MODES };
+/* Most impacts of an orbit and contacts of a body; states of a body. */
+enum { VI_ORBIT_IMPACTS = 64, VI_ORBIT_CONTACTS = 32, VI_ORBIT_STATES = 2 * VI_MODES };
 
 /* Results of a call. */
 enum {
@@ -56,8 +56,8 @@ typedef struct {
     vi_mode mode[VI_MODES];
     double steady_cos[VI_ORBIT_HARMONICS][VI_MODES], steady_sin[VI_ORBIT_HARMONICS][VI_MODES], level[VI_MODES];
     double start[VI_MODES][2]; /* displacement and velocity just after a unit impulse that recurs in each train */
-    vi_complex part[VI_PORTS][VI_TERMS]; /* coupled: terms just after such an impulse at each contact */
-    double state[VI_PORTS][VI_ORBIT_STATES]; /* the same without terms: displacements and velocities */
+    vi_complex part[VI_ORBIT_CONTACTS][VI_TERMS]; /* coupled: terms just after such an impulse at each contact */
+    double state[VI_ORBIT_CONTACTS][VI_ORBIT_STATES]; /* the same without terms: displacements and velocities */
 } vi_orbit_response;
 
 /* Find the modes and their steady responses only. Returns one of VI_ORBIT_*. */

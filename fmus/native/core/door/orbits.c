@@ -67,8 +67,7 @@ static void answer(const vi_orbit_response *response, int i, int k, double g[3])
         const double weight = factor * shape[j];
         g[0] += weight * x[j];
         g[1] += weight * v[j];
-        g[2] += weight
-                * (vi_orbit_evening(response, contact[k], j) - response->mode[j].stiffness * x[j] - drag[j]);
+        g[2] += weight * (vi_orbit_evening(response, contact[k], j) - response->mode[j].stiffness * x[j] - drag[j]);
     }
 }
 

@@ -67,7 +67,7 @@ static int advance(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block
         bool needs_event = false, ends = false, early = false;
         double reached = b->time;
         const int status = f->step(f->instance, b->time, end - b->time, false, &needs_event, &ends, &early, &reached);
-        if (status == STATUS_DISCARD) {
+        if (status == STATUS_DISCARD || (ends && went_well(status))) {
             b->time = reached;
             return ends ? VI_HOLD_ENDS : VI_HOLD_LIMIT;
         }

@@ -222,11 +222,13 @@ static void sine_middles(const vi_one_mode *tables, vi_lane_sines *sines, int fu
 {
     double scale = 1.0;
     for (int n = 0; n <= VI_SINE_ORDER; ++n, scale *= 2.0) {
-        const vi_lane_array *own = tables->taylor[n], *its = sines->taylor[n][further];
-        const bool has_own = n <= VI_LANE_ORDER;
-        const double term[VI_PARTS] = {has_own ? scale * own[VI_OF_Q][lane] : 0.0,
-                                       has_own ? scale * own[VI_OF_P][lane] : 0.0,
-                                       scale * its[VI_OF_ITS_COSINE][lane], scale * its[VI_OF_ITS_SINE][lane], 0.0};
+        const vi_lane_array *its = sines->taylor[n][further];
+        double term[VI_PARTS] = {[VI_OF_COSINE] = scale * its[VI_OF_ITS_COSINE][lane],
+                                 [VI_OF_SINE] = scale * its[VI_OF_ITS_SINE][lane]};
+        if (n <= VI_LANE_ORDER) {
+            term[VI_OF_Q] = scale * tables->taylor[n][VI_OF_Q][lane];
+            term[VI_OF_P] = scale * tables->taylor[n][VI_OF_P][lane];
+        }
         double middle[VI_PARTS];
         shift(one, term, middle);
         for (int part = 0; part < VI_SINE_PARTS; ++part) {

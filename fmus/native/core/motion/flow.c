@@ -320,7 +320,8 @@ static void bound_split(vi_segment *s)
         s->slow_part = fabs(s->v + mode->fast * s->x) / (2.0 * mode->rate);
         s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
     }
-    s->scale = s->swell * fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
+    s->scale = (vi_mode_grows(mode) ? s->swell * fabs(s->x) : fabs(s->x)) + mode->steady_amplitude + fabs(s->level)
+               + fabs(s->level_rate) * s->length;
     double power = s->length;
     for (int n = 2; n <= vi_segment_degree(s); ++n) {
         power *= s->length;

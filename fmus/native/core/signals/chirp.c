@@ -7,9 +7,23 @@ static const vi_twofold TWO_PI = {6.283185307179586232, 2.449293598294706414e-16
 /* (17! 1e-13)^(1/17): a derivative of order 17 up to c^17 leaves a remainder of 1e-13 after 1.2337 / c. */
 static const double REACH = 1.2337;
 
-/* Largest argument of the series of (exp(z) - 1) / z, and its number of terms: the next one is below 1e-33. */
+/* Coefficients of (exp(z) - 1) / z: 1 / (n + 1)! to 32 digits. Up to z = SERIES_END the next one is below 1e-33. */
 static const double SERIES_END = 0.5;
-enum { SERIES_TERMS = 26 };
+static const vi_twofold SERIES[] = {
+    {1.0, 0.0}, {0.5, 0.0}, {0.16666666666666666, 9.25185853854297e-18},
+    {0.041666666666666664, 2.3129646346357427e-18}, {0.008333333333333333, 1.1564823173178714e-19},
+    {0.001388888888888889, -5.300543954373577e-20}, {0.0001984126984126984, 1.7209558293420705e-22},
+    {2.48015873015873e-05, 2.1511947866775882e-23}, {2.7557319223985893e-06, -1.858393274046472e-22},
+    {2.755731922398589e-07, 2.3767714622250297e-23}, {2.505210838544172e-08, -1.448814070935912e-24},
+    {2.08767569878681e-09, -1.20734505911326e-25}, {1.6059043836821613e-10, 1.2585294588752098e-26},
+    {1.1470745597729725e-11, 2.0655512752830745e-28}, {7.647163731819816e-13, 7.03872877733453e-30},
+    {4.779477332387385e-14, 4.399205485834081e-31}, {2.8114572543455206e-15, 1.6508842730861433e-31},
+    {1.5619206968586225e-16, 1.1910679660273754e-32}, {8.22063524662433e-18, 2.2141894119604265e-34},
+    {4.110317623312165e-19, 1.4412973378659527e-36}, {1.9572941063391263e-20, -1.3643503830087908e-36},
+    {8.896791392450574e-22, -7.911402614872376e-38}, {3.868170170630684e-23, -8.843177655482344e-40},
+    {1.6117375710961184e-24, -3.6846573564509766e-41}, {6.446950284384474e-26, -1.9330404233703465e-42}
+};
+enum { SERIES_TERMS = sizeof SERIES / sizeof SERIES[0] };
 
 static vi_twofold twofold(double number)
 {
@@ -20,13 +34,12 @@ static vi_twofold twofold(double number)
 static vi_twofold grown(vi_twofold z)
 {
     int halvings = 0;
-    vi_twofold y = z, sum = twofold(1.0);
+    vi_twofold y = z, sum = SERIES[SERIES_TERMS - 1];
     for (; fabs(y.high) > SERIES_END; ++halvings) {
         y = (vi_twofold){0.5 * y.high, 0.5 * y.low};
     }
-    for (int n = SERIES_TERMS; n >= 1; --n) {
-        sum = vi_twofold_quotient(vi_twofold_product(sum, y), twofold((double)n + 1.0));
-        sum = vi_twofold_sum(sum, twofold(1.0));
+    for (int n = SERIES_TERMS - 2; n >= 0; --n) {
+        sum = vi_twofold_sum(vi_twofold_product(sum, y), SERIES[n]);
     }
     if (halvings == 0) {
         return sum;

@@ -6,12 +6,12 @@
 
 static const double PI = 3.141592653589793116;
 
-/* Instants of the spline in the shortest period. The first image of a frequency w lies at ws - w, ws = 8 w or more; its
- * power is below (1/7)^8 = 1.7e-7 of the density at w. */
+/* Instants of the spline in the shortest period. The first image of a frequency w lies at 7 w or above. Its power is
+ * below (1/7)^8 = 1.7e-7 of the density at w. */
 static const double INSTANTS_PER_PERIOD = 8.0;
 
-/* Kaiser's window with 70 dB: the response is within 3e-4 of the largest one, and edges of the density become slopes
- * of EDGE / size times the upper end of the band. */
+/* Kaiser's window with 70 dB: the response is right to 3e-4 of the largest one. Edges of the density become slopes of
+ * EDGE / size times the upper end of the band. */
 static const double KAISER = 6.755;
 static const double EDGE = 69.1;
 enum { BESSEL_TERMS = 20 };
@@ -25,11 +25,6 @@ static const uint64_t CHANNEL = UINT64_C(0x466f726365730000);
 /* Coefficients that blocks have in common: an interval of the spline needs one before it and two after it. One more makes
  * the number even, for white numbers come in pairs. */
 enum { NEIGHBOURS = 4 };
-
-double vi_random_interval(double high)
-{
-    return 2.0 * PI / (INSTANTS_PER_PERIOD * high);
-}
 
 /* ---- the density ---- */
 
@@ -102,8 +97,8 @@ static int size_for(const vi_density *density)
 
 /* ---- the filter ---- */
 
-/* The response of the filter at frequency j of a transform, before its length is limited: sqrt(S pi / interval), over
- * the transfer function sinc(w interval / 2)^4 of the spline. */
+/* The response of a filter of any length at frequency j of a transform: sqrt(S pi / interval) over that of the spline,
+ * sinc(w interval / 2)^4. */
 static double response_at(const vi_random *r, const vi_transform *transform, const vi_density *density, int j,
                           int *place)
 {
@@ -149,7 +144,7 @@ static void limit(vi_random *r, const vi_transform *transform)
     vi_transform_forward(transform, size, r->first, r->second);
 }
 
-/* Variance of the spline, averaged over time, for the response in first[]: the images of a B-spline add up to a sum of
+/* Variance of the spline, averaged over time, for the response in first[]. The images of a B-spline add up to a sum of
  * cosines of w interval. */
 static double variance(const vi_random *r, const vi_transform *transform)
 {
@@ -169,7 +164,7 @@ void vi_random_shape(vi_random *r, vi_transform *transform, const vi_density *de
 {
     r->size = size_for(density);
     r->known = false;
-    r->interval = vi_random_interval(density->high);
+    r->interval = 2.0 * PI / (INSTANTS_PER_PERIOD * density->high);
     vi_transform_prepare(transform, r->size);
     int at = 0;
     for (int j = 0; j <= r->size / 2; ++j) {

@@ -39,9 +39,6 @@ typedef struct {
 /* Narrowest band that the filter resolves, as a part of its upper end. */
 #define VI_NARROWEST_BAND 0.00390625
 
-/* Interval of the spline for a band up to this angular frequency, s: an eighth of the shortest period. */
-double vi_random_interval(double high);
-
 /* The integral of the density over the band: the variance of the signal. */
 double vi_density_variance(const vi_density *density);
 

@@ -211,3 +211,15 @@ def test_impacts_that_fall_together_are_said() -> None:
     phases = np.array([1.0, 1.0 + 2.0 * np.pi])
     with pytest.raises(OrbitError, match="expected impacts one after the other, got two at one phase"):
         shortened(np.array([0.1, 0.2]), phases, 1)
+
+
+def test_a_body_may_have_32_contacts() -> None:
+    one = np.ones(1)
+    stops = [Contact(one, 1.0, 0.8 if k == 31 else 9.0, 0.75) for k in range(33)]
+    (orbit,) = closed_form(
+        ImpactingBody(one, 0.04 * one, 0.45 * one, 0.0 * one, 1.1, 0.0, tuple(stops[:32]), one), 1, 31
+    )
+    assert orbit.velocities[0] == pytest.approx(0.952486147774719, rel=1e-12)
+    assert orbit.is_physical
+    with pytest.raises(OrbitError):
+        closed_form(ImpactingBody(one, 0.04 * one, 0.45 * one, 0.0 * one, 1.1, 0.0, tuple(stops), one), 1, 31)

@@ -9,6 +9,7 @@ import pytest
 
 from vibroimpact.fmus.bodies import POINTS_OF_FMU, BodyPoints
 from vibroimpact.fmus.core.modes import chain_modes
+from vibroimpact.fmus.errors import UsageError
 
 STOP = {"contact[1].position": 0.3, "contact[1].restitution": 0.8}
 FORCE = {"forcing.angular_frequency": 2.0, "forcing.phase": 0.1}
@@ -158,3 +159,34 @@ def test_several_bodies_have_natural_frequencies_coupled_or_loose_too() -> None:
     loose = floats | damping | {"mode.angular_frequency[1]": 0.0}
     one = POINTS_OF_FMU["Structure"](loose, integers | {"coupled": True}, 1)
     assert one.natural_frequencies.tolist() == [0.0, 4.0]
+
+
+SINES = {
+    **{"mode.sine[1,1]": 0.2, "mode.sine[1,2]": 0.4, "mode.sine[2,1]": -1.0, "mode.sine[3,2]": 2.0},
+    **{"sine[1].amplitude": 0.5, "sine[1].angular_frequency": 6.0, "sine[1].phase": 0.4},
+    **{"sine[2].amplitude": 0.3, "sine[2].angular_frequency": 0.0, "sine[2].phase": 0.0},
+    **{"sine[3].amplitude": 0.1, "sine[3].angular_frequency": 6.0, "sine[3].phase": -0.2},
+    **{"stop[1].amplitude": 0.05, "stop[1].angular_frequency": 4.0, "stop[1].phase": 0.7},
+}
+
+
+def test_a_structure_has_its_further_sines_constant_forces_and_moving_stops() -> None:
+    found, plain = body("Structure", **SINES).mass_normalised(), body("Structure").mass_normalised()
+    assert list(found.harmonics) == [1, 2, 3]
+    assert not found.has_one_sine
+    assert plain.has_one_sine
+    time, phase = 0.77, 2.0 * 0.77 + 0.1  # of the clock
+    pushed = sum((force * np.exp(1j * order * phase)).real for order, force in found.harmonics.items())
+    expected = 0.5 * np.array([0.7, -0.3]) * np.cos(phase)
+    expected += 0.5 * np.array([0.2, 0.4]) * np.cos(6.0 * time + 0.4)
+    expected += 0.1 * np.array([0.0, 2.0]) * np.cos(6.0 * time - 0.2)
+    np.testing.assert_allclose(pushed, expected, atol=1e-15)
+    np.testing.assert_allclose(found.held, plain.held + np.array([-0.3, 0.0]), atol=1e-16)
+    assert found.contacts[0].stop_at(phase) == pytest.approx(0.3 + 0.05 * np.cos(4.0 * time + 0.7), abs=1e-15)
+
+
+@pytest.mark.parametrize("name", ["sine[1]", "stop[1]"])
+def test_sines_without_the_period_of_the_clock_have_no_orbits(name: str) -> None:
+    apart = body("Structure", **SINES | {f"{name}.angular_frequency": 3.0})
+    with pytest.raises(UsageError, match=rf"{name[:-3]}\[1\]\.angular_frequency: expected a whole multiple"):
+        apart.mass_normalised()

@@ -32,8 +32,9 @@ CHIRPS = {
 }
 
 
-def chirp_value(kind: SignalKind, begin: float, first: float, last: float, duration: float, at: Any) -> Any:
+def chirp_value(given: tuple[Any, ...], at: Any) -> Any:
     """Return cos(phase + 1/2) of a chirp with 40 digits."""
+    kind, begin, first, last, duration = given
     since, w, end, span = (mpmath.mpf(number) for number in (at - begin, first, last, duration))
     if kind is SignalKind.chirp_linear:
         phase = w * since + (end - w) / span * since**2 / 2
@@ -60,13 +61,13 @@ def test_a_chirp_is_that_of_forty_digits_also_at_its_end(given: tuple[Any, ...])
         for part in (0.0, 0.1, 0.7, 0.999999):
             at = begin + part * duration
             got = signal.values([at])[0]
-            assert abs(got - chirp_value(*given, mpmath.mpf(at))) < 4e-16
+            assert abs(got - chirp_value(given, mpmath.mpf(at))) < 4e-16
         # pieces from a late place, where a phase of one number would have lost its digits
         pieces = signal.pieces(begin + 0.7 * duration, begin + duration, most=20)
         for k in range(len(pieces.length)):
             start = mpmath.mpf(pieces.start[k, 0]) + mpmath.mpf(pieces.start[k, 1])
             for u in (0.5 * pieces.length[k], pieces.length[k]):
-                assert abs(value(pieces, k, u) - chirp_value(*given, start + mpmath.mpf(u))) < 1.05e-13
+                assert abs(value(pieces, k, u) - chirp_value(given, start + mpmath.mpf(u))) < 1.05e-13
 
 
 def test_a_half_sine_is_exact_and_zero_outside() -> None:
@@ -134,12 +135,12 @@ def random_signal(seed: int = 7, low: float = 0.0, **density: Any) -> Signal:
     return Signal(SignalKind.random, seed=seed, angular_frequency=low, end_angular_frequency=HIGH, **density)
 
 
-def densities(signal: Signal, count: int, size: int) -> tuple[Array, Array]:
+def densities(signal: Signal, count: int, size: int) -> tuple[NDArray[np.floating[Any]], Array]:
     """Return the bins of size `size`, rad/s, and estimates of the one-sided density from `count` separate blocks."""
     values = signal.values(np.arange(count * size) * INTERVAL).reshape(count, size)
     window = np.hanning(size)
     spectrum = np.fft.rfft(values * window, axis=1)
-    power = np.abs(spectrum) ** 2 * INTERVAL / (np.pi * np.sum(window**2))
+    power: Array = np.abs(spectrum) ** 2 * INTERVAL / (np.pi * np.sum(window**2))
     return 2.0 * np.pi * np.fft.rfftfreq(size, INTERVAL), power
 
 

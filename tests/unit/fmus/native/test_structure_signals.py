@@ -6,11 +6,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from support.component_fmu import ComponentFmu, stop
+from support.component_fmu import LOWER, ComponentFmu, stop
 from support.modal_fmu import structure_fmu
 
 from vibroimpact.fmus.core.signals import Signal, SignalKind
@@ -19,7 +20,7 @@ from vibroimpact.fmus.packaging.structure_file import structure_file
 
 NATURAL, RATIO = 3.0, 0.05
 #: One mode on which signal 1 acts with its amplitude, and a free mass.
-MODE = {
+MODE: dict[str, Any] = {
     "mode.angular_frequency": [NATURAL],
     "mode.damping_ratio": [RATIO],
     "mode.contact_shape": [[1.0]],
@@ -27,11 +28,10 @@ MODE = {
     "mode.base": [-1.0],
     "mode.signal": [[1.0]],
 }
-FREE = {**MODE, "mode.angular_frequency": [0.0], "mode.damping_ratio": [0.0]}
-KINDS = {kind.name: kind for kind in SignalKind}
+FREE: dict[str, Any] = {**MODE, "mode.angular_frequency": [0.0], "mode.damping_ratio": [0.0]}
 
 
-def signal(kind: SignalKind, k: int = 1, **more: float) -> dict[str, float]:
+def signal(kind: SignalKind, k: int = 1, **more: Any) -> dict[str, float]:
     return {f"signal[{k}].{name}": value for name, value in {"kind": int(kind), **more}.items()}
 
 
@@ -39,13 +39,13 @@ def energy_error(fmu: ComponentFmu) -> float:
     """Return the energy that the balance misses, relative to the work of the forces."""
     terms = [("kinetic", 1), ("potential", 1), ("forcing_work", -1), ("damping_loss", 1), ("contact_loss", 1)]
     sizes = [sign * fmu.get(f"energy.{name}") for name, sign in terms]
-    return abs(sum(sizes)) / sum(map(abs, sizes))
+    return float(abs(sum(sizes)) / sum(map(abs, sizes)))
 
 
 @pytest.mark.parametrize("kind", [SignalKind.chirp_linear, SignalKind.chirp_logarithmic])
 def test_a_chirp_moves_a_mode_as_a_quadrature_of_thirty_digits(kind: SignalKind) -> None:
     start, duration, first, last = 0.5, 4.0, 1.0, 20.0
-    band = {"angular_frequency": first, "end_angular_frequency": last}
+    band: dict[str, Any] = {"angular_frequency": first, "end_angular_frequency": last}
     chirp = signal(kind, amplitude=2.0, start=start, duration=duration, phase=0.25, **band)
     with structure_fmu(MODE, {**chirp, "record.energies": True}) as fmu:
         for step in (0.25, 2.0, 4.25):
@@ -123,6 +123,35 @@ def test_a_random_force_moves_a_mode_as_exact_steps_over_its_pieces() -> None:
     pieces = pieces._replace(coefficient=2.0 * pieces.coefficient)
     assert np.allclose(state, exact_steps(pieces, 12.0), rtol=1e-12, atol=1e-13)
     assert error < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flights_over_many_intervals_meet_what_single_segments_meet(seed: int) -> None:
+    force = signal(SignalKind.random, amplitude=2.0, end_angular_frequency=100.0, seed=seed)
+    place = 0.04 * (seed + 1)
+    scene = {**force, **stop(place, 0.7), **stop(-2.0 * place, 0.6, k=2, side=LOWER)}
+    arrays = {
+        "mode.angular_frequency": [2.0, NATURAL],
+        "mode.damping_ratio": [0.0, RATIO],
+        "mode.contact_shape": [[0.5, 1.0]] * 2,
+        "mode.observed_shape": [0.5, 1.0],
+        "mode.signal": [[0.3, 1.0]],
+    }
+    with (
+        structure_fmu(arrays, {**scene, "record.energies": True, "record.extrema": True}) as single,
+        structure_fmu(arrays, {**scene, "record.extrema": True}) as many,
+        structure_fmu(arrays, scene) as unrecorded,
+    ):
+        for _ in range(8):
+            for fmu in (single, many, unrecorded):
+                fmu.step(1.0)
+            assert many.state() == pytest.approx(single.state(), abs=1e-11)
+            assert unrecorded.state() == pytest.approx(single.state(), abs=1e-11)
+            for name in ("record.displacement_max", "record.displacement_min"):
+                assert many.get(name) == pytest.approx(single.get(name), abs=1e-11)
+        counts = [[fmu.get(f"contact[{k}].count") for k in (1, 2)] for fmu in (single, many, unrecorded)]
+        assert counts[0] == counts[1] == counts[2]
+        assert counts[0][0] > 0
 
 
 def test_many_signals_at_once_keep_the_balance_of_energy_through_impacts() -> None:
@@ -206,12 +235,43 @@ def test_an_exported_file_has_signals_and_tables(tmp_path: Path, version: str) -
         assert own.state() != (0.0, 0.0)
 
 
+@pytest.mark.parametrize("version", ["3.0", "2.0"])
+def test_model_exchange_has_the_same_signals(tmp_path: Path, version: str) -> None:
+    arrays = {**MODE, "mode.signal": [[1.0], [1.0]]}
+    loads = {
+        **signal(SignalKind.chirp_linear, amplitude=2.0, duration=5.0, end_angular_frequency=6.0),
+        **signal(SignalKind.random, 2, amplitude=1.0, end_angular_frequency=6.0, seed=5),
+        **stop(0.2, 0.7),
+    }
+    content = structure_file(arrays)
+    path = export_fmu(
+        "Structure", tmp_path / "one.fmu", modes=1, fmi=version, starts=loads, structure=content
+    )
+    ends = []
+    for kind in ("ModelExchange", "CoSimulation"):
+        result = fmpy.simulate_fmu(
+            str(path), fmi_type=kind, stop_time=4.0, output_interval=0.1, solver="CVode",
+            relative_tolerance=1e-9, output=["displacement", "contact[1].count"],
+        )  # fmt: skip
+        ends.append((result["displacement"][-1], result["contact[1].count"][-1]))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-5)
+    assert ends[0][1] > 0
+
+
 @pytest.mark.parametrize(
     ("parameters", "rows", "message"),
     [
         (signal(SignalKind.half_sine), {}, "signal[1].duration: expected a finite number > 0, got 0"),
         ({"signal[3].kind": 9}, {}, "signal[3].kind: expected 0 to 8, got 9"),
         (signal(SignalKind.table, table_count=2), {}, "ascend, got 0 as number 2"),
+        (
+            {
+                **signal(SignalKind.table_cubic, table_count=3),
+                **signal(SignalKind.table_cubic, 2, table_count=2, table_start=2),
+            },
+            {"table.time": [0.0, 1.0, 2.0]},
+            "signal[2].table_start: expected all rows of signal[1], or none of them",
+        ),
         (signal(SignalKind.table, table_count=3, table_start=8191), {}, "expected rows 1 to 8192"),
         (
             signal(SignalKind.random, table_count=2, end_angular_frequency=4.0),

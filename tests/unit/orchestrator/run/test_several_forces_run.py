@@ -239,10 +239,44 @@ def test_a_continuation_goes_on_from_the_phase_of_the_first_sine() -> None:
 
 def test_points_of_a_sweep_run_as_alone() -> None:
     sweep = {"forcing[2].amplitude": {"values": [1.0, 1.5]}, "body.mass": {"values": [3.0, 4.0]}}
-    swept = scene(record={"recorded_periods": 4}, sweep=sweep)
+    swept = scene(record={"recorded_periods": 4}, sweep=sweep, execution={"how": "fused"})
     found = vi.run(swept)
     alone = vi.run(swept.with_values({"sweep": {}, "forcing[2].amplitude": 1.5, "body.mass": 3.0}))
     assert found.strobe_displacement.values[1, 0].tolist() == alone.strobe_displacement.values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("forces", "engine"),
+    [
+        (TWO, "lanes"),
+        ([*TWO, {"signal": "constant", "amplitude": 0.3}], "lanes"),
+        ([TWO[0] | {"angular_frequency": 1.1}, *TWO], "lanes"),
+        ([*TWO, {"signal": "pulse", "shape": "half_sine", "amplitude": 1.0, "duration": 2.0}], "fused"),
+        ([TWO[1] | {"angular_frequency": 0.1 * k} for k in range(1, 10)], "fused"),
+    ],
+)
+def test_sines_and_constants_run_in_lanes_as_fused(forces: list[dict[str, Any]], engine: str) -> None:
+    axes = {
+        "forcing[2].amplitude": {"values": [0.5, 1.0, 1.5]},
+        "stop[1].restitution": {"values": [0.5, 0.8]},
+    }
+    given = {"forcing": forces, "record": {"recorded_periods": 4}, "sweep": axes}
+    found, fused = (run(**given, execution={"how": how}) for how in ("auto", "fused"))
+    assert found.attrs["execution"] == engine
+    assert found.impact_count.values.tolist() == fused.impact_count.values.tolist()
+    assert found.impact_count.values.sum() > 6
+    for name in ("strobe_displacement", "displacement_max", "final_displacement"):
+        assert found[name].values == pytest.approx(fused[name].values, abs=1e-11)
+
+
+def test_a_path_of_several_sines_runs_in_lanes_as_fused() -> None:
+    path = {"start": 1.0, "stop": 1.3, "points": 4, "path": "up"}
+    axes = {"forcing[2].amplitude": path, "stop[1].restitution": {"values": [0.5, 0.8]}}
+    found, fused = (
+        run(record={"recorded_periods": 2}, sweep=axes, execution={"how": how}) for how in ("auto", "fused")
+    )
+    assert found.attrs["execution"] == "lanes"
+    assert found.final_displacement.values == pytest.approx(fused.final_displacement.values, abs=1e-9)
 
 
 # ---- studies and exports ----

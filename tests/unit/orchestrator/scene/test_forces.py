@@ -32,6 +32,16 @@ ONE: Tables = {
 CHAIN = {"kind": "chain", "masses": [1.0, 2.0], "stiffnesses": 1.0}
 BEAM = {"kind": "beam", "length": 2.0, "mass_per_length": 0.5, "flexural_rigidity": 1.0, "modes": 3}
 TIMES = {"record": {"recorded_time": 3.0}}
+CHIRP = {
+    "signal": "chirp",
+    "amplitude": 1.0,
+    "angular_frequency": 0.0,
+    "end_angular_frequency": 2.0,
+    "duration": 9.0,
+}
+PULSE = {"signal": "pulse", "amplitude": 1.0, "duration": 2.0, "shape": "triangle"}
+TABLE = {"signal": "table", "times": [0.0, 1.0, 3.0], "values": [0.0, 1.0, 0.0]}
+RANDOM = {"signal": "random", "density": [[0.5, 0.1], [5.0, 0.2]]}
 
 
 def scene(**changes: Any) -> Scene:
@@ -222,6 +232,22 @@ def test_forces_of_several_bodies_act_at_points() -> None:
     assert integer_parameters(several)["sine[2].of_base"] is True
 
 
+def test_a_force_at_all_points_is_a_force_on_each_mass() -> None:
+    bodies = [{"name": "a", "mass": 1.0, "stiffness": 1.0}, CHAIN | {"name": "b"}]
+    forces = [SINE | {"at": "all"}, *(MEAN | {"at": at} for at in ("a", "b.1", "b.2"))]
+    numbers = float_parameters(scene(body=bodies, stop=[], forcing=forces), None)
+    whole = [numbers[f"mode.forcing[{i}]"] for i in (1, 2, 3)]
+    assert whole == pytest.approx([sum(numbers[f"mode.sine[{k},{i}]"] for k in (1, 2, 3)) for i in (1, 2, 3)])
+    one = scene(body=bodies, stop=[], forcing=SINE | {"at": "all"})
+    assert [float_parameters(one, None)[f"mode.force[{i}]"] for i in (1, 2, 3)] == whole
+    with pytest.raises(SceneError, match=r'forcing\.at: expected "all" for oscillators and chains'):
+        scene(body=[*bodies, BEAM | {"name": "c"}], stop=[], forcing=SINE | {"at": "all"})
+
+
+def test_the_view_of_a_scene_counts_its_forces() -> None:
+    assert repr(scene()) == "<Scene scene: oscillator, 3 forces, 1 stop>"
+
+
 def test_the_stop_of_a_beam_keeps_its_place_and_the_tip_is_observed() -> None:
     several = scene(body=BEAM, stop=[{"position": 1.0, "restitution": 0.5, "location": 0.6}])
     shapes = several.body.assembly
@@ -271,15 +297,15 @@ MISTAKES: list[tuple[Callable[[Tables], None], str]] = [
     (lambda t: t["forcing"][1].pop("angular_frequency"),
      "forcing[2].angular_frequency: expected a number >= 0, got nothing"),
     (sets(2, angular_frequency=1.0), 'forcing[3].angular_frequency: expected a known key'),
-    (sets(2, signal="square"), 'forcing[3].signal: expected "sine" or "constant", got "square"'),
+    (sets(2, signal="square"), 'forcing[3].signal: expected "sine", "constant", "chirp", "pulse", "table" or "random"'),
     (sets(2, at="ball"), "forcing[3].at: expected at for several bodies, got it beside an oscillator"),
     (sets(2, kind="uniform"), 'forcing[3].kind: expected "force" or "base_acceleration" for an oscillator'),
     (sets(2, amplitude=[1.0, 2.0]), "forcing[3].amplitude: expected one number for an oscillator under force"),
     (sets(0, location=0.5), 'forcing[1].location: expected location for a beam with kind = "force"'),
     (gives(forcing=sines(*range(1, 18))), 'forcing: expected at most 16 forces of signal "sine", got 17'),
     (gives(forcing=[MEAN] * 9, **TIMES), 'forcing: expected at most 8 forces of signal "constant", got 9'),
-    (gives(forcing=[*sines(*range(2, 18))]), "forcing: expected at most 15 forces in all, got 16"),
-    (gives(forcing=[*sines(*range(1, 17)), MEAN]), "forcing: expected at most 16 forces in all, got 17"),
+    (gives(forcing=[*sines(*range(2, 18))]), "forcing: expected at most 15 sines and constants in all, got 16"),
+    (gives(forcing=[*sines(*range(1, 17)), MEAN]), "forcing: expected at most 16 sines and constants in all, got 17"),
     (gives(record={"recorded_time": 3.0}), "record.recorded_time: expected recorded_periods in a forced scene"),
     (gives(forcing=[MEAN], record={"recorded_periods": 3}), "record.recorded_periods: expected recorded_time"),
     (gives(execution={"how": "coupled"}), 'execution.how: expected "auto" or "fused" beside several forces'),
@@ -296,6 +322,31 @@ MISTAKES: list[tuple[Callable[[Tables], None], str]] = [
      'sweep."body.mass".path: expected "independent" beside several forces'),
     (gives(forcing=3), "forcing: expected a table, got 3"),
     (gives(forcing=[3, MEAN]), "forcing: expected a table, got 3"),
+    (gives(forcing=[PULSE] * 9, **TIMES), "forcing: expected at most 8 chirps, pulses, tables and random forces"),
+    (gives(forcing=[TABLE | {"times": [*range(4097)], "values": [0.0] * 4097}] * 2, **TIMES),
+     "forcing: expected at most 8192 rows of all tables and densities, got 8194"),
+    (gives(forcing=CHIRP | {"duration": 0.0}, **TIMES), "forcing.duration: expected a number > 0, got 0.0"),
+    (gives(forcing=CHIRP | {"spacing": "logarithmic"}, **TIMES),
+     "forcing.angular_frequency: expected a number > 0 for a logarithmic chirp, got 0"),
+    (gives(forcing=CHIRP | {"seed": 1}, **TIMES), "forcing.seed: expected a known key"),
+    (gives(forcing=PULSE | {"shape": "box"}, **TIMES), 'forcing.shape: expected "half_sine", "triangle" or'),
+    (gives(forcing=PULSE | {"rise": 0.5}, **TIMES), 'forcing.rise: expected rise with shape = "trapezoid"'),
+    (gives(forcing=PULSE | {"shape": "trapezoid", "rise": 1.5}, **TIMES), "forcing.rise: expected at most half of"),
+    (gives(forcing=TABLE | {"times": [0.0, 1.0, 1.0]}, **TIMES),
+     "forcing.times: expected instants that ascend, got 1.0 as number 3, after 1.0"),
+    (gives(forcing=TABLE | {"times": [0.0, 1.0]}, **TIMES), "forcing.values: expected one value for each instant"),
+    (gives(forcing={"signal": "table"}, **TIMES), "forcing: expected times and values, or file, got neither"),
+    (gives(forcing={"signal": "table", "times": [0.0, 1.0]}, **TIMES), "forcing: expected times and values, or file"),
+    (gives(forcing={"signal": "table", "file": "no.csv"}, **TIMES), "forcing.file: expected a file that can be read"),
+    (gives(forcing={"signal": "random"}, **TIMES), "forcing: expected band or density, got neither"),
+    (gives(forcing=RANDOM | {"band": [2.0, 2.0]}, **TIMES), "forcing.band: expected a band whose lower end is below"),
+    (gives(forcing=RANDOM | {"band": [0.1, 3.0]}, **TIMES), "forcing.density: expected a density over all of the band"),
+    (gives(forcing=RANDOM | {"density": [[0.5, -0.1], [5.0, 0.2]]}, **TIMES), "forcing.density[1][2]: expected a pair"),
+    (gives(forcing=RANDOM | {"density": [[0.5, 0.1], [0.5, 0.2]]}, **TIMES),
+     "forcing.density: expected angular frequencies that ascend"),
+    (gives(forcing=RANDOM | {"density": [[0.5, 0.0], [5.0, 0.0]]}, **TIMES), "forcing.density: expected a density > 0"),
+    (gives(forcing=RANDOM | {"seed": -1}, **TIMES), "forcing.seed: expected a whole number from 0 to 1000000000"),
+    (gives(forcing=RANDOM, **TIMES, sweep={"forcing.seed": {"values": [0.5]}}), 'sweep."forcing.seed": expected a'),
 ]  # fmt: skip
 
 

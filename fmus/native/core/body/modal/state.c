@@ -4,11 +4,7 @@
 #include <string.h>
 
 #include "body/landing.h"
-#include "body/modal/growth.h"
-#include "body/modal/stop_motion.h"
-
-/* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
-static const double LITTLE_ROOM = 1e-6;
+#include "modes/growth.h"
 
 /* ---- the model ---- */
 
@@ -69,7 +65,9 @@ void vi_structure_prepare(vi_structure_model *model)
         model->fastest = vi_max(model->fastest, rate);
     }
     model->radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
-    model->growth = VI_GROWING ? vi_growth_of(model) : 0.0;
+    model->growth = VI_GROWING ? vi_growth_of(vi_structure_modes(model), model->mode,
+                                              model->coupled ? (const double (*)[VI_MODES])model->coupling : NULL)
+                               : 0.0;
 }
 
 void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)
@@ -90,7 +88,6 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
     }
-    vi_stop_motions_count_by(s->model);
     state->rest.known = 0;
     state->budget.unfinished = 0;
     vi_structure_prepare(s->model);
@@ -283,12 +280,7 @@ int vi_structure_beyond(const vi_structure *s)
 
 void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
 {
-    int on_stop[VI_PORTS], pair[2];
-    if (vi_stop_motions_jam(s, LITTLE_ROOM, pair)) {
-        vi_complain(message, "contact[%d] and contact[%d]: expected room between their stops, of which one moves, got none at %.17g s",
-                    pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
-        return;
-    }
+    int on_stop[VI_PORTS];
     for (int k = 0; k < s->model->contacts; ++k) {
         on_stop[k] = s->state->status[k] != VI_CONTACT_FREE;
     }

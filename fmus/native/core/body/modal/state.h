@@ -9,6 +9,7 @@
 #ifndef VIBROIMPACT_MODAL_STATE_H
 #define VIBROIMPACT_MODAL_STATE_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -258,6 +259,12 @@ static inline int vi_structure_free_modes(const vi_structure_model *model)
 static inline bool vi_structure_grows(const vi_structure_model *model)
 {
     return VI_GROWING && model->growth > 0.0;
+}
+
+/* Longest flight of a motion that grows, s: its bounds hold for twice this time, e^2 times as large. */
+static inline double vi_growth_reach(const vi_structure_model *model)
+{
+    return vi_structure_grows(model) ? 1.0 / model->growth : HUGE_VAL;
 }
 
 /* shape . vector */

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "body/landing.h"
-#include "body/modal/structure/contact.h"
 #include "motion/majorant.h"
 
 /* ---- the modes of the motions ---- */
@@ -206,8 +205,8 @@ double vi_stop_motions_work(const vi_structure *s, const double impulse[])
 /* Difference of the directions of two rows up to which they count as one line, relative to their sizes. */
 static const double PARALLEL = 16.0 * DBL_EPSILON;
 
-/* Room between the stops of contacts i and k, relative to their displacements, where they hold one line of a body from
- * both sides; HUGE_VAL where they do not. */
+/* Room between the stops of contacts i and k, relative to their displacements. HUGE_VAL unless they limit one line of a
+ * body from both sides, and one of them moves. */
 static double room_between(const vi_structure *s, int i, int k)
 {
     const vi_structure_model *model = s->model;
@@ -236,6 +235,20 @@ bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2])
     return false;
 }
 
+/* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
+static const double LITTLE_ROOM = 1e-6;
+
+bool vi_stop_motions_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
+{
+    int pair[2];
+    if (!vi_stop_motions_jam(s, LITTLE_ROOM, pair)) {
+        return false;
+    }
+    vi_complain(message, "contact[%d] and contact[%d]: expected room between their stops, of which one moves, got none at"
+                         " %.17g s", pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
+    return true;
+}
+
 /* ---- other motions ---- */
 
 /* The instant of time 0, which the phases are for. */
@@ -246,8 +259,7 @@ static vi_instant time_zero(const vi_clock *clock)
     return zero;
 }
 
-/* The motion from now on: it goes on from its phase and its place where a frequency or a velocity changes. */
-static vi_stop_motion continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
+vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
 {
     double low;
     const double time = vi_clock_time_twofold(&s->model->clock, s->state->now, &low);
@@ -268,8 +280,7 @@ static vi_stop_motion continued(const vi_structure *s, const vi_stop_motion *was
     return motion;
 }
 
-/* Displacement of a stop by its motion now, m. */
-static double displacement_by(const vi_structure *s, const vi_stop_motion *motion)
+double vi_stop_motion_displacement(const vi_structure *s, const vi_stop_motion *motion)
 {
     vi_given_mode sine = {.motion = *motion}, driven = {.motion = *motion};
     double sum = 0.0;
@@ -282,60 +293,4 @@ static double displacement_by(const vi_structure *s, const vi_stop_motion *motio
         sum += course_of(s, &driven, s->state->now).displacement;
     }
     return sum;
-}
-
-/* Contact k after its stop has taken another place. */
-static void meet_moved(const vi_structure *s, int k)
-{
-    vi_structure_state *state = s->state;
-    if (state->status[k] == VI_CONTACT_HELD) {
-        vi_structure_release(s, k, 0);
-    }
-    if (state->status[k] == VI_CONTACT_TOUCHING) {
-        state->status[k] = VI_CONTACT_FREE;
-    }
-    state->leaving[k] = 0;
-    const double clearance = vi_structure_clearance(s, k), noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
-    if (state->status[k] == VI_CONTACT_FREE && clearance < -noise) {
-        vi_structure_touch_down(s, k); /* of a stop that yields: a rigid one is refused */
-    } else if (state->status[k] == VI_CONTACT_FREE && clearance <= noise) {
-        state->status[k] = VI_CONTACT_TOUCHING;
-    } else if (state->status[k] == VI_CONTACT_YIELDING && clearance >= 0.0) {
-        vi_structure_separate(s, k, false);
-    } else if (state->status[k] == VI_CONTACT_RECEDING && clearance >= 0.0) {
-        state->status[k] = VI_CONTACT_FREE;
-    }
-}
-
-bool vi_stop_motions_change(const vi_structure *s, const vi_stop_motion motion[], int *contact)
-{
-    vi_structure_model *model = s->model;
-    vi_stop_motion next[VI_PORTS];
-    int moved[VI_PORTS];
-    for (int k = 0; k < model->contacts; ++k) {
-        next[k] = continued(s, &model->stop_motion[k], motion[k]);
-        moved[k] = memcmp(&next[k], &model->stop_motion[k], sizeof next[k]) != 0;
-        const double step = moved[k] ? displacement_by(s, &next[k]) - displacement_by(s, &model->stop_motion[k]) : 0.0;
-        const double noise = VI_ROUNDING * (vi_structure_displacement_size(s, k) + fabs(step));
-        if (model->stop[k] == VI_RIGID_STOP
-            && vi_structure_clearance(s, k) + vi_structure_direction(s, k) * step < -noise) {
-            *contact = k + 1;
-            return false;
-        }
-    }
-    vi_stop_motions_begin(model, next);
-    vi_stop_motions_count_by(model);
-    vi_structure_prepare(model);
-    vi_stop_motions_at(s, s->state->now);
-    for (int k = 0; k < model->contacts; ++k) {
-        if (moved[k] && model->stop[k] != VI_NO_STOP) {
-            meet_moved(s, k);
-        }
-    }
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
-        s->state->origin[j].known = 0;
-    }
-    s->state->rest.known = 0;
-    s->state->budget.unfinished = 0;
-    return true;
 }

@@ -1,7 +1,7 @@
 /* Stops that move. The motion of a stop is given, so no force changes it: it is that of a body of infinite mass.
  *
- * Each given motion is a mode behind those of the bodies: an undamped mode for a sine, a mode without a spring for a
- * velocity and a table. Row k of the shapes has minus the motion of stop k, so shape_k . q is the displacement of the
+ * Each given motion is a mode behind those of the bodies. It is undamped for a sine, and has no spring for a velocity and
+ * a table. Row k of the shapes has minus the motion of stop k, so shape_k . q is the displacement of the
  * contact relative to its stop. Impulses and forces of contacts push the modes of the bodies only. Clearances, bounds,
  * sums of chatter, rest and release then need no case for a moving stop. equations.md 6.13
  */
@@ -36,9 +36,14 @@ double vi_stop_motions_room(const vi_structure *s);
  * They are on both sides of one point of a body. pair: their contacts. */
 bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2]);
 
-/* Take changed motions from now on. Frequencies and velocities change the motion from its present phase and place on;
- * other changes move the stop at once. False, with the contact's number, where a rigid stop would cut a body. */
-bool vi_stop_motions_change(const vi_structure *s, const vi_stop_motion motion[], int *contact);
+/* Complain of such stops where time stands still; false where there are none. */
+bool vi_stop_motions_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
+
+/* A changed motion from now on: it goes on from its phase and its place where a frequency or a velocity changes. */
+vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion);
+
+/* Displacement of a stop by its motion now, m. */
+double vi_stop_motion_displacement(const vi_structure *s, const vi_stop_motion *motion);
 
 /* The motion of the stop of contact k at the present instant. */
 vi_stop_course vi_stop_course_of(const vi_structure *s, int k);

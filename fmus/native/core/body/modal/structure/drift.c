@@ -266,7 +266,7 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     if (first.event == VI_DRIFT_NO_EVENT && at_rest_for_good(s, &drift, &now)) {
         return length;
     }
-    if (vi_unbounded_drift(s, &drift, &u)) {
+    if (vi_structure_grows(s->model) && vi_unbounded_drift(s, &drift, &u)) {
         *event = VI_DRIFT_NO_EVENT;
     }
     if (s->record->extrema) {

@@ -73,13 +73,13 @@ static void find_responses(const vi_structure *s, const vi_random *random)
 
 /* ---- intervals that fit ---- */
 
-/* Is the random load the only one besides constant inputs, and are all contacts clear? */
+/* Is the random load the only one besides constant inputs, are all contacts clear, and does no mode grow by itself? */
 static bool is_simple(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
     const vi_structure_state *state = s->state;
-    if (vi_structure_sines(model) > 0 || model->coupled || model->varies || state->exchange.on || s->record->periods
-        || state->follow_energies) {
+    if (vi_structure_sines(model) > 0 || vi_structure_stops_move(model) || vi_structure_grows(model) || model->coupled
+        || model->varies || state->exchange.on || s->record->periods || state->follow_energies) {
         return false;
     }
     for (int k = 0; k < model->contacts; ++k) {
@@ -88,7 +88,9 @@ static bool is_simple(const vi_structure *s)
         }
     }
     for (int j = 0; j < vi_structure_modes(model); ++j) {
-        if (model->mode[j].force != 0.0 || state->input_rate[j] != 0.0) {
+        const vi_mode *mode = &model->mode[j];
+        const bool may_grow = !(mode->stiffness >= 0.0 && mode->decay >= 0.0);
+        if (may_grow || mode->force != 0.0 || state->input_rate[j] != 0.0) {
             return false;
         }
     }

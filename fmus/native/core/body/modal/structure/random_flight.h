@@ -1,5 +1,5 @@
-/* Flights over many intervals of a random load, far from all stops: each mode steps from interval to interval by its
- * response to the coefficients of the spline.
+/* Flights over many intervals of a random load, far from all stops; equations.md 8.10. Each mode steps from interval to
+ * interval by its response to the coefficients of the spline.
  */
 #ifndef VIBROIMPACT_RANDOM_FLIGHT_H
 #define VIBROIMPACT_RANDOM_FLIGHT_H

@@ -6,7 +6,6 @@
 
 #include "body/landing.h"
 #include "body/modal/forces.h"
-#include "body/modal/growth.h"
 #include "body/modal/held.h"
 #include "body/modal/loads.h"
 #include "body/modal/modal_flight.h"
@@ -223,7 +222,8 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
         return false;
     }
     const bool touches = search_result == VI_SEARCH_CONTACT;
-    const bool ends = vi_unbounded_flight(s, &flight, points, touches, &found.u), meets = touches && !ends;
+    const bool ends = vi_structure_grows(s->model) && vi_unbounded_flight(s, &flight, points, touches, &found.u);
+    const bool meets = touches && !ends;
     const bool whole = !meets && !ends && found.u >= length;
     const double u = whole ? length : found.u; /* the room after the end was only searched */
     if (s->record->extrema) {
@@ -423,7 +423,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
-    if (state->unbounded) {
+    if (vi_structure_grows(s->model) && state->unbounded) {
         return VI_STEP_UNBOUNDED;
     }
     if (VI_STOPS_MOVE && vi_stop_motions_jam(s, VI_ROUNDING, pair)) {

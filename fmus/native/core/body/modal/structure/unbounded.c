@@ -96,8 +96,8 @@ static double drift_beyond(const vi_structure *s, const vi_drift *drift, double 
 
 /* ---- stops out of reach ---- */
 
-/* Distance by which the unforced part of a mode may come closer to a stop from now on, m, for a weight towards the stop;
- * HUGE_VAL where it is not bounded. *leaves: the mode grows away from the stop. */
+/* Distance by which the unforced part of a mode may come closer to a stop from now on, m; HUGE_VAL where it is not
+ * bounded. `weight`: of the mode towards the stop. *leaves: the mode grows away from the stop. */
 static double approach_of(const vi_segment *segment, const vi_part *part, double weight, bool *leaves)
 {
     const vi_mode *mode = segment->mode;
@@ -170,7 +170,8 @@ static bool is_out_of_reach(const vi_structure *s, const vi_flight *flight, cons
 /* May the certificate be asked for? Loads that change, and stops of other components, may bring the motion back. */
 static bool is_left_alone(const vi_structure *s, const vi_flight *flight)
 {
-    if (!s->model->ends_unbounded || s->model->asks || flight->series || s->model->varies
+    const bool lasts = VI_DEGREE == 1 || s->state->loads_last == HUGE_VAL;
+    if (!s->model->ends_unbounded || !lasts || s->model->asks || flight->series || s->model->varies
         || vi_flight_degree(flight) > 1) {
         return false;
     }
@@ -199,11 +200,9 @@ static double first_out_of_reach(const vi_structure *s, const vi_flight *flight,
     return high;
 }
 
-bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u)
+bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets,
+                         double *u)
 {
-    if (!vi_structure_grows(s->model)) {
-        return false;
-    }
     if (s->model->displacement_limit > 0.0) {
         const double passed = flight_beyond(s, flight, *u);
         s->state->unbounded = passed < HUGE_VAL ? VI_BEYOND_LIMIT : VI_BOUNDED;
@@ -218,7 +217,7 @@ bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const v
 
 bool vi_unbounded_drift(const vi_structure *s, const vi_drift *drift, double *u)
 {
-    if (!vi_structure_grows(s->model) || !(s->model->displacement_limit > 0.0)) {
+    if (!(s->model->displacement_limit > 0.0)) {
         return false;
     }
     const double passed = drift->rooted ? HUGE_VAL : drift_beyond(s, drift, *u);

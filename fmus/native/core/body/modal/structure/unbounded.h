@@ -6,9 +6,10 @@
 #include "body/modal/modal_flight.h"
 #include "body/modal/state.h"
 
-/* Does a flight that goes on or `meets` a stop after *u seconds, or a drift, become unbounded before? *u is then the first such instant, and
- * state->unbounded has the reason. */
-bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets, double *u);
+/* Does a motion that may grow become unbounded within *u seconds of a flight, or of a drift? *u is then the first such
+ * instant, and state->unbounded has the reason. `meets`: the flight ends at a contact. */
+bool vi_unbounded_flight(const vi_structure *s, const vi_flight *flight, const vi_point points[], bool meets,
+                         double *u);
 bool vi_unbounded_drift(const vi_structure *s, const vi_drift *drift, double *u);
 
 /* Say why the motion has ended at `time`, s, after VI_STEP_UNBOUNDED. */
