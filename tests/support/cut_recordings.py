@@ -22,6 +22,8 @@ AGREEMENT = {"fused": 1e-5, "coupled": 1e-3}
 stop of another FMU, a cut also changes the steps of a contact."""
 ROOM = 1e-12
 """Time from a border within which an event counts as on it, s: `body/landing.c` for coupled runs, else rounding."""
+EARLIEST = 1e-3
+"""Earliest cut, s: a touch without speed at the start is a row where its contact goes on at the cut."""
 MOST_EVENTS = 40
 """Number of events of a run beyond which chaos may have multiplied rounding by any factor."""
 FAINT = 1e-5
@@ -75,7 +77,7 @@ def cuts_of(whole: Events, end: float, share: float) -> list[float]:
         row = whole.sticks[int(share * len(whole.sticks))]
         last = row[1] if np.isfinite(row[1]) else end
         cuts += [row[TIME], 0.5 * (row[TIME] + last), last]
-    return [float(cut) for cut in cuts if 0.0 < cut < end]
+    return [float(cut) for cut in cuts if EARLIEST < cut < end]
 
 
 def problem_of_cuts(

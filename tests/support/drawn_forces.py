@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from support.drawn_structures import ENERGIES, Tables, drawn_structure, law_of, number, numbers, pick
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 
 LENGTH = 8.0
 """Duration of a record, s, beside common periods of many periods of the first sine."""
@@ -49,7 +50,8 @@ def stop_motion(stop: Tables, times: Floats) -> Floats:
     knots = np.array(stop["motion_times"])
     spline = CubicSpline(knots, stop["motion_values"], bc_type="natural")
     inside = np.clip(times, knots[0], knots[-1])
-    return moved + np.asarray(spline(inside) + spline(inside, 1) * (times - inside))
+    moved += spline(inside) + spline(inside, 1) * (times - inside)
+    return moved
 
 
 def _lone_body(random: np.random.Generator) -> Tables:
@@ -99,7 +101,7 @@ def _natural_frequencies(tables: Tables) -> list[float]:
     """Return the natural angular frequencies of the body that are no zeros, rad/s."""
     free = {name: tables[name] for name in tables if name not in ("forcing", "record")}
     scene = Scene.from_dict(free | {"record": {"recorded_time": 1.0}})
-    if isinstance(tables["body"], list):
+    if isinstance(scene.body, StructureBody):
         return [float(w) for w in scene.body.assembly.frequencies if w > 1e-3]
     body = tables["body"]
     if "masses" not in body:
@@ -129,7 +131,7 @@ def _force(random: np.random.Generator, tables: Tables) -> Tables:
         "table": _table(random) | {"start": start, "interpolation": pick(random, "linear", "cubic")},
         "random": _noise(random) | pick(random, {}, {"start": start, "duration": duration}),
     }
-    return force | keys[signal]
+    return force | dict(keys[signal])
 
 
 def _place(random: np.random.Generator, tables: Tables) -> Tables:
@@ -168,7 +170,8 @@ def _noise(random: np.random.Generator) -> Tables:
     low = number(random, 0.0, 3.0)
     band = [low, low + number(random, 1.0, 20.0)]
     density = {"density": [[band[0], 0.1], [band[1], number(random, 0.1, 1.0)]]}
-    return {"seed": int(random.integers(1000))} | pick(random, {"band": band}, density)
+    noise: Tables = {"seed": int(random.integers(1000))}
+    return noise | dict(pick(random, {"band": band}, density))
 
 
 def _move(random: np.random.Generator, stop: Tables, used: Sequence[float]) -> None:

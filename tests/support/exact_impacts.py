@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count, pairwise
+from typing import TypeAlias
 
 import mpmath as mp
 import numpy as np
@@ -16,14 +17,14 @@ from scipy.optimize import brentq
 
 DIGITS = 70
 """Working digits: 40 are left where a stop is grazed."""
-STEP = 0.5
+STEP = 0.8
 """Step times the fastest rate: gaps have at most one peak in it."""
 PARTS = 16
 """Parts of a step between which the sign of a gap is looked at."""
 MOST_ROUNDS = 80
 """Rounds of Newton's method, one digit each at a graze at least."""
 
-Number = float | mp.mpf
+Number: TypeAlias = float | mp.mpf
 Row = list[mp.mpf]
 
 
@@ -129,7 +130,7 @@ class ExactMotion:
         with mp.workdps(DIGITS):
             self._n, self._stops, self._pressed = len(body.displacement), stops, frozenset[int]()
             self._flows: dict[frozenset[int], _Flow] = {}
-            waves = [*body.sines, *(stop for stop in stops if stop.amplitude)]
+            waves: list[ExactSine | ExactStop] = [*body.sines, *(stop for stop in stops if stop.amplitude)]
             self._inverse = mp.matrix(body.mass) ** -1
             self._free = self._matrix(body, [mp.mpf(wave.angular_frequency) for wave in waves])
             self.time = mp.mpf(0)
