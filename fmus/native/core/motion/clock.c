@@ -77,7 +77,8 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
     const double whole = count * clock->period, since = high - whole, rest = since + clock->origin;
     low += clock->origin_low - count * clock->period_low - fma(count, clock->period, -whole);
     low += sum_error(high, -whole, since) + sum_error(since, clock->origin, rest);
-    const double resolution = 2.0 * DBL_EPSILON * fabs(high);
+    /* a phase at time 0 is rounded too, by as much as a period is */
+    const double resolution = 2.0 * DBL_EPSILON * (fabs(high) + (clock->origin != 0.0 ? clock->period : 0.0));
     if (fabs(rest + low) <= resolution) {
         *instant = (vi_instant){(int64_t)count, 0.0, 0.0};
     } else if (fabs((rest - clock->period) + low) <= resolution) {

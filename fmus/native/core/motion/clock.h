@@ -51,7 +51,7 @@ bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_ins
 void vi_clock_retune(vi_clock *clock, double angular_frequency, vi_instant *now, vi_instant *const past[], int count);
 
 /* The instant of time = high + low, s. An instant closer to a period's start than double precision resolves at this
- * time is moved to that start. Returns false beyond 2^53 periods. */
+ * time, or for this phase at time 0, is moved to that start. Returns false beyond 2^53 periods. */
 bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant *instant);
 
 /* Time of an instant, s, rounded once. */
