@@ -275,8 +275,7 @@ class StructureBody(BodyTable):
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
         """Return the number of modes and of further observed points, and whether the damping couples the modes.
 
-        A motion that grows ends where it can meet no stop any more, if the stops stand still: nothing else acts on the
-        bodies of a scene.
+        A motion that grows ends where it can meet no stop any more. For stops that move the FMU does not know that.
         """
         still = not any(isinstance(stop, StopTable) and stop.moves for stop in stops)
         further = {"further_points": len(self.observed) - 1} if len(self.observed) > 1 else {}

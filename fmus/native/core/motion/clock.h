@@ -50,8 +50,8 @@ bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency, vi_ins
  * of periods stay. past[]: instants before *now, which keep their times. */
 void vi_clock_retune(vi_clock *clock, double angular_frequency, vi_instant *now, vi_instant *const past[], int count);
 
-/* The instant of time = high + low, s. An instant closer to a period's start than double precision resolves at this
- * time, or for this phase at time 0, is moved to that start. Returns false beyond 2^53 periods. */
+/* The instant of time = high + low, s. An instant closer to a period's start than the rounding of this time, or of
+ * the phase at time 0, is moved to that start. Returns false beyond 2^53 periods. */
 bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant *instant);
 
 /* Time of an instant, s, rounded once. */
