@@ -47,7 +47,8 @@ static void look(const vi_structure *s, vi_situation *now)
             && vi_structure_surface_lags(s, k)) {
             now->length = vi_min(now->length, s->contacts[k].relaxation_time);
         }
-        now->kept[k] = s->state->status[k] == VI_CONTACT_YIELDING && vi_structure_is_kept(s, k);
+        now->kept[k] = s->state->status[k] == VI_CONTACT_YIELDING && !vi_structure_stops_move(s->model)
+                       && vi_structure_is_kept(s, k);
         if (now->kept[k]) { /* constant force, since rounding would move it and set the step */
             now->press[k] = (vi_press){VI_PRESS_LINEAR, vi_structure_yield(s, k).force, 0.0, 0.0, 1.0};
         }
