@@ -1,9 +1,12 @@
 #include "motion/sines.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "motion/flow.h"
 
+/* Highest multiple of the clock's frequency whose phase is found as a power of the clock's turn. */
+static const double HIGHEST_HARMONIC = 8.0;
 static const double TWO_PI = 6.283185307179586232;
 static const double TWO_PI_LOW = 2.449293598294706414e-16;
 
@@ -51,6 +54,10 @@ static void take_turns(vi_sine *sine, const vi_clock *clock)
     }
     sine->turns = turns.high;
     sine->turns_low = turns.low;
+    const double whole = floor(turns.high + 0.5);
+    const bool is_whole = whole >= 1.0 && whole <= HIGHEST_HARMONIC
+                          && fabs((turns.high - whole) + turns.low) <= 8.0 * DBL_EPSILON * whole;
+    sine->harmonic = clock->angular_frequency > 0.0 && is_whole ? (int64_t)whole : 0;
 }
 
 /* Turns of the sine in high + low seconds. */

@@ -11,6 +11,7 @@ typedef struct {
     double angular_frequency; /* rad/s, > 0 */
     double turns, turns_low;  /* of this sine in a period of the clock; their sum has twice the digits */
     double start, start_low;  /* turns at the clock's origin, 0 <= start < 1 */
+    int64_t harmonic;         /* turns, where they are a whole number to rounding; else 0. 64 bits, to avoid padding */
 } vi_sine;
 
 /* Start a sine of this phase, rad, at time 0. */

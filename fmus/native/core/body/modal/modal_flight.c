@@ -104,6 +104,36 @@ void vi_point_start(vi_point *point, const vi_flight *flight, const double shape
     point->offset = clearance + sign * start;
 }
 
+/* Find the phases of the further sines at an instant: those of harmonics by powers of the turn of the clock. */
+static void turn_further(const vi_flight *flight, vi_flight_instant *now)
+{
+    const vi_drive *drive = &flight->drive;
+    const double cosine = now->cosine * drive->phase.cosine + now->sine * drive->phase.sine;
+    const double sine = now->sine * drive->phase.cosine - now->cosine * drive->phase.sine;
+    double c = 1.0, s = 0.0; /* of `order` turns */
+    int64_t order = 0;
+    for (int k = 0; k < flight->sines; ++k) {
+        const int64_t harmonic = flight->model->sine[k].harmonic;
+        const vi_phase *start = &drive->further[k];
+        const double angle = start->angle + flight->model->sine[k].angular_frequency * now->u;
+        if (harmonic == 0 || now->u == 0.0) {
+            now->further[k] = now->u == 0.0 ? *start : vi_phase_of(angle);
+            continue;
+        }
+        if (harmonic < order) {
+            c = 1.0;
+            s = 0.0;
+            order = 0;
+        }
+        for (; order < harmonic; ++order) {
+            const double turned = c * cosine - s * sine;
+            s = s * cosine + c * sine;
+            c = turned;
+        }
+        now->further[k] = (vi_phase){angle, start->cosine * c - start->sine * s, start->sine * c + start->cosine * s};
+    }
+}
+
 void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
 {
     const double angle = flight->drive.phase.angle + flight->angular_frequency * u;
@@ -111,7 +141,7 @@ void vi_flight_at(const vi_flight *flight, double u, vi_flight_instant *instant)
     instant->cosine = u == 0.0 ? flight->drive.phase.cosine : cos(angle);
     instant->sine = u == 0.0 ? flight->drive.phase.sine : sin(angle);
     if (flight->sines > 0) {
-        vi_flight_further(flight, u, instant->further);
+        turn_further(flight, instant);
     }
     const int modes = vi_structure_modes(flight->model);
     int j = flight->series && u > 0.0 ? vi_series_parts(flight->segment, modes, u, instant->part) : 0;
