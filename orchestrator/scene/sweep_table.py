@@ -40,6 +40,9 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis
 from vibroimpact.orchestrator.scene.sweep_axes import FORMS, SAMPLE, axes_of, read_axis_table
 from vibroimpact.orchestrator.scene.sweep_models import AxisTable
 
+REALISATIONS, MOST_REALISATIONS = "realisations", 10**6
+"""Key of `[sweep]` for the number of signals of each random force, and the most of them."""
+
 
 def read_sweep(
     document: Mapping[str, Any],
@@ -68,6 +71,42 @@ def read_sweep(
         sound += [] if wrong else [axis]
         found += wrong
     return tuple(sound), [*problems, *found]
+
+
+def with_realisations(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Problem]]:
+    """Return the document with realisations as an axis over the seeds of its random forces, and the problems."""
+    sweep, forces = document.get("sweep"), document.get("forcing")
+    if not isinstance(sweep, dict) or REALISATIONS not in sweep:
+        return document, []
+    count, others = sweep[REALISATIONS], {key: sweep[key] for key in sweep if key != REALISATIONS}
+    tables = (
+        {"forcing": forces}
+        if not isinstance(forces, list)
+        else {f"forcing[{number}]": force for number, force in enumerate(forces, start=1)}
+    )
+    seeds = {
+        f"{key}.seed": force.get("seed", 0)
+        for key, force in tables.items()
+        if isinstance(force, dict) and force.get("signal") == "random"
+    }
+    where = key_path(("sweep", REALISATIONS))
+    problems = []
+    if type(count) is not int or not 2 <= count <= MOST_REALISATIONS:
+        problems.append(Problem(where, f"a whole number from 2 to {MOST_REALISATIONS}", quoted(count)))
+    if not seeds:
+        hint = 'Add a [[forcing]] with signal = "random".'
+        problems.append(Problem(where, "a random force beside realisations", "none", hint))
+    problems += [
+        Problem(where, f"no axis over {key} beside it", "one") for key in seeds.keys() & sweep.keys()
+    ]
+    if problems or not all(type(seed) is int for seed in seeds.values()):
+        return {**document, "sweep": others}, problems
+    together = {"zip": "realisation"} if len(seeds) > 1 else {}
+    axes = {
+        key: {"start": seed, "stop": seed + count - 1, "points": count, **together}
+        for key, seed in seeds.items()
+    }
+    return {**document, "sweep": {**others, **axes}}, []
 
 
 def read_short_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:

@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.models import Record
 from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene.rules.scene import rule_problems
-from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep
+from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep, with_realisations
 
 _SHORT_TABLES = ("body", "link", "forcing", "stop", "sensor", "replay")
 _GENERAL_TABLES = ("component", "connection", "contact", "event")
@@ -50,9 +50,10 @@ def _mixed_problem(general: list[str], short: list[str]) -> Problem:
 
 
 def _read_body(document: Mapping[str, Any], folder: Path) -> Reading:
+    document, wrong = with_realisations(document)
     axes, wrong_axes = read_short_sweep(document) if "sweep" in document else ((), [])
     draft = Draft(document, axes, folder)
-    return Reading(draft, wrong_axes + rule_problems(draft), partial(_parts, draft))
+    return Reading(draft, wrong + wrong_axes + rule_problems(draft), partial(_parts, draft))
 
 
 def _parts(draft: Draft) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -139,6 +140,30 @@ def test_a_random_force_has_its_standard_deviation_and_its_seed() -> None:
     again, other = (run(BAND | {"seed": seed}, stop=[], record=sampled(2.0, time=50.0)) for seed in (3, 4))
     assert force_on(again)[:100] == pytest.approx(force[:100], abs=1e-13)
     assert np.abs(force_on(other)[:100] - force[:100]).max() > 0.1
+
+
+def test_realisations_are_an_axis_over_the_seeds_of_all_random_forces() -> None:
+    two = [BAND | {"seed": 2}, BAND | {"seed": 5, "amplitude": 0.2}]
+    axes = {f"forcing[{k}].seed": {"values": [s, s + 1], "zip": "realisation"} for k, s in ((1, 2), (2, 5))}
+    named, written = (run(two, sweep=sweep) for sweep in ({"realisations": 2}, axes))
+    assert named.final_displacement.values.tolist() == written.final_displacement.values.tolist()
+    assert named.final_displacement.sizes == {"realisation": 2}
+
+
+@pytest.mark.parametrize(
+    ("forcing", "sweep", "line"),
+    [
+        (BAND, {"realisations": 1}, "expected a whole number from 2 to 1000000, got 1"),
+        (BAND, {"realisations": 2.5}, "expected a whole number from 2 to 1000000, got 2.5"),
+        ({"amplitude": 1.0, "angular_frequency": 1.0}, {"realisations": 3}, "expected a random force beside"),
+        (BAND, {"realisations": 3, "forcing.seed": {"values": [1, 2]}}, "expected no axis over forcing.seed"),
+    ],
+)
+def test_realisations_that_cannot_be_are_one_line(
+    forcing: dict[str, Any], sweep: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(SceneError, match=re.escape(f"sweep.realisations: {line}")):
+        run(forcing, sweep=sweep)
 
 
 def test_realisations_are_a_sweep_over_seeds() -> None:
