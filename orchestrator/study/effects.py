@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.run.summary import effects as called_effects
 from vibroimpact.orchestrator.run.summary import laws
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import rule_of
-from vibroimpact.orchestrator.scene.models import DAMPING
+from vibroimpact.orchestrator.scene.models import DAMPING, MOTION_KEYS, StopTable
 from vibroimpact.orchestrator.study.errors import errors_of
 from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.motion import (
@@ -236,6 +236,7 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
         yield _without(scene, name, ", ".join(keys), _zeros(keys))
     if len(scene.forces) > 1:
         yield from _of_forces(scene)
+    yield from _of_moving_stops(scene)
 
 
 def _of_forces(scene: Scene) -> Iterator[Effect | None]:
@@ -249,6 +250,27 @@ def _of_forces(scene: Scene) -> Iterator[Effect | None]:
             yield without
         else:
             yield _without(scene, name, asked_by, _zeros([asked_by]))
+
+
+def _of_moving_stops(scene: Scene) -> Iterator[Effect | None]:
+    """Yield the motion of each stop as an effect; a sine that sets the clock has the amplitude 0."""
+    for place, stop in enumerate(scene.stops):
+        if not isinstance(stop, StopTable) or not stop.moves:
+            continue
+        key, names = scene.stop_keys[place], [name for name in MOTION_KEYS if name in stop.model_fields_set]
+        asked_by = ", ".join(f"{key}.{name}" for name in names)
+        name = f"motion of {key}"
+        yield _without(scene, name, asked_by, _drops_of_stop(place, names)) or _without(
+            scene, name, f"{key}.motion_amplitude", _zeros([f"{key}.motion_amplitude"])
+        )
+
+
+def _drops_of_stop(place: int, names: Sequence[str]) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        for name in names:
+            del document["stop"][place][name]
+
+    return change
 
 
 def _without(

@@ -253,3 +253,15 @@ def test_an_export_moves_as_its_scene_in_another_tool(fmi: str, tmp_path: Path) 
     theirs = simulate_fmu(file, stop_time=20.0, output_interval=0.1, output=["displacement"])
     assert ours.sizes["impact"] > 3
     assert theirs["displacement"][:200] == pytest.approx(ours.displacement.values[:200], abs=1e-9)
+
+
+def test_the_motion_of_a_stop_is_an_effect() -> None:
+    moving = [STOP[0] | {"motion_amplitude": 0.05, "motion_angular_frequency": 1.0}]
+    force = {"amplitude": 1.0, "angular_frequency": 1.0}
+    shaken = scene(force, stop=moving, record={"recorded_periods": 3})
+    names = {effect.name: effect for effect in effects_of(shaken)}
+    without = names["motion of stop[1]"].without
+    assert not without.moving_stop
+    alone = scene([{"signal": "constant", "amplitude": 1.0}], stop=moving, record={"recorded_periods": 3})
+    (found,) = [effect for effect in effects_of(alone) if effect.name == "motion of stop[1]"]
+    assert (found.asked_by, found.without.stops[0].motion_amplitude) == ("stop[1].motion_amplitude", 0.0)
