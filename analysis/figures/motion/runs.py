@@ -89,7 +89,8 @@ def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
         size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8
         axis.plot(inside[:, columns[0]], inside[:, columns[1]], markersize=size, label=words_of_marks, **dots)
     for moving in (stop for stop in observed_stops(dataset) if stop.motion):
-        instants = np.linspace(*np.clip(part, *samples["time"].values[[0, -1]]), _INSTANTS_OF_A_STOP)
+        first, last = np.clip(part, *samples["time"].values[[0, -1]]).tolist()
+        instants = np.linspace(first, last, _INSTANTS_OF_A_STOP)
         above.plot(instants, moving.course(instants)[0], **STOP_LINE)
     for position in fixed_positions(observed_stops(dataset)):
         above.axhline(position, **STOP_LINE)
