@@ -8,15 +8,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PPoly
 
 from vibroimpact.analysis.dataset.clock import CLOCK_PERIODS
 from vibroimpact.analysis.dataset.schema import scene_of
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 Floats = NDArray[np.float64]
 _MOTION = (
@@ -55,6 +57,8 @@ class ShownStop(NamedTuple):
 
 def _spline(times: Sequence[float], values: Sequence[float]) -> PPoly:
     """Return the natural cubic spline, which goes on in straight lines before its first and after its last instant."""
+    from scipy.interpolate import CubicSpline, PPoly  # it takes time, and few scenes have such a stop
+
     inner = CubicSpline(times, values, bc_type="natural")
     first, last = inner(times[0], 1), inner(times[-1], 1)
     before, after = [0.0, 0.0, first, values[0] - first], [0.0, 0.0, last, values[-1]]

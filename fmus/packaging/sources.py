@@ -31,7 +31,7 @@ def source_members(component: ComponentDescription, fmi: str, native: Path = NAT
         files |= {path.name: path for path in folder.glob("*.[ch]") if not path.name.startswith(other)}
     members = {name: path.read_bytes() for name, path in sorted(files.items())}
     members[header_name(component)] = c_header(component).encode("utf-8")
-    members[SIZES_HEADER] = _sizes_header(component).encode("ascii")
+    members[SIZES_HEADER] = _sizes_header(component).encode("ascii") + members[SIZES_HEADER]
     members = {f"sources/{name}": content for name, content in members.items()}
     if fmi.startswith("3"):
         members[BUILD_DESCRIPTION] = _build_description(component, members).encode("utf-8")

@@ -64,6 +64,10 @@ COMMANDS = {
     f'orbit {BIFURCATION} --set "sweep={{}}" --set forcing.angular_frequency=1.4 --figure orbits.png': Shown(
         ("0.9286574832", "2.620714454", "2 physical orbits."), (401, 401)
     ),
+    'orbit examples/ball_on_table.toml --set "sweep={}"': Shown(("4.188790205",)),
+    'follow examples/ball_on_table.toml --parameter "stop[1].motion_amplitude" --from 1.1 --to 1.6': Shown(
+        ("1.5268237005", "4.1887902")
+    ),
     f"campaign {BIFURCATION} -o sweep": Shown(("802 points computed",)),
     "plot branches.nc --over sweep -o both.png": Shown((), (16_040, 9688, 253)),
     f"follow {BIFURCATION} {FREQUENCY} --from 0.3 --to 2.2 {SECOND} -o loci.nc --figure loci.png": Shown(
