@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, Stops
-from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.growing import has_negative
 from vibroimpact.orchestrator.scene.body_models.points import (
     ALL,
@@ -309,7 +308,7 @@ class BodyAlone(StructureBody):
 
     @property
     def _masses(self) -> tuple[float, ...]:
-        return self.body.masses if isinstance(self.body, ChainBody) else ()
+        return getattr(self.body, "masses", ())
 
     def _at(self, place: float) -> PointOfBody:
         return PointOfBody(0, place or self.body.size)  # an oscillator has no places
