@@ -84,11 +84,11 @@ def test_every_variable_of_the_schema_is_stored_with_its_dimensions_type_units_a
                 assert variable.dtype == (str if RULES[name].dtype is object else np.dtype(RULES[name].dtype))
 
 
-def test_outcomes_are_flags_with_the_six_meanings(tmp_path: Path) -> None:
+def test_outcomes_are_flags_with_their_meanings(tmp_path: Path) -> None:
     with netCDF4.Dataset(written(dataset_of([record(1.0)]), tmp_path)) as file:
         outcome = file["outcome"]
-        assert outcome.flag_meanings == "ok stuck impact_limit error crash timeout"
-        assert outcome.flag_values.tolist() == [0, 1, 2, 3, 4, 5]
+        assert outcome.flag_meanings == "ok stuck impact_limit error crash timeout unbounded"
+        assert outcome.flag_values.tolist() == [0, 1, 2, 3, 4, 5, 6]
         assert file["impact_count"].sample_dimension == "impact"
         assert file["stick_count"].sample_dimension == "stick"
         assert file["sample_count"].sample_dimension == "sample"
