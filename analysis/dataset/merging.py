@@ -175,7 +175,7 @@ def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: x
     for variable, meaning in first.variables.items():
         for key in _MEANING if variable in part.variables else ():
             expected, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
-            if expected != got:
+            if expected != got and not (key == "flag_meanings" and _is_longer(expected, got)):
                 raise DatasetError(
                     f"{name}: {variable}: expected {key} {expected!r} as in {first_name}, got {got!r}."
                 )
@@ -186,6 +186,12 @@ def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: x
                 f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, expected))}), "
                 f"got {', '.join(map(str, got))}."
             )
+
+
+def _is_longer(one: object, other: object) -> bool:
+    """Return whether one of two lists of flags has those of the other and more: an older version knew fewer."""
+    lists = sorted((str(one).split(), str(other).split()), key=len)
+    return lists[1][: len(lists[0])] == lists[0]
 
 
 def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...]) -> NDArray[Any]:

@@ -45,8 +45,8 @@ CHOSEN = {
     ),
     "impacts count nothing as loss": (
         "core/body/modal/structure/impact.c",
-        "state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;",
-        "state->energies.contact_loss += 0.0 * before;",
+        "energies->contact_loss += before - vi_structure_kinetic(s) + work;",
+        "energies->contact_loss += 0.0 * (before + work);",
     ),
     "rebound in lanes of AVX2 alone is off by 1e-9": (
         "core/lanes/rounds.h",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -79,4 +80,4 @@ def sweeps_negative(sweep: object, owner: str) -> bool:
 def _is_negative(value: object) -> bool:
     if isinstance(value, list | tuple):
         return any(map(_is_negative, value))
-    return isinstance(value, int | float) and value < 0.0
+    return isinstance(value, int | float) and -math.inf < value < 0.0

@@ -40,7 +40,7 @@ def test_check_reports_all_problems_at_once() -> None:
         check(dataset)
     lines = str(caught.value).splitlines()
     assert len(lines) == 3
-    assert "outcome: expected 0 to 5, got 0 to 9." in lines[0]
+    assert "outcome: expected 0 to 6, got 0 to 9." in lines[0]
     assert "run_index" in lines[1]
     assert "impact_count: expected counts that sum to the 21 rows of impact, got 27." in lines[2]
 
