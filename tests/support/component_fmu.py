@@ -66,11 +66,14 @@ def stop(
 MESSAGES2: dict[int, list[str]] = {}
 
 
-@fmi2CallbackLoggerTYPE
-def LOGGER2(environment: int | None, _: bytes, __: int, ___: bytes, message: bytes) -> None:
-    # FMPy's proxy keeps one logger for the whole life of the process: so this logger lives as long
+def _keep_message(environment: int | None, _: bytes, __: int, ___: bytes, message: bytes) -> None:
+    """Keep what an instance says under its environment."""
     if environment in MESSAGES2:
         MESSAGES2[environment].append(message.decode())
+
+
+#: FMPy's proxy keeps one logger for the whole life of the process: so this logger lives as long.
+LOGGER2 = fmi2CallbackLoggerTYPE(_keep_message)
 
 
 class ComponentFmu:
