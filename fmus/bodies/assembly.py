@@ -137,6 +137,63 @@ class BeamPart(Part):
         return np.asarray(self._modes.shapes(place)[0])
 
 
+class ModesPart(Part):
+    """Given modes, which are the coordinates, each with a mass of 1 kg.
+
+    Parameters
+    ----------
+    natural, ratios : array, shape (mode,)
+        Natural angular frequencies, rad/s, and damping ratios.
+    damping : ndarray, shape (mode, mode)
+        Further modal damping phi' C phi, symmetric, 1/s.
+    shapes : ndarray, shape (point, mode)
+        Mass-normalised shapes at the points, kg^(-1/2).
+    participation : array, shape (mode,)
+        phi' M r, kg^(1/2), for 1 m of the base.
+    displacements, velocities : array, shape (mode,)
+        The start of the modes, kg^(1/2) m and kg^(1/2) m/s.
+    """
+
+    def __init__(
+        self,
+        natural: Sequence[float],
+        ratios: Sequence[float],
+        damping: Floats,
+        shapes: Floats,
+        participation: Sequence[float],
+        displacements: Sequence[float],
+        velocities: Sequence[float],
+    ) -> None:
+        self.masses = np.ones(len(natural))
+        self.displacements = np.array(displacements, dtype=np.float64)
+        self.velocities = np.array(velocities, dtype=np.float64)
+        self._natural, self._ratios = np.array(natural), np.array(ratios)
+        self._damping, self._shapes = damping, shapes
+        self._participation = np.array(participation, dtype=np.float64)
+
+    @property
+    def elements(self) -> list[Element]:
+        """The spring and the dashpot of each mode, and a dashpot for each part of the further damping."""
+        stiffness, damping = self._natural**2, 2.0 * self._natural * self._ratios
+        rows = np.eye(len(self.masses))
+        found = [Element(*each) for each in zip(rows, stiffness.tolist(), damping.tolist(), strict=True)]
+        if self._damping.any():
+            sizes, ways = np.linalg.eigh(self._damping)
+            found += [
+                Element(way, 0.0, float(size)) for size, way in zip(sizes, ways.T, strict=True) if size != 0.0
+            ]
+        return found
+
+    @property
+    def participation(self) -> Floats:
+        """As given."""
+        return self._participation
+
+    def point(self, place: float) -> Floats:
+        """Return the shapes at a point, counted from 1."""
+        return np.asarray(self._shapes[int(place) - 1])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
     """A spring beside a dashpot between two points, each a part (from 0) and a place on it; None is the ground."""

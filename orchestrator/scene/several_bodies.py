@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from vibroimpact.orchestrator.scene.body_models.growing import has_negative, sweeps_negative
+from vibroimpact.orchestrator.scene.body_models.modes import is_listed
 from vibroimpact.orchestrator.scene.body_models.points import BODY_NAME, GROUND
 from vibroimpact.orchestrator.scene.body_models.structure import NOT_IN_STRUCTURES
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
@@ -59,11 +60,11 @@ def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
         is_short = "body" in document and "component" not in document
         is_table = is_short and isinstance(bodies, dict)
         return _renamed({**document, "body": [bodies]}, "body.", "body[1].") if is_table else document
-    if isinstance(bodies, dict) and _may_grow(bodies, document, "body."):
+    if isinstance(bodies, dict) and _stays_listed(bodies, document, "body."):
         return _with_named_body(document)
     if not isinstance(bodies, list) or len(bodies) != 1 or not isinstance(bodies[0], dict):
         return document
-    if _may_grow(bodies[0], document, "body[1]."):
+    if _stays_listed(bodies[0], document, "body[1]."):
         return document
     found = _renamed(deepcopy(document), "body[1].", "body.")
     found["body"] = found["body"][0]
@@ -71,8 +72,10 @@ def with_one_body(document: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _may_grow(body: dict[str, Any], document: Mapping[str, Any], owner: str) -> bool:
-    """Return whether a body that may have negative springs or dashpots, which a beam may not, has one."""
+def _stays_listed(body: dict[str, Any], document: Mapping[str, Any], owner: str) -> bool:
+    """Return whether a body runs in a list: as given modes, or with a negative spring or dashpot, which no beam has."""
+    if is_listed(body):
+        return True
     negative = has_negative(body) or sweeps_negative(document.get("sweep"), owner)
     return negative and body.get("kind") != "beam"
 

@@ -3,13 +3,19 @@
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.growing import PART_MODELS
+from vibroimpact.orchestrator.scene.body_models.modes import ModesBody
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
 from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone, LinkTable, StructureBody
 
 Body = OscillatorBody | ChainBody | BeamBody | StructureBody
 
-BODY_MODELS: dict[str, type[OneBody]] = {"oscillator": OscillatorBody, "chain": ChainBody, "beam": BeamBody}
+BODY_MODELS: dict[str, type[OneBody]] = {
+    "oscillator": OscillatorBody,
+    "chain": ChainBody,
+    "beam": BeamBody,
+    "modes": ModesBody,
+}
 """Models of one `[body]` by kind."""
 
 __all__ = [
@@ -20,6 +26,7 @@ __all__ = [
     "BodyAlone",
     "ChainBody",
     "LinkTable",
+    "ModesBody",
     "OneBody",
     "OscillatorBody",
     "Rayleigh",

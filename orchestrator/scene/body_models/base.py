@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.models import AMPLITUDE, SceneTable, Stop
 
 Stops = Sequence[Stop]
 
-BODY_KINDS = Rule('"oscillator", "chain" or "beam"')
+BODY_KINDS = Rule('"oscillator", "chain", "beam" or "modes"')
 
 
 def of_amplitude(name: str, unit: str, doc: str, each: str = "") -> Rule:

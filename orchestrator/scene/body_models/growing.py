@@ -10,6 +10,7 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.modes import ModesBody
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
 from vibroimpact.orchestrator.scene.fields import Rule
@@ -43,6 +44,7 @@ PART_MODELS: dict[str, type[OneBody]] = {
     "oscillator": GrowingOscillator,
     "chain": GrowingChain,
     "beam": BeamBody,
+    "modes": ModesBody,
 }
 """Models of one of several bodies by kind."""
 

@@ -1,4 +1,4 @@
-"""Points of bodies by name: `"ball"`, `"chain.2"`, `"beam.tip"`."""
+"""Points of bodies by name: `"ball"`, `"chain.2"`, `"beam.tip"`, `"bracket.corner"`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import NamedTuple
 from vibroimpact.orchestrator.scene.body_models.base import NoPoint
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
+from vibroimpact.orchestrator.scene.body_models.modes import ModesBody
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 
 GROUND = "ground"
@@ -17,7 +18,7 @@ ALL = "all"
 """Name of all masses together, for forces, unless a body has this name."""
 BODY_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 
-OneBody = OscillatorBody | ChainBody | BeamBody
+OneBody = OscillatorBody | ChainBody | BeamBody | ModesBody
 
 
 class PointOfBody(NamedTuple):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from vibroimpact.orchestrator.scene.body_models import Body
+from vibroimpact.orchestrator.scene.body_models import Body, ModesBody
+from vibroimpact.orchestrator.scene.body_models.modes import POINT_NAME
 from vibroimpact.orchestrator.scene.body_models.structure import NOT_IN_STRUCTURES
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
@@ -145,8 +146,39 @@ def keys_left_out(part: Draft) -> Iterator[str]:
             yield key
 
 
+def modes_are_whole(draft: Draft) -> Iterator[Problem]:
+    """Given modes have one kind of frequencies, and a number for each mode in every array."""
+    body = draft.body
+    if not isinstance(body, ModesBody):
+        return
+    given = [key for key in ("frequencies", "angular_frequencies") if getattr(body, key) is not None]
+    if len(given) != 1:
+        got = " and ".join(given) or "neither"
+        yield Problem("body", "frequencies, Hz, or angular_frequencies, rad/s", got, "Give one of them.")
+        return
+    shapes = {f"body.shapes.{point}": shape for point, shape in body.shapes.items()}
+    rows = {f"body.damping_matrix[{row}]": each for row, each in enumerate(body.damping_matrix, start=1)}
+    for key, value in {"body.damping_ratio": body.damping_ratio, **shapes, **rows}.items():
+        yield from size_problem(key, value, body.size, "mode")
+    yield from size_problem("body.damping_matrix", body.damping_matrix, body.size, "mode")
+    yield from size_problem("body.participation", body.participation, body.size, "mode")
+    for key in ("displacement_start", "velocity_start"):
+        if len(getattr(body, key)) > body.size:
+            got = f"an array of {len(getattr(body, key))}"
+            yield Problem(f"body.{key}", f"at most {body.size} numbers, one for each mode", got)
+    for point in body.shapes:
+        if not POINT_NAME.fullmatch(point):
+            hint = "A dot is allowed within it."
+            yield Problem("body.shapes", "names of letters, digits, _, - and dots", quoted(point), hint)
+    matrix = body.damping_matrix
+    if matrix != tuple(zip(*matrix, strict=False)):
+        hint = "Gyroscopic terms are not modelled."
+        yield Problem("body.damping_matrix", "a symmetric matrix", "one that is not", hint)
+
+
 BODY_RULES = (
     arrays_have_one_size,
+    modes_are_whole,
     beam_is_given_once,
     observed_point_is_there,
     sampled_variables_are_known,

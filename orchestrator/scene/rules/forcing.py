@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import Body
+from vibroimpact.orchestrator.scene.body_models import Body, ModesBody
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene.forcing_models import (
     MOST_CONSTANTS,
@@ -114,6 +114,13 @@ def _in_a_structure(draft: Draft, each: _Read) -> Iterator[Problem]:
         yield Problem(
             f"{key}.at", 'it with kind = "force"', "it with base_acceleration", "The base moves all bodies."
         )
+    elif force.kind == "base_acceleration":
+        for number, part in enumerate(draft.parts, start=1):
+            if isinstance(part.body, ModesBody) and not part.body.participation:
+                where = f"body[{number}].participation"
+                yield Problem(
+                    where, "it beside base_acceleration", "nothing", "It is phi' M r for 1 m of the base."
+                )
     if isinstance(force.amplitude, tuple):
         got = f"an array of {len(force.amplitude)}"
         yield Problem(f"{key}.amplitude", "one number beside [[body]]", got, "Write the number alone.")

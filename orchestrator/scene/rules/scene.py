@@ -19,6 +19,7 @@ from vibroimpact.orchestrator.scene.rules.body import (
     BODY_RULES,
     arrays_have_one_size,
     beam_is_given_once,
+    modes_are_whole,
     sampled_variables_are_known,
 )
 from vibroimpact.orchestrator.scene.rules.forcing import FORCING_RULES
@@ -55,7 +56,9 @@ def _several_bodies(draft: Draft) -> Iterator[DraftRule]:
     """Yield the rules of several bodies, imported only for scenes with them."""
     from vibroimpact.orchestrator.scene.rules.structure import part_problems, structure_problems
 
-    yield partial(part_problems, rules=(*_DAMPING_RULES, arrays_have_one_size, beam_is_given_once))
+    yield partial(
+        part_problems, rules=(*_DAMPING_RULES, arrays_have_one_size, modes_are_whole, beam_is_given_once)
+    )
     yield structure_problems
     yield sampled_variables_are_known
 

@@ -226,7 +226,7 @@ class _Points:
     def start(self, point: PointOfBody) -> Span | None:
         """Return the lowest and highest start of a point; None where only its FMU knows it, and for a beam."""
         part: OneBody = self._body.parts[point.body]
-        if part.PLACE == "location":
+        if part.KEEPS_MODES and part.IS_STRUCTURE:
             return None if part.displacement_start else (0.0, 0.0)
         key = f"body[{point.body + 1}].displacement_start"
         if not part.PLACE:

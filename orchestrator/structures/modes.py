@@ -1,0 +1,44 @@
+"""Modes of a structure with their mass-normalised shapes at named points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vibroimpact.fmus.bodies.impacting_body import Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """Modes from matrices or from a measurement.
+
+    Attributes
+    ----------
+    natural : ndarray, shape (mode,)
+        Natural angular frequencies, rad/s, ascending; 0 for a rigid body.
+    damping_ratios : ndarray, shape (mode,)
+    damping : ndarray or None, shape (mode, mode)
+        Modal damping phi' C phi besides the ratios, 1/s; None without a matrix.
+    shapes : mapping of str to ndarray, shape (mode,)
+        Mass-normalised shapes at each named point, kg^(-1/2).
+    participation : ndarray or None, shape (mode,)
+        phi' M r for the base, kg^(1/2); None where no direction of the base is given.
+    residual_vectors : int
+        How many of the last modes are residual vectors.
+    error : float or None
+        Largest relative error of the static and dynamic flexibility at the points by the reduction; None if unknown.
+    files : mapping of str to str
+        SHA-256 of each file by its name.
+    remarks : tuple of str
+        What was changed or left out on the way, one sentence each.
+    """
+
+    natural: Floats
+    damping_ratios: Floats
+    damping: Floats | None
+    shapes: Mapping[str, Floats]
+    participation: Floats | None = None
+    residual_vectors: int = 0
+    error: float | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
