@@ -75,8 +75,12 @@ def _size_of(path: Path) -> int:
     refuse_no_text(path)
     try:
         status = path.stat()
+    except ValueError as problem:
+        raise UsageError(f"{path}: expected the path of a file, got one with a null character.") from problem
     except OSError as problem:
-        raise UsageError(f"{path}: expected a file that can be read, got {problem.strerror}.") from problem
+        raise UsageError(
+            f"{path}: expected a file that can be read, got an error: {problem.strerror}."
+        ) from problem
     if not stat.S_ISREG(status.st_mode):
         raise UsageError(f"{path}: expected a regular file, got another kind.")
     if not 0 < status.st_size <= MOST_BYTES:

@@ -28,13 +28,16 @@ def read(content: bytes, wanted: Wanted) -> Found:
     Raises
     ------
     UsageError
-        A line has another form; an entry is in the lower triangle or occurs twice.
+        A line has another form; an entry occurs twice, or one of the diagonal is missing: the file is cut off.
     """
     role = wanted.only()
     entries = read_entries(content)
-    if not len(entries):
-        raise UsageError("expected lines of a row, a column and a number, got none.")
-    unknowns = square(*(int(max(entries["row"].max(), entries["column"].max())),) * 2)
+    last = int(entries["column"][-1]) if len(entries) else 0
+    unknowns = square(last, last)
+    diagonal = int(np.count_nonzero(entries["row"] == entries["column"]))
+    if diagonal != unknowns or entries["row"][-1] != last:
+        got = f"{diagonal} up to column {last}"
+        raise UsageError(f"expected all entries of the diagonal, the last one at the end, got {got}.")
     return Found({role: matrix_of(entries, unknowns, content, 0, mirrored=1.0)})
 
 
@@ -47,6 +50,8 @@ def read_freedoms(content: bytes) -> Found:
         A line has another form; there are too many.
     """
     names = []
+    if not content.endswith(b"\n"):
+        raise UsageError("expected a line break at the end, got none. The file may be cut off.")
     for line, text in enumerate(content.split(b"\n"), 1):
         match = _FREEDOM.fullmatch(text.strip())
         if match is not None:

@@ -39,7 +39,7 @@ def read(path: str, options: Mapping[str, Any]) -> tuple[dict[str, Any], list[An
     """
     content, name = unpacked_content(Path(path))
     wanted = Wanted(dict(options["names"]), frozenset(options["optional"]))
-    return packed(_reader_of(name, content)(content, wanted))
+    return packed(reader_of(name, content)(content, wanted))
 
 
 def read_freedoms(path: str, options: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
@@ -87,7 +87,7 @@ def _gunzipped(content: bytes) -> bytes:
     return b"".join(parts)
 
 
-def _reader_of(name: str, content: bytes) -> Reader:
+def reader_of(name: str, content: bytes) -> Reader:
     """Return the reader of a file by its first bytes, then by the end of its name."""
     for first, reader in FIRST_BYTES:
         if content.startswith(first):

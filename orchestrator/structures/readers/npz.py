@@ -84,7 +84,7 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
         there, expected = member.file_size - file.tell(), math.prod(shape) * kind.itemsize
         if there != expected:
             raise UsageError(f"{member.filename}: expected {expected} bytes of values, got {there}.")
-        values = np.frombuffer(file.read(), dtype=kind)
+        values = np.frombuffer(bytearray(file.read()), dtype=kind)
     return values.reshape(shape, order="F" if by_columns else "C")
 
 

@@ -51,6 +51,8 @@ def read_values(content: bytes, start: int) -> NDArray[np.float64]:
 
 
 def _read(content: bytes, start: int, kind: np.dtype[Any], expected: str) -> Entries:
+    if not content.endswith(b"\n"):
+        raise UsageError("expected a line break at the end, got none. The file may be cut off.")
     stream = io.BytesIO(content)
     stream.seek(start)
     try:
@@ -58,7 +60,7 @@ def _read(content: bytes, start: int, kind: np.dtype[Any], expected: str) -> Ent
             warnings.filterwarnings("ignore", "loadtxt: input contained no data")
             warnings.filterwarnings("error", category=DeprecationWarning)  # a fraction as a row
             text = io.TextIOWrapper(stream, encoding="latin-1", newline=None)
-            found = np.loadtxt(text, dtype=kind, comments=None, ndmin=1, max_rows=MOST_ENTRIES + 1)
+            found = np.loadtxt(text, dtype=kind, comments=None, ndmin=1)
     except (ValueError, DeprecationWarning) as problem:
         for line, fields in _lines(content, start):
             if not _fits(fields, len(kind.fields or ())):
