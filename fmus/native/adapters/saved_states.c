@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
+
 /* A saved state: this header, then the used part of the component's struct. */
 typedef struct {
     char magic[8];
@@ -16,21 +18,9 @@ typedef struct {
 
 static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
 
-static const uint64_t HASH_START = 1469598103934665603u;
-
-/* FNV-1a hash: detects a damaged or foreign state, but no forgery. */
-static uint64_t hash(uint64_t h, const void *data, size_t size)
-{
-    const unsigned char *bytes = data;
-    for (size_t i = 0; i < size; ++i) {
-        h = (h ^ bytes[i]) * 1099511628211u;
-    }
-    return h;
-}
-
 static uint64_t token_hash(void)
 {
-    return hash(HASH_START, vi_this_description.token, strlen(vi_this_description.token));
+    return vi_hash(VI_HASH_START, vi_this_description.token, strlen(vi_this_description.token));
 }
 
 static size_t used_size(const vi_instance *instance)
@@ -43,8 +33,8 @@ static size_t used_size(const vi_instance *instance)
 static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
 {
     const size_t first = offsetof(vi_saved, size);
-    const uint64_t h = hash(HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
-    return hash(h, data, header->size);
+    const uint64_t h = vi_hash(VI_HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
+    return vi_hash(h, data, header->size);
 }
 
 bool vi_state_save(vi_instance *instance, const char *function, void **state)
