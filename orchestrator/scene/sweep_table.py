@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.keys import (
     model_of,
     numeric_key,
     parse_key,
+    table_named,
 )
 from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
 from vibroimpact.orchestrator.scene.problems import (
@@ -180,7 +181,10 @@ def _count(document: Mapping[str, Any], name: str) -> int:
 def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list[str]) -> str:
     if isinstance(entry, dict) and text in SWEEPABLE and entry:
         return f'Put the whole key in quotes: "{text}.{next(iter(entry))}".'
-    table = text.partition(".")[0].partition("[")[0]
+    owner, _, rest = text.partition(".")
+    if named := table_named(owner, document):
+        return f"Did you mean {named}.{rest}?"
+    table = owner.partition("[")[0]
     if table in ARRAY_TABLES and isinstance(document.get(table), list):
         key, count = parse_key(text), _count(document, table)
         if key is None or key.place is None or key.place >= count:
