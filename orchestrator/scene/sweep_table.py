@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.scene.keys import (
     parse_key,
 )
 from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
+from vibroimpact.orchestrator.scene.not_modelled import effect_not_modelled
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -181,6 +182,8 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
     if isinstance(entry, dict) and text in SWEEPABLE and entry:
         return f'Put the whole key in quotes: "{text}.{next(iter(entry))}".'
     table = text.partition(".")[0].partition("[")[0]
+    if said := effect_not_modelled(table, text.rpartition(".")[2].partition("[")[0]):
+        return said
     if table in ARRAY_TABLES and isinstance(document.get(table), list):
         key, count = parse_key(text), _count(document, table)
         if key is None or key.place is None or key.place >= count:
