@@ -29,6 +29,7 @@ from vibroimpact.orchestrator.scene.keys import (
     table_named,
 )
 from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
+from vibroimpact.orchestrator.scene.not_modelled import effect_not_modelled
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -185,6 +186,8 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
     if named := table_named(owner, document):
         return f"Did you mean {named}.{rest}?"
     table = owner.partition("[")[0]
+    if said := effect_not_modelled(table, text.rpartition(".")[2].partition("[")[0]):
+        return said
     if table in ARRAY_TABLES and isinstance(document.get(table), list):
         key, count = parse_key(text), _count(document, table)
         if key is None or key.place is None or key.place >= count:

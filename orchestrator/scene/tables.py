@@ -10,7 +10,7 @@ from typing import Any
 from vibroimpact.orchestrator.scene.draft import Draft, Reading
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, table_named
 from vibroimpact.orchestrator.scene.models import Record
-from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
+from vibroimpact.orchestrator.scene.problems import MODELLED, Problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene.rules.scene import rule_problems
 from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep, with_realisations
 
@@ -79,7 +79,8 @@ def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iter
                 key = f".{next(iter(value))}" if isinstance(value, dict) and len(value) == 1 else ""
                 hint = f"Did you mean {named}{key}?"
             what = "table" if isinstance(value, dict | list) else "key outside any table"
-            yield Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", hint)
+            general = Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", hint)
+            yield problem if problem.expected == MODELLED else general
 
 
 def _applicable(record: Record) -> Record:
