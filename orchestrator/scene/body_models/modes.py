@@ -127,7 +127,7 @@ class ModesBody(BodyTable):
         str | None,
         Rule(
             "the name of a file",
-            doc="a file of modes, TOML, CSV, NetCDF or UFF 55, in place of frequencies and shapes, see [below](#files-of-modes)",
+            doc="a file of modes in place of frequencies and shapes, see [below](#files-of-modes)",
         ),
     ] = None
     origin: Annotated[
