@@ -40,7 +40,7 @@ class Origin(SceneTable):
 
     files: Annotated[
         dict[str, str],
-        Rule("a table of files with their SHA-256", doc="SHA-256 of each file by its name"),
+        Rule("a table of files with their SHA-256", doc="SHA-256 of each file by its name", default="none"),
     ] = {}  # noqa: RUF012  pydantic copies it
     residual_vectors: Annotated[
         int,
@@ -51,12 +51,14 @@ class Origin(SceneTable):
         NotNegative | None,
         Rule(
             sweepable=False,
-            doc="relative error of the flexibility at the points by the reduction",
+            doc="relative error of the flexibility at the points",
             default="unknown",
         ),
     ] = None
     remarks: Annotated[
-        tuple[str, ...], Field(strict=False), Rule("an array of texts", doc="what was changed on the way")
+        tuple[str, ...],
+        Field(strict=False),
+        Rule("an array of texts", doc="what was changed on the way", default="none"),
     ] = ()
 
 
