@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from urllib.parse import quote
 
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.service.ownership import URL_FILE
 from vibroimpact.service.remote import RemoteJob, RemoteRecording, ServiceError
 
@@ -128,6 +128,7 @@ class Service:
             text = Path(scene).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise UsageError(f"{scene}: expected a scene file, got {error}.") from None
+        text = _with_given_modes(text, Path(scene))
         body: dict[str, Any] = {"scene": text, "workers": workers}
         if recordings or score or fit is not None:
             body |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
@@ -326,3 +327,19 @@ def _accepted(answer: httpx.Response) -> httpx.Response:
     except (ValueError, KeyError, TypeError):
         detail, problems = f"{answer.status_code} {answer.reason_phrase}", None
     raise ServiceError(detail, answer.status_code, problems)
+
+
+def _with_given_modes(text: str, path: Path) -> str:
+    """Return the text of a scene with the modes of its bodies as numbers: the service reads no files of bodies."""
+    if "file" not in text and "matrices" not in text:
+        return text
+    # these imports take time, and few scenes need them
+    from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.scene.file import parse_scene_toml
+    from vibroimpact.orchestrator.scene.own_structures import files_named
+
+    try:
+        document = parse_scene_toml(text, str(path))
+    except SceneError:
+        return text  # the service says where
+    return load_scene(path).text if any(files_named(document)) else text

@@ -14,6 +14,8 @@ from vibroimpact.fmus.shipped import components, letters_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.changes import text_with_values
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
+from vibroimpact.orchestrator.scene.forcing_models import forcing_keys
+from vibroimpact.orchestrator.scene.own_structures import files_named
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.service.fmus import FmuStore
 from vibroimpact.service.places import Places
@@ -101,6 +103,18 @@ def _files(document: Mapping[str, Any], shelf: Shelf) -> tuple[dict[str, Path], 
             problems.append(
                 f"{SOURCE}: component.{name}.fmu: expected one of {known}, got {fmu!r}. "
                 "This service loads no FMU but those of the package and its own."
+            )
+    for key in files_named(document):
+        problems.append(
+            f"{SOURCE}: {key}: expected the modes in the scene, got a file. This service reads no files of its machine."
+        )
+    written = document.get("forcing", [])
+    forces = written if isinstance(written, list) else [written]
+    for key, force in zip(forcing_keys(forces), forces, strict=True):
+        if isinstance(force, Mapping) and "file" in force:
+            problems.append(
+                f"{SOURCE}: {key}.file: expected times and values in the scene, got a file. "
+                "This service reads no files of its machine."
             )
     replay = document.get("replay")
     named = replay.get("recordings") if isinstance(replay, Mapping) else None

@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.scene.file import (
     text_of_tables,
 )
 from vibroimpact.orchestrator.scene.keys import coordinate_name, is_missing, with_alternatives
+from vibroimpact.orchestrator.scene.own_structures import with_bodies_in_text, with_given_modes
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -306,6 +307,12 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     changed: tuple[str, ...] = ()
     if changes:
         written, changed = changed_document(written, changes)
+    given, wrong = with_given_modes(written, Path(source).parent)
+    if wrong:
+        raise SceneError(lines_of(wrong, source, changed))
+    if given != written:
+        text = edited_text(text, lambda before: with_bodies_in_text(before, given), given)
+        written = given
     one_body = with_one_body(with_resting_start(written) if for_orbits else written)
     document = with_one_force(one_body)
     fields, problems = read_tables(document, Path(source).parent)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
@@ -42,3 +43,20 @@ class Modes:
     error: float | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+
+    def table(self) -> dict[str, Any]:
+        """Return the table `[body]` of these modes, with where they come from."""
+        found: dict[str, Any] = {
+            "kind": "modes",
+            "angular_frequencies": self.natural.tolist(),
+            "damping_ratio": self.damping_ratios.tolist(),
+            "shapes": {name: shape.tolist() for name, shape in self.shapes.items()},
+        }
+        if self.damping is not None:
+            found["damping_matrix"] = self.damping.tolist()
+        if self.participation is not None:
+            found["participation"] = self.participation.tolist()
+        origin: dict[str, Any] = {"files": dict(self.files), "residual_vectors": self.residual_vectors}
+        origin |= {} if self.error is None else {"error": self.error}
+        origin |= {"remarks": list(self.remarks)} if self.remarks else {}
+        return found | {"origin": origin}

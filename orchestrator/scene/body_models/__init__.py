@@ -3,7 +3,8 @@
 from vibroimpact.orchestrator.scene.body_models.beam import BeamBody, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.chain import ChainBody
 from vibroimpact.orchestrator.scene.body_models.growing import PART_MODELS
-from vibroimpact.orchestrator.scene.body_models.modes import ModesBody
+from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
+from vibroimpact.orchestrator.scene.body_models.modes import ModesBody, Origin
 from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
 from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone, LinkTable, StructureBody
@@ -26,8 +27,10 @@ __all__ = [
     "BodyAlone",
     "ChainBody",
     "LinkTable",
+    "MatricesBody",
     "ModesBody",
     "OneBody",
+    "Origin",
     "OscillatorBody",
     "Rayleigh",
     "StructureBody",

@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.models import AMPLITUDE, SceneTable, Stop
 
 Stops = Sequence[Stop]
 
-BODY_KINDS = Rule('"oscillator", "chain", "beam" or "modes"')
+BODY_KINDS = Rule('"oscillator", "chain", "beam", "modes" or "matrices"')
 
 
 def of_amplitude(name: str, unit: str, doc: str, each: str = "") -> Rule:

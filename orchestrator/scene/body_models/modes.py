@@ -20,6 +20,7 @@ from vibroimpact.orchestrator.scene.models import (
     FiniteArray,
     FiniteNumbers,
     NotNegative,
+    SceneTable,
     StartArray,
 )
 from vibroimpact.orchestrator.scene.sampled_names import each_of
@@ -32,6 +33,33 @@ _ONE_FOR_EACH = "One for each mode."
 POINT_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,39}")
 MOST_POINTS = 1024
 """Largest number of points with shapes."""
+
+
+class Origin(SceneTable):
+    """`body.origin`: where given modes come from."""
+
+    files: Annotated[
+        dict[str, str],
+        Rule("a table of files with their SHA-256", doc="SHA-256 of each file by its name", default="none"),
+    ] = {}  # noqa: RUF012  pydantic copies it
+    residual_vectors: Annotated[
+        int,
+        Field(ge=0, le=MOST_MODES),
+        Rule(doc="how many of the last modes are residual vectors", sweepable=False),
+    ] = 0
+    error: Annotated[
+        NotNegative | None,
+        Rule(
+            sweepable=False,
+            doc="relative error of the flexibility at the points",
+            default="unknown",
+        ),
+    ] = None
+    remarks: Annotated[
+        tuple[str, ...],
+        Field(strict=False),
+        Rule("an array of texts", doc="what was changed on the way", default="none"),
+    ] = ()
 
 
 class ModesBody(BodyTable):
@@ -97,6 +125,17 @@ class ModesBody(BodyTable):
             default="none",
         ),
     ] = ()
+    file: Annotated[
+        str | None,
+        Rule(
+            "the name of a file",
+            doc="a file of modes in place of frequencies and shapes, see [below](#files-of-modes)",
+        ),
+    ] = None
+    origin: Annotated[
+        Origin | None,
+        Rule("a table", doc="where the modes come from; written for bodies by files", default="none"),
+    ] = None
     displacement_start: Annotated[
         StartArray,
         Rule(unit="m", hint=_ONE_FOR_EACH, doc="of the modes, kg^(1/2) m; those left out are 0", default="0"),

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.structures.readers import calculix, freedoms, matlab, matrix_market, npz
+from vibroimpact.orchestrator.structures.readers import (
+    calculix,
+    dmig,
+    freedoms,
+    matlab,
+    matrix_market,
+    npz,
+    op4,
+)
 from vibroimpact.orchestrator.structures.readers.apart import MOST_BYTES
 from vibroimpact.orchestrator.structures.readers.found import Found, packed
 from vibroimpact.orchestrator.structures.readers.wanted import Wanted
@@ -21,6 +29,7 @@ FIRST_BYTES: tuple[tuple[bytes, Reader], ...] = (
     (b"PK\x03\x04", npz.read),
     (b"MATLAB", matlab.read),
     (b"\x89HDF\r\n\x1a\n", matlab.read),
+    *((first, op4.read) for first in op4.FIRST_BYTES),
 )
 SUFFIXES: Mapping[str, Reader] = {
     ".mtx": matrix_market.read,
@@ -28,6 +37,10 @@ SUFFIXES: Mapping[str, Reader] = {
     ".mat": matlab.read,
     ".sti": calculix.read,
     ".mas": calculix.read,
+    ".op4": op4.read,
+    ".pch": dmig.read,
+    ".bdf": dmig.read,
+    ".dat": dmig.read,
 }
 """Readers by the first bytes of a file, then by the end of its name; each takes the content and the wanted matrices."""
 

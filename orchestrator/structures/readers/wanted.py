@@ -9,9 +9,9 @@ from vibroimpact.fmus.errors import UsageError
 
 ROLES = ("stiffness", "mass", "damping")
 _USUAL: Mapping[str, tuple[str, ...]] = {
-    "stiffness": ("stiffness", "k", "kaa", "kaax", "kgg", "kggx"),
-    "mass": ("mass", "m", "maa", "maax", "mgg", "mggx"),
-    "damping": ("damping", "c", "d", "b", "baa", "baax", "bgg", "bggx"),
+    "stiffness": ("stiffness", "k", "kaa", "kaax", "kgg", "kggx", "kxx"),
+    "mass": ("mass", "m", "maa", "maax", "mgg", "mggx", "mxx"),
+    "damping": ("damping", "c", "d", "b", "baa", "baax", "bgg", "bggx", "bxx"),
 }
 """Names of each matrix in lower case, of Nastran's files too; the first of them in a file counts."""
 MOST_LISTED = 8

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
-from vibroimpact.service.scenes import located
+from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.recordings import RecordingStore
+from vibroimpact.service.scenes import Shelf, located, taken_scene
 
 
 @pytest.mark.parametrize(
@@ -88,3 +92,16 @@ def test_no_answer_repeats_more_than_fifty_problems_or_a_megabyte_of_a_key() -> 
     assert len(found) == 51
     assert found[50]["message"] == "and 950 more problems."
     assert max(len(one["message"]) for one in found) <= 1000
+
+
+@pytest.mark.parametrize("head", ["[forcing]", "[[forcing]]"])
+def test_a_table_of_a_force_may_name_no_file(head: str, tmp_path: Path) -> None:
+    # once the error of the scene quoted a line of any file of the machine
+    (tmp_path / "secret").write_text("password, 1\n", encoding="utf-8")
+    text = f"[body]\nmass = 1.0\nstiffness = 1.0\n{head}\nsignal = 'table'\nfile = '{tmp_path / 'secret'}'"
+    shelf = Shelf(Mock(spec=RecordingStore), Mock(spec=FmuStore, folder=tmp_path, names=lambda: ()))
+    with pytest.raises(SceneError) as caught:
+        taken_scene(text, shelf)
+    (problem,) = caught.value.problems
+    assert "forcing.file: expected times and values in the scene, got a file." in problem
+    assert "password" not in problem

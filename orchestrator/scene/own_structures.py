@@ -1,0 +1,143 @@
+"""Bodies by matrices or by files of modes become given modes when a scene is read, so that it needs no file later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
+from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted, read_table
+
+PATHS = ("file", "stiffness", "mass", "damping", "freedoms")
+"""Keys of a body by matrices that name files."""
+START = ("displacement_start", "velocity_start")
+"""Keys of the modes that a body by files may have."""
+
+
+def files_named(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the keys of bodies that name files.
+
+    >>> list(files_named({"body": [{"kind": "modes", "file": "a.uff"}, {"kind": "chain"}]}))
+    ['body[1].file']
+    """
+    for path, body in _bodies(document):
+        kind = body.get("kind")
+        keys = PATHS if kind == "matrices" else ("file",) if kind == "modes" else ()
+        yield from (key_path((*path, key)) for key in keys if key in body)
+
+
+def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
+    """Return a document whose bodies by files have their modes as numbers, and the problems of their tables."""
+    if not any(files_named(document)):
+        return document, []
+    problems: list[Problem] = []
+    found: list[Any] = []
+    for path, body in _bodies(document):
+        names = set(_named_points(document, str(body.get("name", path[0]))))
+        if body.get("kind") == "matrices":
+            found.append(_of_matrices(body, path, folder, names, problems))
+        elif body.get("kind") == "modes" and "file" in body:
+            found.append(_of_modes(body, path, folder, problems))
+        else:
+            found.append(body)
+    written = document["body"]
+    return {**document, "body": found if isinstance(written, list) else found[0]}, problems
+
+
+def with_bodies_in_text(text: str, document: Mapping[str, Any]) -> str:
+    """Return the text of a scene with the bodies of a document, and with the comments of its other tables."""
+    import tomlkit  # the import takes time, and few scenes are written anew
+
+    edited = tomlkit.parse(text)
+    edited["body"] = document["body"]
+    return tomlkit.dumps(edited)
+
+
+def _bodies(document: Mapping[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    bodies = document.get("body")
+    if isinstance(bodies, dict):
+        yield ("body",), bodies
+    for place, body in enumerate(bodies if isinstance(bodies, list) else ()):
+        yield ("body", place), body if isinstance(body, dict) else {}
+
+
+def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
+    """Yield what follows the name of a body in all points of a document."""
+
+    def texts(value: object) -> Iterator[str]:
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, list):
+            for each in value:
+                yield from texts(each)
+
+    tables = [document.get(each) for each in ("stop", "contact", "link", "forcing")]
+    rows = [row for table in tables for row in (table if isinstance(table, list) else [table])]
+    record = document.get("record")
+    for row in (*rows, record):
+        for key in ("at", "between", "observed"):
+            for text in texts(row.get(key) if isinstance(row, dict) else None):
+                owner, _, rest = text.partition(".")
+                if owner == name and rest:
+                    yield rest
+
+
+def _of_matrices(
+    body: dict[str, Any], path: KeyPath, folder: Path, named: set[str], problems: list[Problem]
+) -> dict[str, Any]:
+    """Return the modes of a body by matrices as its table."""
+    from vibroimpact.orchestrator.structures.find import find_modes  # scipy takes time
+    from vibroimpact.orchestrator.structures.request import Request
+
+    kept = {key: body[key] for key in ("name", *START) if key in body}
+    table = read_table(
+        MatricesBody, {key: value for key, value in body.items() if key not in kept}, path, problems
+    )
+    if table is None:
+        return body
+    rayleigh = table.rayleigh
+    request = Request(
+        stiffness=table.stiffness,
+        mass=table.mass,
+        damping=table.damping,
+        file=None if table.file is None else Path(table.file),
+        freedoms=None if table.freedoms is None else Path(table.freedoms),
+        folder=folder,
+        points={name: {at: 1.0} if isinstance(at, str) else at for name, at in table.points.items()},
+        named=tuple(sorted(named - table.points.keys())),
+        modes=table.modes,
+        residual=table.residual,
+        base=table.base,
+        damping_ratio=table.damping_ratio,
+        rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
+    )
+    try:
+        modes = find_modes(request)
+    except UsageError as error:
+        problems.append(_problem(path, error))
+        return body
+    return {**kept, **modes.table()}
+
+
+def _of_modes(body: dict[str, Any], path: KeyPath, folder: Path, problems: list[Problem]) -> dict[str, Any]:
+    """Return the modes of a file as a table, with the keys that the body has itself."""
+    from vibroimpact.orchestrator.structures.find import modes_of_file
+
+    file = body["file"]
+    if not isinstance(file, str):
+        problems.append(Problem(key_path((*path, "file")), "the name of a file", quoted(file)))
+        return body
+    try:
+        modes = modes_of_file(folder / file)
+    except UsageError as error:
+        problems.append(_problem((*path, "file"), error))
+        return body
+    return modes.table() | {key: value for key, value in body.items() if key != "file"}
+
+
+def _problem(path: KeyPath, error: UsageError) -> Problem:
+    """Return the problem that the error of a file is."""
+    expected, _, got = str(error).partition(", got ")
+    return Problem(key_path(path), expected.removeprefix("expected "), got.removesuffix("."))
