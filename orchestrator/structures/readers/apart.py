@@ -5,6 +5,7 @@ The process has limits of time and memory, writes nothing and has no network (`f
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from collections.abc import Callable, Mapping, Sequence
@@ -52,8 +53,8 @@ def read_file_apart(
     Raises
     ------
     UsageError
-        The file is missing, no regular file, too large, refused by its reader, crashes its library, or is not read
-        within the limits; the text begins with its path.
+        The file is missing, too large, refused by its reader, crashes its library, or is not read within the limits.
+        The text begins with its path.
     """
     size = _size_of(path)
     seconds = SECONDS + size / RATE
@@ -70,8 +71,15 @@ def read_file_apart(
     raise UsageError(f"{path}: {_reason(answer, seconds)}")
 
 
+def content_hash(path: Path) -> str:
+    """Return the SHA-256 of a regular file, as hexadecimal text; errors are as in `read_file_apart`."""
+    _size_of(path)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def _size_of(path: Path) -> int:
-    """Return the size of a regular file, bytes."""
+    """Return the size of a regular file, bytes; errors are as in `read_file_apart`."""
     refuse_no_text(path)
     try:
         status = path.stat()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,7 @@ MOST_ENTRIES = 100_000_000
 """Limits of one matrix; ten times the unknowns that the reduction is made for."""
 NAME = r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,39}"
 """Name of a degree of freedom, as a regular expression."""
+_NAME = re.compile(NAME)
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 """Displacements along, and rotations around, the axes: directions 1 to 6 of a node."""
 
@@ -115,7 +117,14 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> Found:
     if facts["coordinates"]:
         coordinates = np.frombuffer(next(rest), dtype=np.float64).reshape(-1, 3)
     matrices = {str(role): _matrix(int(size), rest) for role, size in facts["sizes"].items()}
-    return Found(matrices, tuple(str(name) for name in facts["freedoms"]), coordinates)
+    names = tuple(facts["freedoms"])
+    if not all(_NAME.fullmatch(name) for name in names):
+        raise ValueError("a degree of freedom with another name")
+    counts = {len(matrix.indptr) - 1 for matrix in matrices.values()} if names else set()
+    counts |= set() if coordinates is None else {len(coordinates)}
+    if counts - {len(names)}:
+        raise ValueError("degrees of freedom, coordinates and matrices differ in number")
+    return Found(matrices, names, coordinates)
 
 
 def _matrix(size: int, buffers: Iterator[bytearray]) -> Sparse:

@@ -1,7 +1,7 @@
 """Tables of degrees of freedom: names, or nodes and directions, with coordinates where they are known.
 
-The first line names the columns, which commas, semicolons, tabs or blanks separate: `name`, or `node` and `direction`
-(x, y, z, rx, ry, rz, or 1 to 6); besides `x`, `y`, `z`, m. Other columns are not read. Lines with `#` are comments.
+The first line names the columns; commas, semicolons, tabs or blanks separate them. A table has `name`, or `node` and
+`direction` (x, y, z, rx, ry, rz, or 1 to 6); coordinates are `x`, `y`, `z`, m. Other columns are not read.
 """
 
 from __future__ import annotations

@@ -12,8 +12,9 @@ import numpy as np
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.matrices import Matrices
-from vibroimpact.orchestrator.structures.readers.apart import read_file_apart
+from vibroimpact.orchestrator.structures.readers.apart import content_hash, read_file_apart
 from vibroimpact.orchestrator.structures.readers.found import Found, unpacked
+from vibroimpact.orchestrator.structures.readers.union import in_order, refuse_twice, united
 from vibroimpact.orchestrator.structures.readers.wanted import ROLES, Wanted
 
 _CHILD = "vibroimpact.orchestrator.structures.readers.child"
@@ -96,6 +97,20 @@ class Sources:
         """Return the paths of all files that are read."""
         return (*self.files(), *(path for path in (self.table(), self.model()) if path is not None))
 
+    def hashes(self) -> dict[str, str]:
+        """Return the SHA-256 of each file by its path in `folder`.
+
+        Raises
+        ------
+        UsageError
+            A file cannot be read.
+        """
+        return {self._name_of(path): content_hash(path) for path in self.all_paths()}
+
+    def _name_of(self, path: Path) -> str:
+        inside = path.is_relative_to(self.folder)
+        return (path.relative_to(self.folder) if inside else path).as_posix()
+
 
 def _is_kind(path: Path, end: str) -> bool:
     """Return whether a name ends so, also before `.gz`."""
@@ -132,21 +147,21 @@ def read_matrices(sources: Sources) -> Matrices:
         A file is missing, damaged, or of another kind; the matrices and the table differ in size; a name occurs twice.
         One line that begins with the path.
     """
-    found: dict[str, tuple[Path, Any]] = {}
-    named: tuple[Path, Found] | None = None
-    for path, wanted in sources.files().items():
-        content = _read(path, "read", {"names": dict(wanted.names), "optional": sorted(wanted.optional)})
-        found |= {role: (path, matrix) for role, matrix in content.matrices.items()}
-        named = (path, content) if content.freedoms and named is None else named
-    table = sources.table()
+    files = sources.files()
+    found = united({path: _read(path, "read", wanted.options()) for path, wanted in files.items()})
+    unknowns = int(found.matrices["stiffness"].shape[0])
+    names, coordinates = found.freedoms, found.coordinates
+    table, model = sources.table(), sources.model()
     if table is not None:
-        named = table, _read(table, "read_freedoms", {})
-    unknowns = _common_size(found)
-    names, coordinates = _freedoms(named, unknowns)
-    model = sources.model()
+        listed = _read(table, "read_freedoms", {})
+        if not names:
+            _refuse_unfit(table, listed.freedoms, unknowns)
+            names = listed.freedoms
+        coordinates = in_order(table, names, listed)
     if model is not None:
         coordinates = _coordinates_of_nodes(model, names)
-    matrices = {role: matrix for role, (_, matrix) in found.items()}
+    names = names or tuple(str(number) for number in range(1, unknowns + 1))
+    matrices = found.matrices
     return Matrices(matrices["stiffness"], matrices["mass"], matrices.get("damping"), names, coordinates)
 
 
@@ -154,46 +169,13 @@ def _read(path: Path, reader: str, options: Mapping[str, Any]) -> Found:
     return read_file_apart(path, f"{_CHILD}:{reader}", options, unpacked, _LIBRARIES)
 
 
-def _common_size(found: Mapping[str, tuple[Path, Any]]) -> int:
-    """Return the number of unknowns of all matrices."""
-    first, matrix = found["stiffness"]
-    unknowns = int(matrix.shape[0])
-    for role, (path, other) in found.items():
-        if other.shape[0] != unknowns:
-            got = f"{other.shape[0]} in the {role} matrix"
-            raise UsageError(f"{path}: expected {unknowns} unknowns, as in {first.name}, got {got}.")
-    return unknowns
-
-
-def _freedoms(named: tuple[Path, Found] | None, unknowns: int) -> tuple[tuple[str, ...], Floats | None]:
-    """Return the names of the degrees of freedom, and their coordinates."""
-    if named is None:
-        return tuple(str(number) for number in range(1, unknowns + 1)), None
-    path, content = named
-    names = content.freedoms
+def _refuse_unfit(table: Path, names: Sequence[str], unknowns: int) -> None:
+    """Raise UsageError unless a table names each unknown, and each name once."""
     if len(names) != unknowns:
         half = " Matrices of a cyclic symmetry are not supported." if 2 * len(names) == unknowns else ""
-        raise UsageError(
-            f"{path}: expected {unknowns} degrees of freedom, as the matrices, got {len(names)}.{half}"
-        )
-    if len(set(names)) < unknowns:
-        again = _first_again(names)
-        raise UsageError(
-            f"{path}: expected each degree of freedom once, got {names[again]!r} again ({again + 1})."
-        )
-    if content.coordinates is not None and len(content.coordinates) != unknowns:
-        raise UsageError(f"{path}: expected a whole file, got one that its library misreads.")
-    return names, content.coordinates
-
-
-def _first_again(names: Sequence[str]) -> int:
-    """Return the place of the first name that occurs before."""
-    seen: set[str] = set()
-    for place, name in enumerate(names):
-        if name in seen:
-            return place
-        seen.add(name)
-    return len(names)
+        expected = f"expected {unknowns} degrees of freedom, as the matrices"
+        raise UsageError(f"{table}: {expected}, got {len(names)}.{half}")
+    refuse_twice(table, names)
 
 
 def _coordinates_of_nodes(model: Path, names: Sequence[str]) -> Floats:

@@ -117,8 +117,8 @@ def matrix_of(
     content, start : bytes and int
         The text, whose line an error names.
     mirrored : float
-        Factor of the entries in the other triangle: 1 for a symmetric matrix, of which the text holds one triangle; -1
-        for a skew one; 0 where the text holds all entries.
+        Factor of the entries in the other triangle: 1 for a symmetric matrix, -1 for a skew one. 0: the text holds both
+        triangles.
 
     Raises
     ------

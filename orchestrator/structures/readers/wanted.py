@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
 
@@ -32,6 +33,10 @@ class Wanted:
 
     names: Mapping[str, str]
     optional: frozenset[str] = frozenset()
+
+    def options(self) -> dict[str, Any]:
+        """Return the options of a reader in another process."""
+        return {"names": dict(self.names), "optional": sorted(self.optional)}
 
     def only(self) -> str:
         """Return the role of the matrix in a file that holds one.

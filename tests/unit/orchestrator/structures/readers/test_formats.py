@@ -112,8 +112,8 @@ def test_a_skew_symmetric_matrix_keeps_its_signs() -> None:
 def test_a_format_is_known_by_its_first_bytes() -> None:
     matrix = np.diag([1.0, 2.0])
     for content in (market(matrix), npz({"K": matrix}), matlab({"K": matrix}), matlab_7_3({"K": matrix})):
-        close(read("export.dat", content).matrices["stiffness"], matrix, 0.0)
-    assert refusal("export.dat", b"1 1 2.0\n").startswith("expected a file of matrices (.mtx, .npz")
+        close(read("export.bin", content).matrices["stiffness"], matrix, 0.0)
+    assert refusal("export.bin", b"1 1 2.0\n").startswith("expected a file of matrices (.mtx, .npz")
 
 
 HEAD = b"%%MatrixMarket matrix coordinate real symmetric\n"

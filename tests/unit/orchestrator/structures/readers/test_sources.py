@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +138,40 @@ def test_a_reader_writes_nothing(folder: Path) -> None:
             folder / "k.mtx", "support.harmful_reader:read", {"way": "write"}, found.unpacked
         )
     assert (folder / "k.mtx").read_bytes() in (before, b"")  # opened, but never written
+
+
+def nastran(path: Path, name: str, entries: Mapping[tuple[str, str], float]) -> None:
+    """Write a DMIG file of a symmetric matrix by its degrees of freedom, such as `12.3`."""
+    lines = [f"DMIG    {name:8}       0       6       2       0"]
+    for (column, row), value in entries.items():
+        lines += [f"DMIG,{name},{','.join(column.split('.'))},,{','.join(row.split('.'))},{value}"]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_files_with_names_are_brought_into_one_order(tmp_path: Path) -> None:
+    nastran(tmp_path / "k.pch", "KAAX", {("1.3", "1.3"): 2.0, ("2.3", "1.3"): -1.0, ("2.3", "2.3"): 3.0})
+    nastran(tmp_path / "m.pch", "MAAX", {("2.3", "2.3"): 0.5})
+    sources = Sources("k.pch", "m.pch", folder=tmp_path)
+    got = read_matrices(sources)
+    assert got.freedoms == ("1.z", "2.z")
+    assert got.stiffness.toarray().tolist() == [[2.0, -1.0], [-1.0, 3.0]]
+    assert got.mass.toarray().tolist() == [[0.0, 0.0], [0.0, 0.5]]
+    (tmp_path / "places.csv").write_text("name,x\n2.z,20\n1.z,10\n")
+    placed = read_matrices(replace(sources, freedoms="places.csv"))
+    assert placed.freedoms == got.freedoms
+    assert placed.coordinates is not None
+    assert placed.coordinates[:, 0].tolist() == [10.0, 20.0]
+    for wrong, said in (("2.z,1\n1.x,2\n", "got none named '1.z'"), ("1.z,1\n2.z,2\n3.z,3\n", "got 3 names")):
+        (tmp_path / "places.csv").write_text(f"name,x\n{wrong}")
+        expected = "places.csv: expected the 2 degrees of freedom of the matrices"
+        assert f"{expected}, {said}" in refusal(replace(sources, freedoms="places.csv"))
+
+
+def test_hashes_name_all_files_that_are_read(folder: Path) -> None:
+    sources = Sources("k.mtx", "m.mtx", freedoms=str(folder / "freedoms.csv"), folder=folder)
+    hashes = sources.hashes()
+    assert list(hashes) == ["k.mtx", "m.mtx", "freedoms.csv"]
+    assert hashes["k.mtx"] == hashlib.sha256((folder / "k.mtx").read_bytes()).hexdigest()
 
 
 def test_a_message_lists_few_names() -> None:
