@@ -40,23 +40,25 @@ def with_key_tables(page: str) -> str:
     KeyError
         A marker names no model.
     """
-    tables = {
-        name: found
-        for module in (
-            models,
-            forcing_models,
-            body_models,
-            measuring_models,
-            replay_models,
-            sweep_models,
-            component_models,
-        )
-        for name, found in vars(module).items()
-        if isinstance(found, type) and issubclass(found, BaseModel)
-    }
+    tables = models_of_tables()
     return _MARKED.sub(
         lambda match: f"{match['begin']}{key_table(tables[match['model']])}\n{match['end']}", page
     )
+
+
+def models_of_tables() -> dict[str, type[BaseModel]]:
+    """Return the models of all tables of a scene, by their names."""
+    modules = (
+        models,
+        forcing_models,
+        body_models,
+        measuring_models,
+        replay_models,
+        sweep_models,
+        component_models,
+    )
+    named = (pair for module in modules for pair in vars(module).items())
+    return {name: found for name, found in named if isinstance(found, type) and issubclass(found, BaseModel)}
 
 
 def key_table(model: type[BaseModel]) -> str:

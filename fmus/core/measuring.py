@@ -10,6 +10,7 @@ from operator import index
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vibroimpact.fmus.core.arrays import address, row_of
 from vibroimpact.fmus.core.library import core_library
 from vibroimpact.fmus.errors import UsageError
 
@@ -131,8 +132,8 @@ class LoadCell:
             A number is not finite, instants are out of order, an impact is outside of the block, or impacts come with
             contact_duration 0. More than 2048 impacts are within one contact_duration: the cell is of no further use.
         """
-        at, force = _row("LoadCell: times", times), _row("LoadCell: forces", forces)
-        hits, impulse = _row("LoadCell: impact_times", impact_times), _row("LoadCell: impulses", impulses)
+        at, force = row_of("LoadCell: times", times), row_of("LoadCell: forces", forces)
+        hits, impulse = row_of("LoadCell: impact_times", impact_times), row_of("LoadCell: impulses", impulses)
         self._check_block(at, force, hits, impulse)
         volts = np.empty_like(at)
         if not len(at):
@@ -142,7 +143,14 @@ class LoadCell:
             start = min(at[0], hits[0]) if len(hits) else at[0]
             library.vi_door_cell_start(self._cell, self._settings, start, force[0])
         status = library.vi_door_cell_follow(
-            self._cell, len(at), _data(at), _data(force), len(hits), _data(hits), _data(impulse), _data(volts)
+            self._cell,
+            len(at),
+            address(at),
+            address(force),
+            len(hits),
+            address(hits),
+            address(impulse),
+            address(volts),
         )
         self._reached = float(at[-1])
         if status:
@@ -213,7 +221,7 @@ def gaussian(seed: int, channel: int, first: int, count: int) -> Array:
         _check(0 <= value < 2**64, f"gaussian: {name}", "0 to 2^64 - 1", value)
     _check(0 <= count <= 2**64 - first, "gaussian: count", ">= 0, and no number beyond 2^64", count)
     numbers = np.empty(count)
-    _library().vi_door_gaussian(seed, channel, first, count, _data(numbers))
+    _library().vi_door_gaussian(seed, channel, first, count, address(numbers))
     return numbers
 
 
@@ -247,9 +255,9 @@ def digitised(volts: ArrayLike, highest: float, bits: int) -> Array:
     _check(0.0 < highest < math.inf, "digitised: highest", "a finite number > 0", highest)
     bits = index(bits)
     _check(1 <= bits <= MOST_BITS, "digitised: bits", f"1 to {MOST_BITS}", bits)
-    row = _row("digitised: volts", volts, finite=False)
+    row = row_of("digitised: volts", volts, finite=False)
     levels = np.empty_like(row)
-    _library().vi_door_digitised(len(row), _data(row), highest, bits, _data(levels))
+    _library().vi_door_digitised(len(row), address(row), highest, bits, address(levels))
     return levels
 
 
@@ -283,9 +291,9 @@ def sensor_reading(values: ArrayLike, gain: float, offset: float = 0.0, highest:
     for name, value in (("gain", gain), ("offset", offset)):
         _check(math.isfinite(value), f"sensor_reading: {name}", "a finite number", value)
     _check(0.0 <= highest < math.inf, "sensor_reading: highest", "a finite number >= 0", highest)
-    row = _row("sensor_reading: values", values, finite=False)
+    row = row_of("sensor_reading: values", values, finite=False)
     volts = np.empty_like(row)
-    _library().vi_door_reading(len(row), _data(row), gain, offset, highest, _data(volts))
+    _library().vi_door_reading(len(row), address(row), gain, offset, highest, address(volts))
     return volts
 
 
@@ -333,15 +341,15 @@ def exciter_force(
         _check(math.isfinite(value), f"exciter_force: {name}", "a finite number", value)
     _check(0.0 <= distance < math.inf, "exciter_force: distance", "a finite number >= 0", distance)
     _check(side in EXCITER_SIDES, "exciter_force: side", "lower or upper", repr(side))
-    row = _row("exciter_force: volts", volts, finite=False)
-    place = _row("exciter_force: displacement", displacement)
+    row = row_of("exciter_force: volts", volts, finite=False)
+    place = row_of("exciter_force: displacement", displacement)
     _check(
         len(place) in (1, len(row)), "exciter_force: displacement", f"one number or {len(row)}", len(place)
     )
     place = np.ascontiguousarray(np.broadcast_to(place, row.shape))
     forces = np.empty_like(row)
     done = _library().vi_door_magnet(
-        len(row), _data(row), _data(place), gain, offset, distance, EXCITER_SIDES[side], _data(forces)
+        len(row), address(row), address(place), gain, offset, distance, EXCITER_SIDES[side], address(forces)
     )
     if done < len(row):
         raise UsageError(
@@ -372,20 +380,6 @@ def _library() -> ctypes.CDLL:
     ]  # fmt: skip
     library.vi_door_magnet.restype = size
     return library
-
-
-def _data(row: Array) -> int:
-    return row.ctypes.data
-
-
-def _row(what: str, values: ArrayLike, *, finite: bool = True) -> Array:
-    row = np.ascontiguousarray(np.atleast_1d(np.asarray(values, dtype=np.float64)))
-    if row.ndim != 1:
-        raise UsageError(f"{what}: expected a row of numbers, got an array of shape {row.shape}.")
-    if finite and not np.all(np.isfinite(row)):
-        place = int(np.argmin(np.isfinite(row)))
-        raise UsageError(f"{what}: expected finite numbers, got {row[place]} at place {place}.")
-    return row
 
 
 def _check(good: bool, what: str, expected: str, got: object) -> None:

@@ -8,8 +8,6 @@ from enum import IntEnum
 from functools import cache
 from typing import Any
 
-from numpy.typing import NDArray
-
 from vibroimpact.fmus.core.library import core_library
 
 
@@ -72,13 +70,6 @@ class RunsPoints(Structure):
         ("stage", c_int32),
         *((name, c_double) for name in ("time", "spent")),
     ]
-
-
-def address(array: NDArray[Any]) -> int:
-    """Return the address of the values of a contiguous array."""
-    if not array.flags.c_contiguous:
-        raise ValueError("address: expected a contiguous array")
-    return int(array.ctypes.data)
 
 
 @cache

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vibroimpact.fmus.core.arrays import address, row_of
 from vibroimpact.fmus.core.library import core_library
 from vibroimpact.fmus.errors import UsageError
 
@@ -120,10 +121,10 @@ class Signal:
         if not 0 <= index(seed) < 2**64:
             raise UsageError(f"signal.seed: expected 0 to 2^64 - 1, got {seed}.")
         numbers = (start, duration, angular_frequency, end_angular_frequency, phase, rise)
-        settings = _Settings(int(kind), *numbers, seed, at.size, at.ctypes.data, value.ctypes.data)
+        settings = _Settings(int(kind), *numbers, seed, at.size, address(at), address(value))
         self._memory = np.zeros(_library().vi_door_signal_size(), dtype=np.uint8)
         message = ctypes.create_string_buffer(_MESSAGE_LENGTH)
-        if _library().vi_door_signal_start(self._memory.ctypes.data, settings, message):
+        if _library().vi_door_signal_start(address(self._memory), settings, message):
             raise UsageError(f"{message.value.decode('utf-8', 'replace')}.")
 
     def values(self, times: ArrayLike, low: ArrayLike = 0.0) -> Array:
@@ -138,11 +139,11 @@ class Signal:
         -------
         ndarray, shape (sample,)
         """
-        at = _row(times)
+        at = row_of("signal.values", times)
         rounding = np.ascontiguousarray(np.broadcast_to(np.asarray(low, dtype=np.float64), at.shape))
         values = np.empty_like(at)
-        rows = (row.ctypes.data for row in (at, rounding, values))
-        _library().vi_door_signal_values(self._memory.ctypes.data, at.size, *rows)
+        rows = (address(row) for row in (at, rounding, values))
+        _library().vi_door_signal_values(address(self._memory), at.size, *rows)
         return values
 
     def pieces(self, begin: float, end: float, most: int = 100_000) -> Pieces:
@@ -156,8 +157,8 @@ class Signal:
         if not (math.isfinite(begin) and math.isfinite(end)):
             raise UsageError(f"signal.pieces: expected finite times, got {begin} and {end}.")
         pieces = Pieces(np.empty((most, 2)), np.empty(most), np.empty((most, COEFFICIENTS)))
-        rows = (row.ctypes.data for row in pieces)
-        count = _library().vi_door_signal_pieces(self._memory.ctypes.data, begin, end, most, *rows)
+        rows = (address(row) for row in pieces)
+        count = _library().vi_door_signal_pieces(address(self._memory), begin, end, most, *rows)
         return Pieces(*(row[:count] for row in pieces))
 
 
@@ -172,10 +173,3 @@ def _library() -> ctypes.CDLL:
     library.vi_door_signal_pieces.argtypes = [pointer, number, number, size, pointer, pointer, pointer]
     library.vi_door_signal_pieces.restype = size
     return library
-
-
-def _row(values: ArrayLike) -> Array:
-    row = np.ascontiguousarray(np.atleast_1d(np.asarray(values, dtype=np.float64)))
-    if row.ndim != 1 or not np.all(np.isfinite(row)):
-        raise UsageError("signal.values: expected a row of finite times, got another.")
-    return row

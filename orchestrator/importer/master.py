@@ -10,7 +10,7 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
-from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS, ContactBonds
+from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS
 from vibroimpact.orchestrator.importer.events import (
     NO_EVENTS,
     Event,
@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.importer.events import (
     StepWatcher,
     standstill_error,
 )
-from vibroimpact.orchestrator.importer.order import stepping_order
+from vibroimpact.orchestrator.importer.parts import parts_of
 from vibroimpact.orchestrator.importer.plain_loop import MOST_SECONDS, Made, PlainLoop
 from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
@@ -30,11 +30,9 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.importer.step_plan import Parts, StepPlan
+from vibroimpact.orchestrator.importer.step_plan import StepPlan
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import MOST_REPETITIONS
-from vibroimpact.orchestrator.importer.ticks import Ticks
-from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
-from vibroimpact.orchestrator.importer.wiring import LoopSolver, SettlingInputs, order_of, transfers_of
+from vibroimpact.orchestrator.importer.wiring import SettlingInputs
 
 #: Steps without progress after which the run ends in an error.
 STANDSTILLS = 100
@@ -105,44 +103,12 @@ class Importer:
         log: Callable[[str], LogTail] | None = None,
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
-        self.components: dict[str, Component] = {}
-        watched = {event.component for event in events}
-        connections = [*connections, *(c for contact in contacts for c in contact.connections)]
-        for spec in components:
-            self.components[spec.name] = Component(
-                spec,
-                log=log(spec.name) if log else None,
-                wrap=wrap(spec.name) if wrap else None,
-                events=spec.name not in watched,
-            )
+        parts = parts_of(components, connections, events, contacts, pairs, contact_steps, log, wrap)
+        self.components, self._order = parts.named, parts.components
         self.macro_step = macro_step
-        self.watches = [Watch(self.components[event.component], event) for event in events]
-        tuning = [c for c in connections if is_tunable(c, self.components)]
-        connections = [c for c in connections if c not in tuning]
-        order = order_of(connections, self.components)
-        self.transfers = transfers_of(order, self.components)
-        self.tuning = Tuning(self.components, tuning, self.transfers)
-        self.loops = LoopSolver(order.loops, self.components)
-        self.ticks = Ticks(self.components.values())
-        self.contacts = ContactBonds(
-            self.components, self.transfers, connections, contacts, pairs, contact_steps
-        )
-        fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]
-        for name, component in self.components.items():
-            component.watch_inputs(variable for owner, variable in fed if owner == name)
-        self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
-        self._order = stepping_order(self.components, connections)
-        parts = Parts(
-            self._order,
-            {name: number for number, name in enumerate(self.components)},
-            self.transfers,
-            self._looping,
-            self.loops,
-            self.watches,
-            self.contacts,
-            self.tuning,
-            self.ticks,
-        )
+        self.watches, self.contacts = parts.watches, parts.contacts
+        self.transfers, self.loops, self._looping = parts.transfers, parts.loops, parts.looping
+        self.tuning, self.ticks = parts.tuning, parts.ticks
         self._progress = Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
         self.watchers: list[StepWatcher] = []

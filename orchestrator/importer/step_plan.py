@@ -2,38 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.contacts import ContactBonds
 from vibroimpact.orchestrator.importer.events import EventMode
 from vibroimpact.orchestrator.importer.order import fresh_inputs
+from vibroimpact.orchestrator.importer.parts import Parts
 from vibroimpact.orchestrator.importer.plain_loop import PlainLoop, can_loop
 from vibroimpact.orchestrator.importer.progress import Progress
-from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import Exchange
-from vibroimpact.orchestrator.importer.ticks import Ticks
-from vibroimpact.orchestrator.importer.tuning import Tuning
-from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, moves_of
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """The parts of an importer."""
-
-    components: Sequence[Component]
-    """The components, in the order in which they are stepped."""
-    numbers: Mapping[str, int]
-    """Place of each component in the order of event reports."""
-    transfers: Sequence[Transfer]
-    looping: Sequence[Transfer]
-    """The transfers that belong to algebraic loops."""
-    loops: LoopSolver
-    watches: Sequence[Watch]
-    contacts: ContactBonds
-    tuning: Tuning
-    ticks: Ticks
+from vibroimpact.orchestrator.importer.wiring import moves_of
 
 
 class StepPlan:
@@ -125,7 +101,7 @@ class StepPlan:
         events = self.event_mode
         if not can_loop(components, [self.start_moves, *inputs, events.begin, events.again]):
             return None
-        numbers, progress = parts.numbers, self._progress
+        numbers = {name: number for number, name in enumerate(parts.named)}
         return PlainLoop(
-            components, numbers, self.start_moves, inputs, events, saves=self.saves, progress=progress
+            components, numbers, self.start_moves, inputs, events, saves=self.saves, progress=self._progress
         )

@@ -43,7 +43,7 @@ class _Closing(Exception):
 
 
 class _OneByOne:
-    """Runs states of a scene one by one, for bodies that neither lanes nor the loop in C can follow."""
+    """Runs states of a scene one by one, for bodies and points that neither lanes nor the loop in C can follow."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -84,6 +84,7 @@ class BodyFlow:
         self._closing = False
         self._runners: list[PointRunner] = []
         self._alone: list[_OneByOne] = []
+        self._left_out: dict[PointLoop, _OneByOne] = {}
         self._bare = [self._loop(bare) for _ in range(count)]
         self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
@@ -95,13 +96,15 @@ class BodyFlow:
         by_lanes = self.scene.execution.how == "auto" and may_go_by_lanes(scene)
         self._runners.append(PointRunner(scene, execution="lanes" if by_lanes else "fused"))
         loop = self._runners[-1].loop
+        alone = _OneByOne(scene)
+        self._alone.append(alone)
         if loop is None and not scene.is_measured:
-            self._alone.append(_OneByOne(scene))
-            return self._alone[-1]
+            return alone
         if loop is None:
             raise UsageError(
                 f"{self.scene.source}: basins: expected a body without a measuring chain, got one with it."
             )
+        self._left_out[loop] = alone
         return loop
 
     def close(self) -> None:
@@ -162,8 +165,9 @@ class BodyFlow:
         if isinstance(loop, _OneByOne):
             return columns_of([self._run_alone(loop, state, periods, first=first) for state in states])
 
-        def refused(place: int, _: object) -> tuple[RunRecord, None]:
-            return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
+        def alone(place: int, _: object) -> tuple[RunRecord, None]:
+            """Return the record of a point that the loop leaves out, such as one with a rest, run by itself."""
+            return self._run_alone(self._left_out[loop], states[place], periods, first=first), None
 
         done: list[RunColumns] = []
         while len(states):
@@ -171,11 +175,9 @@ class BodyFlow:
                 raise _Closing
             points, over = self._prepared(loop, states, periods, first=first), time.perf_counter() + SLICE
             if loop.by_lanes:
-                done.append(
-                    run_prepared_in_lanes(loop, points, over, lambda place, _: refused(place, None)[0])
-                )
+                done.append(run_prepared_in_lanes(loop, points, over, lambda place, _: alone(place, None)[0]))
             else:
-                done.append(run_loop(loop, points, None, over, refused)[0])
+                done.append(run_loop(loop, points, None, over, alone)[0])
             states = states[len(done[-1]) :]
         return joined(done)
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Generator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -25,6 +25,7 @@ from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.transients import TransientsOf
 from vibroimpact.orchestrator.orbits.basins import beyond_stops
@@ -33,7 +34,8 @@ from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
+from vibroimpact.orchestrator.scene.forcing_clock import signals_of
+from vibroimpact.orchestrator.scene.forcing_models import Forcing, forces_in_words
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "transients followed by vibroimpact"
@@ -58,6 +60,8 @@ SAME = 1e-4
 """Distance over the size of the motion, below which two states are on one orbit."""
 LOOKS = (100, 200, 400, 800, 1600)
 """Periods after which the study checks whether all starts have reached their final motion."""
+SINE_KEYS = ("signal", "angular_frequency", "frequency", "phase")
+"""Keys of a sine that a constant force does not have."""
 SURVEY = 50
 """Periods of the scene's own motion that define its size."""
 DRAWS = 100
@@ -239,12 +243,15 @@ def verdict(data: xr.Dataset) -> list[str]:
     what = "" if data.attrs["period_of"] == "the force" else " of the first mode"
     lines = []
     if ends.count(FORGOTTEN) == many:
-        lines.append(f"The start is forgotten to {tolerance:g} after {after.max():.0f} periods{what}.")
+        lines.append(
+            f"The start is forgotten to {tolerance:g} after {counted(int(after.max()), 'period')}{what}."
+        )
     elif CHAOTIC in ends:
         lines.append("The motion is chaotic: its start is never forgotten, only its statistics are the same.")
     else:
         lines.append(
-            f"{ends.count(FORGOTTEN)} of {counted(many, 'start')} forgotten after {data.sizes['period']} periods{what}."
+            f"{ends.count(FORGOTTEN)} of {counted(many, 'start')} forgotten after "
+            f"{counted(data.sizes['period'], 'period')}{what}."
         )
     if other := sorted(
         {str(data["motion"].values[place]) for place in range(many) if ends[place] == ELSEWHERE}
@@ -280,25 +287,40 @@ def _refuse(study: Transients) -> None:
 
 
 def _with_the_first_mode(scene: Scene) -> Scene:
-    """Return a scene without a force as a scene with zero force, with the period of its first mode on a spring."""
+    """Return a scene without a force as a scene with zero force, with the period of its first mode on a spring.
+
+    Constant forces stay beside the force of amplitude 0.
+    """
     if scene.moving_stop:
         raise UsageError(
             f"{scene.source}: {scene.moving_stop}: expected stops that stand still, got one that moves."
         )
-    if scene.has_several_forces:
+    if signals_of(scene.forces):
         got = forces_in_words(scene.forces)
-        raise UsageError(f"{scene.source}: forcing: expected one sine, or no force, got {got}.")
+        raise UsageError(f"{scene.source}: forcing: expected sines, constant forces or no force, got {got}.")
+    loads = _constant_loads(scene)
 
     def forced(frequency: float) -> Scene:
         record = {"transient_periods": 0, "recorded_periods": 1}
-        return scene.with_values(
-            {"record": record, "forcing": {"amplitude": 0.0, "angular_frequency": frequency}}
-        )
+        sine = {"kind": "base_acceleration", "amplitude": 0.0, "angular_frequency": frequency}
+        return scene.with_values({"record": record, "forcing": [sine, *loads]})
 
     body = impacting_body(forced(1.0))
     if body.loose == body.frequencies.size:
         raise UsageError(f"{scene.source}: forcing: expected one where no body has a spring, got none.")
     return forced(float(body.frequencies[body.loose]))
+
+
+def _constant_loads(scene: Scene) -> list[dict[str, Any]]:
+    """Return the tables of a scene's constant forces, of which one may be a sine of frequency 0."""
+    written = parse_toml(scene.text).get("forcing", [])
+    loads = []
+    for given, force in zip(written if isinstance(written, list) else [written], scene.forces, strict=True):
+        load = {key: value for key, value in given.items() if key not in SINE_KEYS}
+        if isinstance(force, Forcing):
+            load["amplitude"] = (np.array(force.amplitude) * math.cos(force.phase)).tolist()
+        loads.append({**load, "signal": "constant"})
+    return loads
 
 
 def _size(flow: BodyFlow, body: ImpactingBody) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import runs, stepping
+from vibroimpact.fmus.core.arrays import address
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging.archive import array_shapes, unpack, value_references
 from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
@@ -222,13 +223,13 @@ class BodyDriver(RecordedBody):
         rows = np.empty((plan.row_capacity, ROW_WIDTH))
         block = stepping.HoldBlock(
             count=len(ends),
-            ends=runs.address(ends),
-            inputs=runs.address(inputs),
-            rates=None if rates is None else runs.address(rates),
-            renewed=None if renewed is None else runs.address(renewed),
-            samples=runs.address(samples),
+            ends=address(ends),
+            inputs=address(inputs),
+            rates=None if rates is None else address(rates),
+            renewed=None if renewed is None else address(renewed),
+            samples=address(samples),
             time=self.instance.time,
-            rows=runs.address(rows),
+            rows=address(rows),
             rows_room=len(rows),
         )
         end = stepping.HoldEnd.again
@@ -270,7 +271,7 @@ class BodyDriver(RecordedBody):
             # a chain has other inputs, which are not set here
             input=references.get(name, 0),
             input_rate=references.get(f"{name}_rate", 0),
-            outputs=runs.RunsVariables(runs.address(read), len(read)),
+            outputs=runs.RunsVariables(address(read), len(read)),
         )
         if exciter is not None:
             plan.magnet = ctypes.pointer(exciter.magnet)

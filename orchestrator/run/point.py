@@ -47,6 +47,8 @@ from vibroimpact.orchestrator.run.runner import Rows, Runner
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan, few_samples_message
 from vibroimpact.orchestrator.run.window import (
     TWO_PI,
+    error_in_keys_of,
+    in_keys_of,
     late_message,
     limit_message,
     no_load_message,
@@ -160,8 +162,11 @@ class PointRunner(Runner):
         plan = self._plan.at(scene) if values else self._plan
         state = without_padding(start, len(state_variables(scene)) // 2)
         run = _Run(scene, self.driver, plan, state, at_time_0=at_time_0)
-        outcome, message = run.run()
-        message = message or "; ".join(self.driver.warnings)
+        try:
+            outcome, message = run.run()
+        except ComponentError as error:
+            raise error_in_keys_of(scene, error) from None
+        message = message or in_keys_of(scene, "; ".join(self.driver.warnings))
         record = run.record(outcome, message, time.perf_counter() - began)
         return replace(record, final_state=padded_state(record.final_state, most_elements(self.scene)))
 

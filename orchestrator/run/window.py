@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import Record
 
 TWO_PI = 2.0 * math.pi
+_CONTACT = re.compile(r"\bcontact\[([0-9]+)\](\.position)?")
+"""A contact in messages of an FMU, which counts stops and contacts together, maybe with its position."""
 Numbers = TypeVar("Numbers", float, NDArray[np.float64])
 
 
@@ -57,3 +61,30 @@ def late_message(deadline: float | None, time: float) -> str:
 def no_load_message(stop: str) -> str:
     """Return the message of a run that ends at rest on a stop, given by its key, without a load on the stop."""
     return f"rests on {stop} without load"
+
+
+def in_keys_of(scene: Scene, text: str) -> str:
+    """Return a message of the body's FMU with the keys of the scene in place of the numbers of contacts.
+
+    Examples
+    --------
+    >>> tables = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}
+    >>> scene = Scene.from_dict(tables | {"stop": [{"position": 1.0, "restitution": 1.0}]})
+    >>> in_keys_of(scene, "contact[1].position: expected a finite number, got nan")
+    'stop[1].position: expected a finite number, got nan'
+    """
+
+    def key(match: re.Match[str]) -> str:
+        place, variable = int(match[1]) - 1, match[2] or ""
+        if not 0 <= place < len(keys):
+            return match[0]
+        return keys[place] + (".clearance" if variable and keys[place].startswith("contact") else variable)
+
+    keys = scene.stop_keys
+    return _CONTACT.sub(key, text)
+
+
+def error_in_keys_of(scene: Scene, error: ComponentError) -> ComponentError:
+    """Return an error of the body's FMU with the keys of the scene in its message."""
+    said = in_keys_of(scene, error.message)
+    return type(error)(said, instance=error.instance, function=error.function, time=error.time, log=error.log)

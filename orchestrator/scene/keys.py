@@ -161,6 +161,23 @@ def is_missing(document: Mapping[str, Any], text: str) -> bool:
     return isinstance(owner, Mapping) and not {key.name, ALTERNATIVES.get(key.name)} & owner.keys()
 
 
+def table_named(name: str, document: Mapping[str, Any]) -> str:
+    """Return the key of a named body or of a component's parameters; an empty text for a name of neither.
+
+    Examples
+    --------
+    >>> table_named("ball", {"body": [{"name": "frame"}, {"name": "ball"}]})
+    'body[2]'
+    >>> table_named("ball", {"component": {"ball": {}}}), table_named("ball", {})
+    ('component.ball.parameters', '')
+    """
+    bodies, components = document.get("body"), document.get("component")
+    for number, body in enumerate(bodies if isinstance(bodies, list) else (), start=1):
+        if isinstance(body, dict) and body.get("name") == name:
+            return f"body[{number}]"
+    return f"component.{name}.parameters" if isinstance(components, dict) and name in components else ""
+
+
 def with_alternatives(texts: Iterable[str]) -> set[str]:
     """Return keys together with their alternatives.
 

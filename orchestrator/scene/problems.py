@@ -29,6 +29,7 @@ from vibroimpact.orchestrator.scene.fields import (
     listed,
     rule_of,
 )
+from vibroimpact.orchestrator.scene.not_modelled import effect_not_modelled
 
 Table = TypeVar("Table", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
@@ -40,6 +41,7 @@ LONGEST_QUOTE = 60
 MOST_PROBLEMS = 50
 """Largest number of problems of one file that are listed; of further problems only the number is given."""
 MOST_WORDS_LISTED = 12
+MODELLED = "effects that are modelled"
 CHANGES = "--set"
 """The option that changes keys of a scene."""
 
@@ -176,7 +178,9 @@ def _nearest_word(word: object, options: Sequence[str]) -> str | None:
 
 
 def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
-    """Return the problem of an unknown key of a table."""
+    """Return the problem of an unknown key of a table; one that asks for an effect names the effect."""
+    if said := effect_not_modelled(str(path[0]), path[-1]):
+        return Problem(key_path(path), MODELLED, quoted(path[-1]), said)
     return Problem(
         key_path(path),
         "a known key",
@@ -276,7 +280,7 @@ def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) ->
     """Return the problem of a value that breaks the rule of its field."""
     rule = rule_of(field)
     expected = rule.item if rule.item and isinstance(path[-1], int) else rule.expected
-    hint = _value_hint(rule, value, choices_of(field.annotation))
+    hint = _value_hint(rule, path, value, choices_of(field.annotation))
     return Problem(key_path(path), expected, quoted(value), hint)
 
 
@@ -286,14 +290,16 @@ def choice_problem(
     """Return the problem of a word that should choose a kind of table, and is none of the choices."""
     rule = rule_of(field)
     expected = listed([quoted(choice) for choice in choices], "or")
-    return Problem(key_path(path), expected, quoted(value), _value_hint(rule, value, choices))
+    return Problem(key_path(path), expected, quoted(value), _value_hint(rule, path, value, choices))
 
 
-def _value_hint(rule: Rule, value: object, words: Iterable[object]) -> str:
+def _value_hint(rule: Rule, path: Sequence[str | int], value: object, words: Iterable[object]) -> str:
     if isinstance(value, str) and value in rule.unavailable:
         return f'"{value}" is not available in this version.'
     choices = [word for word in words if isinstance(word, str)]
     if isinstance(value, str) and choices:
+        if said := effect_not_modelled(str(path[0]), value):
+            return said
         near = _nearest_word(value, choices)
         return f'Did you mean "{near}"?' if near else rule.hint
     if isinstance(value, str) and _NUMBER_IN_TEXT.match(value):

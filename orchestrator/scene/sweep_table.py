@@ -26,8 +26,10 @@ from vibroimpact.orchestrator.scene.keys import (
     model_of,
     numeric_key,
     parse_key,
+    table_named,
 )
 from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
+from vibroimpact.orchestrator.scene.not_modelled import effect_not_modelled
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -180,7 +182,12 @@ def _count(document: Mapping[str, Any], name: str) -> int:
 def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list[str]) -> str:
     if isinstance(entry, dict) and text in SWEEPABLE and entry:
         return f'Put the whole key in quotes: "{text}.{next(iter(entry))}".'
-    table = text.partition(".")[0].partition("[")[0]
+    owner, _, rest = text.partition(".")
+    if named := table_named(owner, document):
+        return f"Did you mean {named}.{rest}?"
+    table = owner.partition("[")[0]
+    if said := effect_not_modelled(table, text.rpartition(".")[2].partition("[")[0]):
+        return said
     if table in ARRAY_TABLES and isinstance(document.get(table), list):
         key, count = parse_key(text), _count(document, table)
         if key is None or key.place is None or key.place >= count:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.scene.draft import Draft, Reading
-from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
+from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES, table_named
 from vibroimpact.orchestrator.scene.models import Record
-from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
+from vibroimpact.orchestrator.scene.problems import MODELLED, Problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene.rules.scene import rule_problems
 from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep, with_realisations
 
@@ -74,8 +74,13 @@ def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iter
             yield Problem(name, f"[{name}] in a scene with [body]", "one beside [component.NAME]", hint)
         elif name not in known:
             problem = unknown_key((name,), known)
+            hint = problem.hint
+            if named := table_named(name, document):
+                key = f".{next(iter(value))}" if isinstance(value, dict) and len(value) == 1 else ""
+                hint = f"Did you mean {named}{key}?"
             what = "table" if isinstance(value, dict | list) else "key outside any table"
-            yield Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", problem.hint)
+            general = Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", hint)
+            yield problem if problem.expected == MODELLED else general
 
 
 def _applicable(record: Record) -> Record:

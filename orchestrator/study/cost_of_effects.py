@@ -124,7 +124,8 @@ def _as_a_whole(motion: Motion, full: Motion | None = None) -> tuple[str, ...]:
     for name, value in motion.of.items():
         cell = "-" if np.isnan(value) else f"{value:.4g}"
         if not np.isnan(changes.get(name, np.nan)):
-            cell += f", {change_in_words(changes[name], chance[name])}"
+            words = change_in_words(changes[name], chance[name])
+            cell += ", " + words.replace(" (", "\n(")  # long lines would leave no width to the names
         cells.append(cell)
     return str(motion.impacts), *cells, motion.orbit or "-"
 

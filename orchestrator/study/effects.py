@@ -405,7 +405,7 @@ class _Compared:
         full = self._motions[base]
         if full is None or not (lost or full.chaotic):
             return share
-        share = replace(share, changes=lost or CHAOS, change=math.nan)
+        share = replace(share, changes=lost or full.change, change=math.nan)
         if self._scene.replay is not None:
             share = replace(share, statistics=statistics_of(alone, reference, ()))
         without = motion_of(share.effect.without)

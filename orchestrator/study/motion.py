@@ -11,6 +11,8 @@ import numpy as np
 
 from vibroimpact.analysis.dataset.results import TableRow
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, signals_of
+from vibroimpact.orchestrator.scene.models import StopTable
 from vibroimpact.orchestrator.scene.sampled_names import CONSERVATIVE
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Observation
@@ -55,6 +57,10 @@ SAMPLES_A_PERIOD, MOST_SAMPLES = 256, 2**16
 """Samples of the energies in a forcing period, and at most in a run; an unforced run has `MOST_SAMPLES` / 16."""
 CHAOS = "chaotic"
 """Class of a motion that becomes another motion by a small change of a number."""
+QUASI_PERIODIC, NO_PERIOD = "quasi-periodic forcing", "forcing without a period"
+"""Classes of motions under forces that never repeat: under sines alone, and beside other signals or drifting stops."""
+SENSITIVE = "a small change leads to another motion"
+"""Difference of a motion under such forces from its replicates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +72,24 @@ class Motion:
     impacts: int
     """Number of recorded impacts."""
     orbit: str
-    """Class of the motion: `P(p,q)`, `chaotic`, `no impacts`, ...; empty without forcing."""
+    """Class of the motion: `P(p,q)`, `chaotic`, `no impacts`, ...; empty without forcing.
+
+    Under forces without a common period it names these forces: the motion has no class.
+    """
     sampling: Mapping[str, float] = field(default_factory=dict)
-    """Largest relative difference among runs from slightly different numbers, by quantity; empty without chaos."""
+    """Largest relative difference among runs from slightly different numbers, by quantity; empty if they agree."""
 
     @property
     def chaotic(self) -> bool:
         """Whether a small change of a number leads to another motion."""
         return bool(self.sampling)
+
+    @property
+    def change(self) -> str:
+        """The word for a motion that a small change of a number makes another one; empty for other motions."""
+        if not self.chaotic:
+            return ""
+        return CHAOS if self.orbit == CHAOS else SENSITIVE
 
 
 def motion_of(scene: Scene) -> Motion | None:
@@ -85,7 +101,10 @@ def motion_of(scene: Scene) -> Motion | None:
     found = observed(followed)
     if found.failure:
         return None
-    orbit = orbit_of(found, None if scene.replay else scene.period, scales.window)
+    clock = _acting_clock(scene)
+    unclassed = _without_a_period(scene, clock) if len(found.impacts) else ""
+    period = None if clock is None or scene.replay else clock.period
+    orbit = unclassed or orbit_of(found, period, scales.window)
     own = Motion(_quantities(found, scene), len(found.impacts), orbit)
     if orbit.startswith("P(") or not len(found.impacts):
         return own
@@ -97,7 +116,21 @@ def motion_of(scene: Scene) -> Motion | None:
         name: max((abs(_relative(one[name], own.of[name])) for one in known), default=math.nan)
         for name in QUANTITIES
     }
-    return replace(own, orbit=CHAOS, sampling=sampling)
+    return replace(own, orbit=unclassed or CHAOS, sampling=sampling)
+
+
+def _acting_clock(scene: Scene) -> Clock | None:
+    """Return the clock of the forces that are not 0; that of all forces where none is left."""
+    acting = [force for force in scene.forces if np.any(force.amplitude)]
+    return clock_of(acting, scene.stops) or scene.clock
+
+
+def _without_a_period(scene: Scene, clock: Clock | None) -> str:
+    """Return the class of a motion whose forces never repeat; empty for other scenes."""
+    if clock is None or clock.is_common:
+        return ""
+    drifts = any(isinstance(stop, StopTable) and stop.drifts for stop in scene.stops)
+    return NO_PERIOD if drifts or signals_of(scene.forces) else QUASI_PERIODIC
 
 
 def is_chaotic(found: Observation, replicates: Sequence[Observation], scales: Scales) -> bool:

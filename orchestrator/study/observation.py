@@ -68,7 +68,7 @@ def observation_of(record: RunRecord) -> Observation:
     if record.outcome == Outcome.timeout:
         failure = LATE
     elif record.outcome not in (Outcome.ok, Outcome.stuck):
-        failure = f"{record.outcome.name}: {record.message}"
+        failure = f"{record.outcome.name}: {record.message.removeprefix(f'{record.outcome.name}: ')}"
     impacts, periods = _no_impacts(), record.periods
     if record.impacts is not None:
         impacts = record.impacts[:, [IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT]]

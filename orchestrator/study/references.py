@@ -25,6 +25,13 @@ DISTURBANCE = 1e-9
 """Relative change of a number of the scene that measures the sensitivity of its motion."""
 DISTURBED = (
     *("body.mass", "body.masses[1]", "body.mass_per_length", "body.stiffness", "body.frequency"),
+    *(
+        "body[1].mass",
+        "body[1].masses[1]",
+        "body[1].mass_per_length",
+        "body[1].stiffness",
+        "body[1].frequency",
+    ),
     *("forcing.amplitude", "stop[1].position", "body.velocity_start", "body.displacement_start"),
 )
 """Keys of the numbers that are disturbed, where a scene has them."""

@@ -2,12 +2,19 @@
 
 import math
 from itertools import islice
+from typing import Any
 
 import mpmath as mp
+import numpy as np
 import pytest
+import xarray as xr
+from scipy.optimize import brentq
 from support.component_fmu import ComponentFmu
 from support.moving_stops import ball_on_table
 from support.shaken_table import DIGITS, Table, events
+
+import vibroimpact as vi
+from vibroimpact.orchestrator.scene import Scene
 
 HALF_TURN = math.pi
 
@@ -82,3 +89,104 @@ def test_the_cycle_doubles_at_its_known_amplitude() -> None:
             differences.append(abs(last[1] - last[0]))
     assert differences[0] < 1e-5
     assert differences[1] > 0.05
+
+
+# ---- bodies that a moving stop presses against others ----
+
+ENERGIES = ("kinetic", "potential", "forcing_work", "damping_loss", "contact_loss")
+
+
+def run(rate: float, tables: dict[str, Any]) -> xr.Dataset:
+    """Run a scene for a period, with its energies."""
+    record = {
+        "time_series": {"rate": rate, "variables": [f"energy.{name}" for name in ENERGIES]},
+        "transient_periods": 0,
+        "recorded_periods": 1,
+    }
+    return vi.run(Scene.from_dict({"scene": {"units": "nondimensional"}, "record": record} | tables))
+
+
+def imbalance(found: xr.Dataset) -> float:
+    """Return the largest error of the balance of energies, J."""
+    kinetic, potential, work, loss, contact = (found[f"energy_{name}"].values for name in ENERGIES)
+    balance = kinetic + potential - work + loss + contact
+    return float(np.abs(balance - balance[0]).max())
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.9, 1.0])
+def test_a_row_of_balls_between_closing_stops_ends_by_name(restitution: float) -> None:
+    # once the joint impulses of the three contacts were 1e5 times too large, and the run went on
+    balls = [
+        {"name": name, "mass": mass, "stiffness": 0.0} for name, mass in (("a", 1.0), ("b", 2.0), ("c", 0.7))
+    ]
+    pairs = [{"between": list(pair), "clearance": 0.05, "restitution": restitution} for pair in ("ab", "bc")]
+    jaws = [
+        {"at": "a", "side": "lower", "position": -0.2, "restitution": 0.0, "velocity": 0.1},
+        {"at": "c", "side": "upper", "position": 0.3, "restitution": 0.0},
+    ]
+    tables: dict[str, Any] = {"body": balls, "contact": pairs, "stop": jaws}
+    before, after = (
+        run(
+            20.0,
+            tables | {"forcing": [{"at": "a", "amplitude": 0.0, "angular_frequency": 2.0 * math.pi / until}]},
+        )
+        for until in (5.999, 6.001)
+    )
+    assert imbalance(before) < 1e-12
+    assert (
+        str(after.message.values)
+        .split(", got none at ")[0]
+        .endswith(
+            "contact[1], contact[2], contact[3], contact[4]: expected room between their stops, of which one moves"
+        )
+    )
+    assert float(str(after.message.values).split("got none at ")[1].split(" s")[0]) == pytest.approx(
+        6.0, abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_a_moving_stop_bears_the_force_of_a_power_law_that_moves_nothing(damping: float) -> None:
+    amplitude, w, mass, stiffness, hertz, gap = 0.5, 1.3, 2.0, 1.0, 10.0, 0.1
+    law = {"law": "hunt_crossley", "damping": damping} if damping else {"law": "hertz"}
+    stops = [
+        {"side": "upper", "position": gap, "stiffness": hertz, **law},
+        {
+            "side": "lower",
+            "position": 0.0,
+            "restitution": 0.0,
+            "motion_amplitude": amplitude,
+            "motion_angular_frequency": w,
+        },
+    ]
+    found = run(
+        30.0,
+        {"body": {"mass": mass, "stiffness": stiffness, "displacement_start": amplitude}, "stop": stops},
+    )
+
+    def force(time: float) -> float:
+        place, speed = amplitude * math.cos(w * time), -amplitude * w * math.sin(w * time)
+        depth = max(0.0, place - gap)
+        pressed = hertz * depth**1.5 * (1.0 + damping * speed)
+        return pressed + (stiffness - mass * w * w) * place
+
+    release = brentq(force, 0.0, 0.5 * math.pi / w, xtol=1e-15)
+    assert float(found.stick_end[0]) == pytest.approx(release, abs=1e-10)
+    assert imbalance(found) < 1e-9
+
+
+@pytest.mark.parametrize("law", [{"law": "hertz"}, {"law": "hunt_crossley", "damping": 0.4}])
+def test_the_work_of_a_stop_that_presses_a_body_into_a_power_law(law: dict[str, Any]) -> None:
+    # once the series of the force, which moves nothing, went beyond where it converges: a work of 1e39 J
+    speed, gap, until = 0.5, 0.05, 3.0
+    stops = [
+        {"side": "upper", "position": gap, "stiffness": 10.0, **law},
+        {"side": "lower", "position": 0.0, "restitution": 0.0, "velocity": speed},
+    ]
+    none = {"amplitude": 0.0, "angular_frequency": 2.0 * math.pi / until}
+    body = {"mass": 2.0, "stiffness": 1.0, "velocity_start": speed}
+    found = run(30.0, {"body": body, "stop": stops, "forcing": [none]})
+    depth = speed * float(found.time[-1]) - gap
+    loss = (1.0 + law.get("damping", 0.0) * speed) * 10.0 * depth**2.5 / 2.5
+    assert float(found.energy_forcing_work[-1]) == pytest.approx(loss + 0.5 * (depth + gap) ** 2, rel=1e-9)
+    assert imbalance(found) < 1e-9

@@ -3,6 +3,7 @@
 #include "../../fmus/native/adapters/model_exchange.c"
 #include "../../fmus/native/adapters/resources.c"
 #include "../../fmus/native/adapters/saved_states.c"
+#include "../../fmus/native/adapters/sparse.c"
 
 #include "check.h"
 
@@ -161,6 +162,38 @@ static void states_come_back_and_damaged_ones_do_not(uint64_t *seed)
     vi_instance_free(instance);
 }
 
+static void bytes_come_back_from_their_packed_form(uint64_t *seed)
+{
+    for (int n = 0; n < 3000; ++n) {
+        const size_t size = 1 + (size_t)(next_random(seed) % 2000);
+        unsigned char *bytes = calloc(size, 1); /* of exactly the needed sizes, for the sanitizer */
+        unsigned char *back = malloc(size);
+        CHECK(bytes != NULL && back != NULL, "%s", "memory");
+        const uint32_t numbers = choice(seed, 40);
+        for (uint32_t i = 0; i < numbers; ++i) {
+            bytes[next_random(seed) % size] = (unsigned char)next_random(seed);
+        }
+        const size_t packed_size = vi_sparse_pack(bytes, size, NULL, 0);
+        unsigned char *packed = malloc(packed_size);
+        CHECK(packed != NULL && packed_size <= size + size / 512 + 1, "%lu bytes", (unsigned long)packed_size);
+        CHECK(vi_sparse_pack(bytes, size, packed, packed_size - 1) == packed_size, "%s", "too little room");
+        CHECK(vi_sparse_pack(bytes, size, packed, packed_size) == packed_size, "%s", "just enough room");
+        memset(back, 1, size);
+        vi_sparse_unpack(packed, back, size);
+        CHECK(memcmp(bytes, back, size) == 0, "%lu bytes", (unsigned long)size);
+        CHECK(vi_sparse_fits(packed, packed_size, size), "%lu bytes", (unsigned long)packed_size);
+        CHECK(!vi_sparse_fits(packed, packed_size + 1, size), "%s", "one byte more");
+        CHECK(!vi_sparse_fits(packed, packed_size - 1, size), "%s", "one byte less");
+        if (size >= 64) {
+            packed[0] ^= 1u; /* another number of blocks */
+            CHECK(!vi_sparse_fits(packed, packed_size, size), "%s", "another block");
+        }
+        free(bytes);
+        free(back);
+        free(packed);
+    }
+}
+
 static void the_longest_message_fits(void)
 {
     vi_instance *instance = vi_instance_new("a name that is not short at all, so that something must be cut off somewhere");
@@ -273,6 +306,7 @@ int main(int count, char *arguments[])
     any_references_do_no_harm(&seed, folder);
     random_references_and_sizes_are_errors_or_right(&seed);
     states_come_back_and_damaged_ones_do_not(&seed);
+    bytes_come_back_from_their_packed_form(&seed);
     the_longest_message_fits();
     return 0;
 }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from support.structure import Modes, Stop, Structure
+from vibroimpact.fmus.core.arrays import address
 from vibroimpact.fmus.core.lanes import (
     IMPACT_WIDTH,
     MOST_CONTACTS,
@@ -23,7 +24,6 @@ from vibroimpact.fmus.core.lanes import (
     lanes_memory,
     run_lanes,
 )
-from vibroimpact.fmus.core.runs import address
 
 Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]

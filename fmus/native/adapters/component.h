@@ -1,7 +1,8 @@
 /* The interface of a component (Oscillator, ImpactStop, ...) to the FMI adapters.
  *
  * All variables of a component live in one flat struct; `vi_this_description`, which the build generates from
- * variables.toml, gives their places. So get and set are table look-ups, and saving a state is a memcpy. The adapters
+ * variables.toml, gives their places. So get and set are table look-ups, and saving a state is a copy
+ * without zeros. The adapters
  * fmi2.c and fmi3.c are compiled once for each component and know nothing of its physics.
  */
 #ifndef VIBROIMPACT_COMPONENT_H

@@ -3,34 +3,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A saved state: this header, then the used part of the component's struct. */
+#include "hash.h"
+#include "sparse.h"
+
+/* A saved state: this header, then the used part of the component's struct without its zeros. */
 typedef struct {
     char magic[8];
     uint64_t token_hash, state_hash;
-    uint64_t size, capacity; /* of the data, bytes */
+    uint64_t size;             /* of the used part, bytes */
+    uint64_t packed, capacity; /* of the data, and room for them, bytes */
     int64_t mode, exchange;
     double start_time;
     int64_t outputs_stale;
     unsigned char data[];
 } vi_saved;
 
-static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
-
-static const uint64_t HASH_START = 1469598103934665603u;
-
-/* FNV-1a hash: detects a damaged or foreign state, but no forgery. */
-static uint64_t hash(uint64_t h, const void *data, size_t size)
-{
-    const unsigned char *bytes = data;
-    for (size_t i = 0; i < size; ++i) {
-        h = (h ^ bytes[i]) * 1099511628211u;
-    }
-    return h;
-}
+static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '2'};
 
 static uint64_t token_hash(void)
 {
-    return hash(HASH_START, vi_this_description.token, strlen(vi_this_description.token));
+    return vi_hash(VI_HASH_START, vi_this_description.token, strlen(vi_this_description.token));
 }
 
 static size_t used_size(const vi_instance *instance)
@@ -43,8 +35,8 @@ static size_t used_size(const vi_instance *instance)
 static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
 {
     const size_t first = offsetof(vi_saved, size);
-    const uint64_t h = hash(HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
-    return hash(h, data, header->size);
+    const uint64_t h = vi_hash(VI_HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
+    return vi_hash(h, data, header->packed);
 }
 
 bool vi_state_save(vi_instance *instance, const char *function, void **state)
@@ -54,21 +46,24 @@ bool vi_state_save(vi_instance *instance, const char *function, void **state)
     }
     const size_t size = used_size(instance);
     vi_saved *saved = *state;
-    if (saved == NULL || saved->capacity < size) {
-        saved = realloc(saved, sizeof(vi_saved) + size);
+    const size_t room = saved == NULL ? 0 : saved->capacity;
+    const size_t packed = vi_sparse_pack(instance->self, size, saved == NULL ? NULL : saved->data, room);
+    if (saved == NULL || packed > room) {
+        saved = realloc(saved, sizeof(vi_saved) + packed);
         if (saved == NULL) {
             return vi_instance_fail(instance, function, "out of memory");
         }
         memset(saved, 0, sizeof(vi_saved));
-        saved->capacity = size;
+        saved->capacity = packed;
+        vi_sparse_pack(instance->self, size, saved->data, packed);
     }
     memcpy(saved->magic, MAGIC, sizeof MAGIC);
     saved->size = size;
+    saved->packed = packed;
     saved->mode = (int64_t)instance->mode;
     saved->exchange = instance->exchange;
     saved->start_time = instance->start_time;
     saved->outputs_stale = instance->outputs_stale;
-    memcpy(saved->data, instance->self, size);
     *state = saved;
     return true;
 }
@@ -90,7 +85,7 @@ bool vi_state_restore(vi_instance *instance, const char *function, const void *s
                                 instance->exchange ? "model exchange" : "co-simulation",
                                 instance->exchange ? "co-simulation" : "model exchange");
     }
-    memcpy(instance->self, saved->data, saved->size);
+    vi_sparse_unpack(saved->data, instance->self, saved->size);
     instance->mode = (vi_mode_of_use)saved->mode;
     instance->start_time = saved->start_time;
     instance->outputs_stale = saved->outputs_stale != 0;
@@ -111,7 +106,7 @@ bool vi_state_size(const vi_instance *instance, const void *state, size_t *size)
     if (instance == NULL || state == NULL || size == NULL) {
         return false;
     }
-    *size = sizeof(vi_saved) + ((const vi_saved *)state)->size;
+    *size = sizeof(vi_saved) + ((const vi_saved *)state)->packed;
     return true;
 }
 
@@ -124,10 +119,10 @@ bool vi_state_write(const vi_instance *instance, const void *state, unsigned cha
     }
     vi_saved header = *saved;
     header.token_hash = token_hash();
-    header.capacity = saved->size;
+    header.capacity = saved->packed;
     header.state_hash = state_hash(&header, saved->data);
     memcpy(bytes, &header, sizeof header);
-    memcpy(bytes + sizeof header, saved->data, saved->size);
+    memcpy(bytes + sizeof header, saved->data, saved->packed);
     return true;
 }
 
@@ -143,8 +138,9 @@ bool vi_state_read(vi_instance *instance, const char *function, const unsigned c
     memcpy(&header, bytes, sizeof header);
     const unsigned char *data = bytes + sizeof header;
     if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
-        || header.size != size - sizeof header || header.size > vi_this_description.struct_size
-        || header.state_hash != state_hash(&header, data)) {
+        || header.packed != size - sizeof header || header.size > vi_this_description.struct_size
+        || header.state_hash != state_hash(&header, data)
+        || !vi_sparse_fits(data, header.packed, header.size)) {
         return vi_instance_fail(instance, function,
                                 "these bytes are not an undamaged state of this component and version");
     }
@@ -153,7 +149,7 @@ bool vi_state_read(vi_instance *instance, const char *function, const unsigned c
         return vi_instance_fail(instance, function, "out of memory");
     }
     memcpy(saved, bytes, size);
-    saved->capacity = header.size;
+    saved->capacity = header.packed;
     *state = saved;
     return true;
 }

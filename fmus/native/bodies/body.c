@@ -6,6 +6,7 @@
 #include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body/modal/structure/jam.h"
 #include "body/modal/structure/moved_stops.h"
 #include "body/modal/structure/unbounded.h"
 #include "body_check.h"
@@ -370,7 +371,7 @@ static vi_step_result advance(vi_body *c, vi_instant target, const vi_step_reque
     const vi_structure parts = vi_body_parts(c);
     c->state.follow_energies = c->record_energies;
     const vi_step_result result = vi_structure_advance(&parts, target, request);
-    if (result == VI_STEP_STANDSTILL && !vi_stop_motions_complain(&parts, message)) {
+    if (result == VI_STEP_STANDSTILL && !vi_structure_jam_complains(&parts, message)) {
         vi_structure_complain(&parts, message);
     }
     if (result == VI_STEP_UNBOUNDED) {

@@ -6,18 +6,7 @@
 #include <string.h>
 
 #include "body/signal_check.h"
-
-static const uint64_t HASH_START = 1469598103934665603u;
-
-/* FNV-1a hash. */
-static uint64_t hash(uint64_t h, const void *data, size_t size)
-{
-    const unsigned char *bytes = data;
-    for (size_t i = 0; i < size; ++i) {
-        h = (h ^ bytes[i]) * 1099511628211u;
-    }
-    return h;
-}
+#include "hash.h"
 
 /* Number of signals in use: up to the last one of any kind. */
 static int used(const vi_structure_signals *signals)
@@ -100,11 +89,11 @@ void vi_structure_check_signals(const vi_structure_signals *signals, int modes, 
 uint64_t vi_structure_signals_key(const vi_structure_signals *signals)
 {
     const int count = used(signals);
-    uint64_t key = hash(HASH_START, signals->signal, (size_t)count * sizeof signals->signal[0]);
+    uint64_t key = vi_hash(VI_HASH_START, signals->signal, (size_t)count * sizeof signals->signal[0]);
     for (int k = 0; k < count; ++k) {
         const vi_table table = table_of(signals, k);
-        key = hash(key, table.time, (size_t)table.count * sizeof table.time[0]);
-        key = hash(key, table.value, (size_t)table.count * sizeof table.value[0]);
+        key = vi_hash(key, table.time, (size_t)table.count * sizeof table.time[0]);
+        key = vi_hash(key, table.value, (size_t)table.count * sizeof table.value[0]);
     }
     return count > 0 ? key | 1u : 0u;
 }

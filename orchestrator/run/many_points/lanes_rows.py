@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import STICK_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import lanes as core
-from vibroimpact.fmus.core.runs import address
+from vibroimpact.fmus.core.arrays import address
 from vibroimpact.orchestrator.run.many_points.lanes import lane_points
 from vibroimpact.orchestrator.run.many_points.lanes_samples import LaneSamples, fits
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues, PreparedPoints

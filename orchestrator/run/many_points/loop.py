@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.core import runs as core
+from vibroimpact.fmus.core.arrays import address
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN, RecordedBody
@@ -115,7 +116,7 @@ class PointLoop:
 
     def _address(self, values: Any, dtype: Any) -> int:
         self._kept.append(np.ascontiguousarray(values, dtype=dtype))
-        return core.address(self._kept[-1])
+        return address(self._kept[-1])
 
     def _variables(self, names: Sequence[str]) -> core.RunsVariables:
         references = [self.driver.references[name] for name in names]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import STICK_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
 from vibroimpact.fmus.core import runs as core
+from vibroimpact.fmus.core.arrays import address
 from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PreparedPoints
 from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.run.points import State
@@ -110,7 +111,7 @@ class LoopArrays:
         }
         self.state = core.RunsPoints(count=count, rows_room=ROWS_ROOM, most_seconds=LISTEN_SECONDS)
         for name, array in self._arrays.items():
-            setattr(self.state, name, core.address(array))
+            setattr(self.state, name, address(array))
         self._blocks: list[Floats] = []
         self._give_up_at = (0, math.inf)  # a point under way, and the end of its time
         self._carry(start)

@@ -79,15 +79,29 @@ void vi_check_each(char message[VI_MESSAGE_LENGTH], vi_check check, const char *
     }
 }
 
-void vi_complain_of_standstill(char message[VI_MESSAGE_LENGTH], double time, const int on_stop[], int count)
+/* The names of the chosen contacts, at least one character. */
+static void list_contacts(char names[16 * VI_PORTS], const int chosen[], int count)
 {
-    char names[16 * VI_PORTS] = "no contact";
     size_t used = 0;
+    (void)snprintf(names, 16, "no contact");
     for (int k = 0; k < count; ++k) {
-        if (on_stop[k]) {
-            used += (size_t)snprintf(names + used, sizeof names - used, "%scontact[%d]", used > 0 ? ", " : "", k + 1);
+        if (chosen[k]) {
+            used += (size_t)snprintf(names + used, 16 * VI_PORTS - used, "%scontact[%d]", used > 0 ? ", " : "", k + 1);
         }
     }
+}
+
+void vi_complain_of_standstill(char message[VI_MESSAGE_LENGTH], double time, const int on_stop[], int count)
+{
+    char names[16 * VI_PORTS];
+    list_contacts(names, on_stop, count);
     vi_complain(message, "%s: expected a motion that goes on, got %d events at %.17g s. Change a gap, a start value or"
                          " contact_tolerance a little", names, VI_MOST_EVENTS, time);
+}
+
+void vi_complain_of_jam(char message[VI_MESSAGE_LENGTH], double time, const int jammed[], int count)
+{
+    char names[16 * VI_PORTS];
+    list_contacts(names, jammed, count);
+    vi_complain(message, "%s: expected room between their stops, of which one moves, got none at %.17g s", names, time);
 }

@@ -27,4 +27,7 @@ void vi_check_each(char message[VI_MESSAGE_LENGTH], vi_check check, const char *
 /* Complain that time stands still at `time`, s, and name the contacts on their stops. */
 void vi_complain_of_standstill(char message[VI_MESSAGE_LENGTH], double time, const int on_stop[], int count);
 
+/* Complain of these contacts, whose stops leave bodies no room. */
+void vi_complain_of_jam(char message[VI_MESSAGE_LENGTH], double time, const int jammed[], int count);
+
 #endif

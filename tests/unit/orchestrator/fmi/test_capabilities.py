@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from xml.etree.ElementTree import Element, parse
 
 import numpy as np
 import pytest
@@ -14,14 +12,12 @@ from fmpy.fmi3 import FMU3Slave
 from support import fmu_factory
 from support.coupled_parts import link, part, values
 from support.fmu_factory import redescribed
-from support.places import ROOT
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.fmus.packaging.fmpy_door import schema_folder
 from vibroimpact.orchestrator.fmi import instance2, instance3
-from vibroimpact.orchestrator.fmi.capabilities import FLAGS, Flag, Treatment
+from vibroimpact.orchestrator.fmi.capabilities import FLAGS, Treatment
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer import plain_loop
@@ -31,10 +27,7 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopC
 from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
-XS = "{http://www.w3.org/2001/XMLSchema}"
 VERSIONS = ("2.0", "3.0")
-INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
-NO_FLAGS = {"modelIdentifier"}
 STATES = ' canGetAndSetFMU{0}="true" canSerializeFMU{0}="true"'
 MASS = """
 [scene]
@@ -49,6 +42,17 @@ variables = ["m.x", "m.v"]
 [execution]
 macro_step = {macro_step}
 """
+
+
+Test = Callable[..., None]
+PUNISHED: set[tuple[str, str]] = set()
+"""Owner and name of each heeded flag with a test whose FMU punishes its neglect."""
+
+
+def punishes(*names: str) -> Callable[[Test], Test]:
+    """Note that the FMU of a test punishes the neglect of these flags."""
+    PUNISHED.update((f.owner, f.name) for f in FLAGS if f.name in names and f.treatment is Treatment.heeded)
+    return lambda test: test
 
 
 @pytest.fixture(scope="module")
@@ -91,67 +95,6 @@ def described(folder: Path, source: str, *replacements: tuple[str, str]) -> str:
     """Return the name of an FMU of the folder with a changed description."""
     count = sum(1 for _ in folder.glob("described*.fmu"))
     return redescribed(folder / source, folder / f"described{count}.fmu", *replacements).name
-
-
-# ---- the table ----
-
-
-def flags_of_schema(version: str) -> Iterator[tuple[str, str]]:
-    """Yield the owner and the name of each flag that the schema of a version has."""
-    root = schema_folder() / f"fmi{version[0]}"
-    for file in sorted(root.glob("*.xsd")):
-        for element in parse(file).getroot().iter():
-            owner = owner_of(element, version)
-            for attribute in element.iter(f"{XS}attribute") if owner in INTERFACES else ():
-                if not in_source_files(element, attribute) and attribute.get("name") not in NO_FLAGS:
-                    for one in INTERFACES if element.get("name") == "fmi3InterfaceType" else (owner,):
-                        yield one, attribute.get("name", "")
-            if owner == "CoSimulation" or owner in INTERFACES:
-                continue
-            for attribute in element.findall(f"{XS}attribute"):
-                name = attribute.get("name", "")
-                if re.match("can|needs|provides|supports|has|might", name) or name == "intervalVariability":
-                    yield ("clock" if "Clock" in element.get("name", "") else "variable"), name
-
-
-def owner_of(element: Element, version: str) -> str:
-    name = element.get("name", "")
-    if element.tag == f"{XS}element" and version == "2.0" and name in INTERFACES:
-        return name
-    if element.tag == f"{XS}complexType" and version == "3.0":
-        return "CoSimulation" if name == "fmi3InterfaceType" else name.removeprefix("fmi3")
-    return ""
-
-
-def in_source_files(interface: Element, attribute: Element) -> bool:
-    return any(attribute in list(e.iter()) for e in interface.iter(f"{XS}element") if e.get("name") == "File")
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_every_flag_of_the_schema_stands_in_the_table_and_nothing_else_does(version: str) -> None:
-    of_schema = {
-        (owner, name)
-        for owner, name in flags_of_schema(version)
-        if owner in (*INTERFACES, "variable", "clock")
-    }
-    # the attributes of an interface include those of its elements
-    interfaces = {name for owner, name in of_schema if owner in INTERFACES}
-    of_schema = {(o, n) for o, n in of_schema if o != "variable" or n not in interfaces}
-    in_table = {(flag.owner, flag.name) for flag in FLAGS if version in flag.versions.split(", ")}
-    assert in_table == of_schema
-    assert len(of_schema) > 15
-
-
-def test_the_table_of_the_page_is_that_of_the_code() -> None:
-    page = (ROOT / "docs" / "exchange.md").read_text(encoding="utf-8")
-    for flag in FLAGS:
-        if flag.owner in ("CoSimulation", "clock"):
-            assert f"| `{flag.name}` | {flag.versions} | {flag.treatment}: {flag.how} |" in page
-
-
-def test_every_heeded_flag_has_an_fmu_that_punishes_its_neglect() -> None:
-    heeded = {(flag.owner, flag.name) for flag in FLAGS if flag.treatment is Treatment.heeded}
-    assert heeded == {(flag.owner, flag.name) for flag in PUNISHED}
 
 
 # ---- a step is never taken back behind its start ----
@@ -216,6 +159,7 @@ def test_steps_of_one_size_are_kept_and_read_where_they_end(
     np.testing.assert_allclose(samples[:, 1:], exact(samples), atol=1e-12)
 
 
+@punishes("canHandleVariableCommunicationStepSize")
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu(folder: Path, fmi: str) -> None:
     # the FMU declares steps of any size
@@ -239,6 +183,7 @@ def test_an_event_that_cuts_a_step_of_one_size_is_an_error_with_the_attribute(
     importer.free()
 
 
+@punishes("fixedInternalStepSize")
 def test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end(folder: Path) -> None:
     declared = part("ball", folder / "SteppedBall.fmi3.fmu")
     silent = folder / described(folder, "SteppedBall.fmi3.fmu", (' fixedInternalStepSize="1e-3"', ""))
@@ -258,6 +203,7 @@ def test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end(folder: Path) -
 # ---- heeded: states, event mode, early return ----
 
 
+@punishes("canGetAndSetFMUstate", "canGetAndSetFMUState")
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_an_fmu_without_states_is_asked_for_none(folder: Path, fmi: str) -> None:
     fmu = f"StatelessMass.fmi{fmi[0]}.fmu"
@@ -280,6 +226,7 @@ def bounces(fmu: Path) -> list[float]:
     return found
 
 
+@punishes("hasEventMode")
 def test_event_mode_is_entered_where_it_is_declared_alone(folder: Path) -> None:
     ball = folder / "SteppedBall.fmi3.fmu"
     without = folder / described(folder, ball.name, ('hasEventMode="true"', 'hasEventMode="false"'))
@@ -292,6 +239,7 @@ def test_event_mode_is_entered_where_it_is_declared_alone(folder: Path) -> None:
         Instance3(unpack(folder / "Mass.fmi3.fmu"), "m", event_mode=True)
 
 
+@punishes("mightReturnEarlyFromDoStep")
 def test_an_early_return_counts_whether_it_was_announced_or_not(folder: Path) -> None:
     ball = folder / "SteppedBall.fmi3.fmu"
     silent = folder / described(folder, ball.name, (' mightReturnEarlyFromDoStep="true"', ""))
@@ -308,6 +256,7 @@ def test_an_early_return_counts_whether_it_was_announced_or_not(folder: Path) ->
 # ---- heeded: instances ----
 
 
+@punishes("canBeInstantiatedOnlyOncePerProcess")
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_process_has_one_instance_of_an_fmu_that_allows_no_more(folder: Path, fmi: str) -> None:
     fmu = folder / f"Single.fmi{fmi[0]}.fmu"
@@ -335,6 +284,7 @@ def test_a_process_has_one_instance_of_an_fmu_that_allows_no_more(folder: Path, 
     both.free()
 
 
+@punishes("needsExecutionTool")
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_the_tool_of_an_fmu_is_named_where_it_makes_no_instance(
     folder: Path, fmi: str, monkeypatch: pytest.MonkeyPatch
@@ -352,6 +302,7 @@ def test_the_tool_of_an_fmu_is_named_where_it_makes_no_instance(
     assert "needsExecutionTool" not in str(without.value)
 
 
+@punishes("canNotUseMemoryManagementFunctions")
 def test_memory_functions_are_given_to_every_fmu(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mass = folder / "Mass.fmi2.fmu"
     Instance2(unpack(mass), "m").free()
@@ -360,6 +311,11 @@ def test_memory_functions_are_given_to_every_fmu(folder: Path, monkeypatch: pyte
         Instance2(unpack(mass), "m")
 
 
+@punishes(
+    "providesIntermediateUpdate",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "recommendedIntermediateInputSmoothness",
+)
 def test_no_intermediate_update_is_asked_for(folder: Path) -> None:
     offers = (
         'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" '
@@ -392,6 +348,7 @@ OFFERED = {
 }
 
 
+@punishes(*(flag for _, flag in OFFERED))
 @pytest.mark.parametrize(("fmi", "flag"), OFFERED)
 def test_what_is_offered_and_not_needed_is_not_called(folder: Path, fmi: str, flag: str) -> None:
     fmu = f"StatelessMass.fmi{fmi[0]}.fmu"
@@ -492,6 +449,7 @@ def test_input_clocks_tick_at_their_instants(
     np.testing.assert_allclose(total, exact_sum, rtol=0, atol=1e-9)
 
 
+@punishes("intervalVariability", "canBeDeactivated")
 def test_a_clock_that_nobody_ticks_counts_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = CLOCKED.format(fmu="Clocked.fmi3.fmu", macro_step=0.1, major="3", exchange="jacobi")
     monkeypatch.setattr("vibroimpact.orchestrator.importer.ticks.Ticks.are_due", lambda *_: False)
@@ -500,13 +458,13 @@ def test_a_clock_that_nobody_ticks_counts_nothing(folder: Path, monkeypatch: pyt
     assert not samples[:, 2:].any()
 
 
+@punishes("supportsFraction")
 def test_the_interval_of_a_clock_may_be_a_fraction(folder: Path) -> None:
     # its functions for fractions return an error
     fraction = 'supportsFraction="true" canBeDeactivated="true" resolution="3" intervalCounter="1"'
     fmu = described(folder, "Clocked.fmi3.fmu", ('intervalDecimal="0.2"', fraction))
-    ticks = samples_of(run(CLOCKED.format(fmu=fmu, macro_step=0.1, major="3", exchange="jacobi"), folder))[
-        :, 2
-    ]
+    text = CLOCKED.format(fmu=fmu, macro_step=0.1, major="3", exchange="jacobi")
+    ticks = samples_of(run(text, folder))[:, 2]
     assert ticks[-1] == 3.0  # at 0, 1/3, 2/3; the tick at 1 comes after the last sample
     assert int(np.argmax(ticks == 2.0)) == 334
 
@@ -533,35 +491,9 @@ def test_clocked_components_feed_each_other_at_one_tick(folder: Path) -> None:
     importer.free()
 
 
-Punished = Callable[..., None]
-PUNISHED: dict[Flag, Punished] = {}
+# ---- all of them ----
 
 
-def _punished_by(test: Punished, *names: str) -> None:
-    """Register the test whose FMU punishes the neglect of these flags."""
-    for flag in FLAGS:
-        if flag.name in names and flag.treatment is Treatment.heeded:
-            PUNISHED[flag] = test
-
-
-_punished_by(test_the_tool_of_an_fmu_is_named_where_it_makes_no_instance, "needsExecutionTool")
-_punished_by(
-    test_a_process_has_one_instance_of_an_fmu_that_allows_no_more, "canBeInstantiatedOnlyOncePerProcess"
-)
-_punished_by(test_memory_functions_are_given_to_every_fmu, "canNotUseMemoryManagementFunctions")
-_punished_by(
-    test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu, "canHandleVariableCommunicationStepSize"
-)
-_punished_by(test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end, "fixedInternalStepSize")
-_punished_by(test_an_fmu_without_states_is_asked_for_none, "canGetAndSetFMUstate", "canGetAndSetFMUState")
-_punished_by(test_event_mode_is_entered_where_it_is_declared_alone, "hasEventMode")
-_punished_by(test_an_early_return_counts_whether_it_was_announced_or_not, "mightReturnEarlyFromDoStep")
-_punished_by(test_what_is_offered_and_not_needed_is_not_called, *(flag for _, flag in OFFERED))
-_punished_by(
-    test_no_intermediate_update_is_asked_for,
-    "providesIntermediateUpdate",
-    "canReturnEarlyAfterIntermediateUpdate",
-    "recommendedIntermediateInputSmoothness",
-)
-_punished_by(test_a_clock_that_nobody_ticks_counts_nothing, "intervalVariability", "canBeDeactivated")
-_punished_by(test_the_interval_of_a_clock_may_be_a_fraction, "supportsFraction")
+def test_every_heeded_flag_has_an_fmu_that_punishes_its_neglect() -> None:
+    heeded = {(flag.owner, flag.name) for flag in FLAGS if flag.treatment is Treatment.heeded}
+    assert heeded == PUNISHED

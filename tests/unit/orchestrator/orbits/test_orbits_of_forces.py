@@ -120,6 +120,22 @@ def test_basins_follow_states_in_lanes_and_one_by_one_alike(first: bool) -> None
     np.testing.assert_allclose(ends[0].states, ends[1].states, rtol=0.0, atol=1e-12)
 
 
+def test_states_that_come_to_rest_in_lanes_are_followed_as_one_by_one() -> None:
+    load = {"signal": "constant", "amplitude": 0.8}  # presses the body on its stop
+    weak = TWO["forcing"][0] | {"amplitude": 0.01}
+    states = np.array([[0.45, 0.3], [0.2, 0.1], [0.3, -0.4]])
+    ends, classes = [], []
+    for how in ("auto", "fused"):
+        flow = BodyFlow(scene(forcing=[weak, load], execution={"how": how}), workers=1)
+        with closing(flow):
+            ends.append(flow.follow(states, 6))
+            classes.append([each.name for each in flow.classes(states, 4)[0]])
+    assert all(each.well.all() for each in ends)
+    np.testing.assert_allclose(ends[0].states, ends[1].states, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(ends[0].states, [[0.5, 0.0]] * 3, rtol=0.0, atol=1e-12)
+    assert classes == [["rest"] * 3] * 2
+
+
 def test_basins_take_a_moving_stop() -> None:
     stop = {"position": 0.5, "restitution": 0.7, "motion_amplitude": 0.1, "motion_angular_frequency": 0.8}
     found = vi.basins(scene(stop=[stop]), points=(3, 3))

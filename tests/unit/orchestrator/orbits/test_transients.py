@@ -105,6 +105,41 @@ def test_without_a_force_the_period_is_that_of_the_first_mode() -> None:
 
 
 @pytest.mark.parametrize(
+    "load",
+    [
+        {"amplitude": 0.6, "angular_frequency": 0.0},
+        {"signal": "constant", "amplitude": 0.6},
+        {"amplitude": 1.2, "angular_frequency": 0.0, "phase": math.pi / 3.0},
+    ],
+)
+def test_a_constant_force_stays_where_the_first_mode_gives_the_period(load: dict[str, Any]) -> None:
+    pressed = {
+        "body": BODY,
+        "forcing": load,
+        "stop": [{"position": 0.5, "restitution": 0.7}],
+        "record": {"recorded_time": 10.0},
+    }
+    found = vi.transients(vi.Scene.from_dict(pressed), starts=2)
+    assert found.attrs["motion"] == "rest"  # without the load the body rests at 0, away from its stop
+    assert set(found.end.values) == {FORGOTTEN}
+    assert set(found.motion.values) == {"rest"}
+
+
+def test_a_chain_without_a_force_forgets_as_its_slowest_mode_says() -> None:
+    chain = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": 1.0, "dampings": 0.1}
+    tables = {"stop": [{"position": 1000.0, "restitution": 0.7}], "record": {"recorded_time": 10.0}}
+    found = vi.transients(vi.Scene.from_dict({"body": chain} | tables), starts=2)
+    assert found.contraction.values == pytest.approx(found.attrs["linear_contraction"], rel=1e-2)
+    assert set(found.end.values) == {FORGOTTEN}
+
+
+def test_a_random_force_has_no_period_of_its_own() -> None:
+    noise = [{"signal": "random", "amplitude": 0.1, "band": [0.5, 2.0]}]
+    with pytest.raises(UsageError, match="expected sines, constant forces or no force, got 1 random"):
+        vi.transients(vi.Scene.from_dict({"body": BODY, "forcing": noise, "record": {"recorded_time": 9.0}}))
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"starts": 0}, "transients: starts: expected 1 to 1000, got 0."),

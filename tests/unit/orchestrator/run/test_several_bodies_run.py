@@ -20,6 +20,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.summary import fused_form
+from vibroimpact.orchestrator.run.window import in_keys_of
 from vibroimpact.orchestrator.scene import Scene
 
 BEFORE_CHAOS = 30
@@ -328,6 +329,21 @@ def test_the_orbit_of_a_ball_in_a_cavity_is_the_motion_of_its_run(damping: float
     expected = np.sort(np.log(np.abs(orbit.multipliers)) / 2.0)
     assert np.sort(vi.lyapunov(recorded).lyapunov_exponent.values) == pytest.approx(expected, abs=1e-9)
     assert vi.energies(recorded).identity_error < 1e-12
+
+
+def test_messages_of_the_engine_have_the_names_of_the_scene() -> None:
+    stops = [
+        {"at": "a", "position": 1.0, "restitution": 0.5, "velocity": -0.1},
+        {"at": "b.1", "side": "lower", "position": -3.0, "restitution": 0.5},
+        {"at": "a", "side": "lower", "position": -1.0, "restitution": 0.5},
+    ]
+    said = str(run(stop=stops, forcing=TABLES["forcing"] | {"amplitude": 0.1}).message.item())
+    assert "stop[1] and stop[3]: expected room between their stops, of which one moves" in said
+    scene = Scene.from_dict(TABLES | {"stop": stops})
+    assert in_keys_of(scene, "contact[4].position: expected room between it and contact[3]") == (
+        "contact[1].clearance: expected room between it and stop[3]"
+    )
+    assert in_keys_of(scene, "contact[5].restitution of no contact") == "contact[5].restitution of no contact"
 
 
 def test_components_that_meet_only_each_other_have_a_fused_form() -> None:

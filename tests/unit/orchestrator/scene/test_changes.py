@@ -43,6 +43,26 @@ recorded_time = 1.0
 [sweep]
 "ball.mass" = { values = [1.0, 2.0] }
 """
+TWO_BODIES = """
+[[body]]
+name = "frame"
+mass = 1.0
+stiffness = 1.0
+[[body]]
+name = "ball"
+stiffness = 0.0
+mass = 0.02
+[[contact]]
+between = ["frame", "ball"]
+restitution = 0.8
+clearance = 0.05
+[forcing]
+at = "frame"
+amplitude = 0.1
+angular_frequency = 1.0
+[record]
+recorded_periods = 1
+"""
 
 
 def changed(*changes: str, text: str = ONE_STOP) -> Scene:
@@ -117,6 +137,16 @@ def test_a_number_that_the_sweep_replaces_is_not_changed_in_vain() -> None:
     assert said.startswith("--set: stop[1].restitution: expected a key that the scene does not sweep")
     assert changed("stop[1].restitution=0.9", "sweep={}", text=ONE_STOP + SWEEP).sweep == ()
     assert "does not sweep" in refused("component.ball.parameters.mass=3.0", text=BALL)
+
+
+def test_a_body_or_component_called_by_its_name_is_named_by_its_key() -> None:
+    assert refused("ball.mass=2", text=TWO_BODIES).endswith("Did you mean body[2].mass?")
+    assert refused("ball=2", text=TWO_BODIES).endswith("Did you mean body[2]?")
+    swept = refused('sweep={"ball.mass"={values=[1, 2]}}', text=TWO_BODIES)
+    assert swept.endswith('got "ball.mass". Did you mean body[2].mass?')
+    assert refused("ball.stiffness=2", text=BALL).endswith(
+        "Did you mean component.ball.parameters.stiffness?"
+    )
 
 
 @pytest.mark.parametrize(

@@ -14,14 +14,9 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import agree, si_unit
 from vibroimpact.orchestrator.scene import (
     Scene,
-    body_models,
-    component_models,
     forcing_models,
-    measuring_models,
     models,
     parse_scene,
-    replay_models,
-    sweep_models,
 )
 from vibroimpact.orchestrator.scene.body_models import (
     BeamBody,
@@ -33,19 +28,12 @@ from vibroimpact.orchestrator.scene.body_models import (
 from vibroimpact.orchestrator.scene.component_facts import component_facts
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
 
+KEY_TABLES = run_path(str(ROOT / "docs" / "site" / "key_tables.py"))
+#: Models with keys of their own.
 MODELS = {
     found
-    for module in (
-        models,
-        forcing_models,
-        body_models,
-        measuring_models,
-        replay_models,
-        sweep_models,
-        component_models,
-    )
-    for found in vars(module).values()
-    if isinstance(found, type) and issubclass(found, BaseModel) and found is not StructureBody
+    for found in KEY_TABLES["models_of_tables"]().values()
+    if found is not StructureBody
     if found.model_fields.keys()
     > {key for base in found.__bases__ for key in getattr(base, "model_fields", ())}
 }
@@ -71,10 +59,9 @@ def beam() -> Scene:
 
 
 def test_the_tables_of_the_reference_are_those_of_the_fields() -> None:
-    script = run_path(str(ROOT / "docs" / "site" / "key_tables.py"))
-    for path in script["PAGES"]:
+    for path in KEY_TABLES["PAGES"]:
         page = path.read_text(encoding="utf-8")
-        assert script["with_key_tables"](page) == page, "Run `python docs/site/key_tables.py`."
+        assert KEY_TABLES["with_key_tables"](page) == page, "Run `python docs/site/key_tables.py`."
 
 
 def test_the_reference_has_a_table_for_every_model() -> None:

@@ -16,7 +16,7 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.cost_of_effects import CostOfEffects
 from vibroimpact.orchestrator.study.effects import effects_of, not_called, shares_of
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
-from vibroimpact.orchestrator.study.motion import changes_of_motion, sampling_of_change
+from vibroimpact.orchestrator.study.motion import changes_of_motion, motion_of, sampling_of_change
 from vibroimpact.orchestrator.study.observation import Observation
 from vibroimpact.orchestrator.study.statistics import statistics_of
 
@@ -139,6 +139,24 @@ def test_a_chaotic_motion_is_told_by_statistics_and_by_what_chance_makes_of_them
     off = changes_of_motion(*stop.motions)["kinetic_energy"]
     assert abs(off) > 3.0 * sampling_of_change(*stop.motions)["kinetic_energy"]
     assert "(by chance " in slight.statistics_in_words
+
+
+def test_a_motion_under_forces_without_a_common_period_has_no_class() -> None:
+    scene = load_scene(EXAMPLES / "two_frequencies.toml")
+    record = {"transient_periods": 100, "recorded_periods": 20}
+    of_two = motion_of(scene.with_values({"record": record}))
+    of_one = motion_of(scene.with_values({"record": record, "forcing[2].amplitude": 0.0}))
+    assert of_two is not None
+    assert of_one is not None
+    assert (of_two.orbit, of_one.orbit) == ("quasi-periodic forcing", "P(2,1)")
+    assert "chaotic" not in of_two.change
+
+
+def test_a_run_that_ends_early_says_its_outcome_once() -> None:
+    scene = load_scene(EXAMPLES / "inverted_pendulum.toml").unswept()
+    stop = [one for one in effects_of(scene) if one.asked_by == "stop[1]"]
+    (share,) = shares_of(scene, stop)
+    assert share.changes == "unbounded: no stop can be met any more from time 0 s on"
 
 
 def test_a_motion_without_impacts_has_no_statistics_of_impacts() -> None:

@@ -305,18 +305,26 @@ static double reach(const vi_drift *drift, const equation *e, double fastest)
     return REACH;
 }
 
-/* Shorten the segment for power laws, to where their last terms are below the tolerance. */
-static void shorten(vi_drift *drift, const vi_drift_start *start)
+/* Shorten the segment to where the terms of order `last` - 1 and `last` are below this share of the first. */
+static void shorten_for(vi_drift *drift, const double series[], int last, double share)
 {
-    const double tolerance = SMALLEST_TERM * drift->model->tolerance;
-    for (int k = 0; k < drift->model->contacts; ++k) {
-        const double *d = drift->penetration[k];
-        if (start->press[k].kind != VI_PRESS_POWER) {
-            continue;
+    for (int n = last - 1; n <= last; ++n) {
+        if (series[n] != 0.0) {
+            drift->length = vi_min(drift->length, pow(share * fabs(series[0]) / fabs(series[n]), 1.0 / (double)n));
         }
-        for (int n = drift->order - 1; n <= drift->order; ++n) {
-            if (d[n] != 0.0) {
-                drift->length = vi_min(drift->length, pow(tolerance * d[0] / fabs(d[n]), 1.0 / (double)n));
+    }
+}
+
+/* Shorten the segment for power laws, to where their last terms are below the tolerance. Held contacts may bear a force
+ * that moves nothing: then only its own series shows its singularity. */
+static void shorten(vi_drift *drift, const vi_drift_start *start, bool any_held)
+{
+    const double share = SMALLEST_TERM * drift->model->tolerance;
+    for (int k = 0; k < drift->model->contacts; ++k) {
+        if (start->press[k].kind == VI_PRESS_POWER) {
+            shorten_for(drift, drift->penetration[k], drift->order, share);
+            if (any_held) {
+                shorten_for(drift, drift->force[k], drift->order - 2, share);
             }
         }
     }
@@ -423,7 +431,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);
     drift->length = fastest > 0.0 ? vi_min(length, reach(drift, &e, fastest) / fastest) : length;
-    shorten(drift, start);
+    shorten(drift, start, e.any_held);
 }
 
 void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[])

@@ -1,12 +1,9 @@
 #include "body/modal/modal_scan.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "motion/majorant.h"
 
-/* Shortest step between samples, in radians of the fastest rate. */
-static const double SHORTEST_STEP = 0.05;
 /* Rounding of samples, relative to the sum of sizes of a displacement's terms. Less clearance is unresolved. */
 static const double ROUNDING = 1e-12;
 /* Longest level of steps for a single mode: steps beyond .8 radians clear little. */
@@ -19,64 +16,6 @@ enum { MOST_ITERATIONS = 8 };
 static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
 /* Newton step, in intervals between samples, below which a guess is good enough: its error is about the square. */
 static const double CLOSE = 3e-4;
-
-/* ---- propagators ---- */
-
-static void renew(vi_scan *scan, const vi_structure_model *model)
-{
-    bool same = scan->modes == vi_structure_modes(model) && scan->angular_frequency == model->clock.angular_frequency;
-    for (int j = 0; j < vi_structure_modes(model) && same; ++j) {
-        same = scan->stiffness[j] == model->mode[j].stiffness && scan->decay[j] == model->mode[j].decay;
-    }
-    const vi_mode *first = &model->mode[0];
-    same = same && scan->sines == vi_mode_sines(first);
-    for (int k = 0; k < vi_mode_sines(first) && same; ++k) {
-        same = scan->further[k] == first->further[k].angular_frequency;
-    }
-    if (same) {
-        return;
-    }
-    scan->sines = vi_mode_sines(first);
-    for (int k = 0; k < vi_mode_sines(first); ++k) {
-        scan->further[k] = first->further[k].angular_frequency;
-    }
-    scan->modes = vi_structure_modes(model);
-    scan->angular_frequency = model->clock.angular_frequency;
-    for (int j = 0; j < vi_structure_modes(model); ++j) {
-        scan->stiffness[j] = model->mode[j].stiffness;
-        scan->decay[j] = model->mode[j].decay;
-    }
-    for (int l = 0; l < VI_SCAN_LEVELS; ++l) {
-        scan->level[l].step = 0.0;
-    }
-}
-
-static double step_of(const vi_structure_model *model, int l)
-{
-    return SHORTEST_STEP * model->radian * (double)(1 << l);
-}
-
-static void make(vi_scan_level *level, const vi_scan *scan, const vi_structure_model *model, int l)
-{
-    level->step = step_of(model, l);
-    for (int i = 0; i < VI_SCAN_SAMPLES; ++i) {
-        const double time = (double)(i + 1) * level->step;
-        level->cosine[i] = cos(scan->angular_frequency * time);
-        level->sine[i] = sin(scan->angular_frequency * time);
-        for (int k = 0; k < vi_mode_sines(&model->mode[0]); ++k) {
-            level->further_cosine[k][i] = cos(scan->further[k] * time);
-            level->further_sine[k][i] = sin(scan->further[k] * time);
-        }
-        for (int j = 0; j < vi_structure_modes(model); ++j) {
-            double phi[4];
-            vi_mode_propagator(&model->mode[j], time, phi);
-            level->x_of_x[j][i] = phi[0];
-            level->x_of_v[j][i] = phi[1];
-            level->v_of_x[j][i] = phi[2];
-            level->v_of_v[j][i] = phi[3];
-        }
-    }
-}
 
 /* ---- the scan ---- */
 
@@ -233,7 +172,7 @@ static bool is_worth(const scanner *s, double step)
 static int level_between(const scanner *s, int shortest, int longest)
 {
     int l = longest;
-    while (l > shortest && !is_worth(s, step_of(s->flight->model, l))) {
+    while (l > shortest && !is_worth(s, vi_scan_step(s->flight->model, l))) {
         --l;
     }
     return l;
@@ -388,7 +327,7 @@ static int longest_level(const vi_flight *flight)
     const double growing = vi_structure_grows(flight->model) ? 1.0 : 0.0;
     const double samples = vi_flight_degree(flight) > 1 ? (double)VI_SCAN_SAMPLES : growing;
     int l = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
-    while (samples > 0.0 && l >= 0 && step_of(flight->model, l) * samples > flight->length) {
+    while (samples > 0.0 && l >= 0 && vi_scan_step(flight->model, l) * samples > flight->length) {
         --l;
     }
     return l;
@@ -530,17 +469,14 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
     s.flight = flight;
     s.points = points;
     s.looked_for = looked_for;
-    renew(scan, flight->model);
+    vi_scan_renew(scan, flight->model);
     begin(&s, from, first);
     const int longest = longest_level(flight);
     int l = level_between(&s, -1, longest);
     for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
-        vi_scan_level *level = &scan->level[l];
+        const vi_scan_level *level = vi_scan_level_of(scan, flight->model, l);
         verdict next;
         int contact;
-        if (level->step == 0.0) {
-            make(level, scan, flight->model, l);
-        }
         const int steps = cleared(&s, level, &next, &contact);
         if (s.at.u + (double)steps * level->step >= flight->length) {
             return VI_SCAN_CLEAR;

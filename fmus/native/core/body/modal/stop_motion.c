@@ -1,6 +1,5 @@
 #include "body/modal/stop_motion.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -198,55 +197,6 @@ double vi_stop_motions_work(const vi_structure *s, const double impulse[])
         }
     }
     return work;
-}
-
-/* ---- stops that leave no room ---- */
-
-/* Difference of the directions of two rows up to which they count as one line, relative to their sizes. */
-static const double PARALLEL = 16.0 * DBL_EPSILON;
-
-/* Room between the stops of contacts i and k, relative to their displacements. HUGE_VAL unless they limit one line of a
- * body from both sides, and one of them moves. */
-static double room_between(const vi_structure *s, int i, int k)
-{
-    const vi_structure_model *model = s->model;
-    const double one = vi_structure_direction(s, i), other = vi_structure_direction(s, k);
-    const double size = sqrt(model->compliance[i][i] * model->compliance[k][k]);
-    if (!(one * other * model->compliance[i][k] <= -(1.0 - PARALLEL) * size)
-        || !(vi_structure_stop_moves(model, i) || vi_structure_stop_moves(model, k))) {
-        return HUGE_VAL;
-    }
-    const double first = sqrt(model->compliance[i][i]), second = sqrt(model->compliance[k][k]);
-    const double room = one * vi_structure_stop_position(s, i) / first + other * vi_structure_stop_position(s, k) / second;
-    return room / (vi_structure_displacement_size(s, i) / first + vi_structure_displacement_size(s, k) / second);
-}
-
-bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2])
-{
-    for (int i = 0; i < s->model->contacts && vi_structure_stops_move(s->model); ++i) {
-        for (int k = i + 1; k < s->model->contacts && s->model->stop[i] == VI_RIGID_STOP; ++k) {
-            if (s->model->stop[k] == VI_RIGID_STOP && room_between(s, i, k) <= least) {
-                pair[0] = i;
-                pair[1] = k;
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
-/* Room between moving stops, relative to the displacements, that explains a motion whose time stands still. */
-static const double LITTLE_ROOM = 1e-6;
-
-bool vi_stop_motions_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
-{
-    int pair[2];
-    if (!vi_stop_motions_jam(s, LITTLE_ROOM, pair)) {
-        return false;
-    }
-    vi_complain(message, "contact[%d] and contact[%d]: expected room between their stops, of which one moves, got none at"
-                         " %.17g s", pair[0] + 1, pair[1] + 1, vi_clock_time(&s->model->clock, s->state->now));
-    return true;
 }
 
 /* ---- other motions ---- */

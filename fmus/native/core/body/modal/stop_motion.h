@@ -32,13 +32,6 @@ void vi_stop_motions_at(const vi_structure *s, vi_instant now);
 /* Time for which the accelerations of the given motions have no kink, s. */
 double vi_stop_motions_room(const vi_structure *s);
 
-/* Do two rigid stops, of which one moves, leave no more room between them than `least`, relative to the displacements?
- * They are on both sides of one point of a body. pair: their contacts. */
-bool vi_stop_motions_jam(const vi_structure *s, double least, int pair[2]);
-
-/* Complain of such stops where time stands still; false where there are none. */
-bool vi_stop_motions_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
-
 /* A changed motion from now on: it goes on from its phase and its place where a frequency or a velocity changes. */
 vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion);
 

@@ -15,6 +15,7 @@
 #include "body/modal/structure/pressed.h"
 #include "body/modal/structure/thin.h"
 #include "body/modal/structure/unbounded.h"
+#include "contact/complementarity.h"
 
 /* Depth, relative to the depth reached by a thin contact, below which a power law counts as thin. */
 static const double ENTRY = 1e-3;
@@ -172,6 +173,24 @@ static double energy_now(const vi_structure *s)
     return vi_structure_kinetic(s) + elastic;
 }
 
+/* Add the impulses of the held contacts, which keep their points in place against the impulses of the others. */
+static void bear(const vi_structure *s, double impulse[VI_PORTS])
+{
+    double g[VI_PORTS][VI_PORTS], approach[VI_PORTS] = {0.0}, borne[VI_PORTS];
+    int held[VI_PORTS];
+    vi_structure_signed(s, s->model->compliance, g);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        held[k] = s->state->status[k] == VI_CONTACT_HELD;
+        for (int l = 0; l < s->model->contacts; ++l) {
+            approach[k] -= g[k][l] * impulse[l];
+        }
+    }
+    vi_solve_active(s->model->contacts, g, approach, held, borne);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        impulse[k] += borne[k];
+    }
+}
+
 /* Finish a segment: add impulses of thin contacts, project held contacts. Stops take the lost energy. */
 static void finish(const vi_structure *s, const vi_drift *drift, const vi_situation *now, double u)
 {
@@ -187,7 +206,11 @@ static void finish(const vi_structure *s, const vi_drift *drift, const vi_situat
     }
     vi_structure_project(s);
     if (follow) {
-        const double work = VI_STOPS_MOVE ? vi_stop_motions_work(s, impulse) : 0.0;
+        double work = 0.0;
+        if (vi_structure_stops_move(s->model)) {
+            bear(s, impulse);
+            work = vi_stop_motions_work(s, impulse);
+        }
         s->state->energies.forcing_work += work;
         s->state->energies.contact_loss += before - energy_now(s) + work;
     }

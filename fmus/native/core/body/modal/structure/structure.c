@@ -14,6 +14,7 @@
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/drift.h"
 #include "body/modal/structure/extremes.h"
+#include "body/modal/structure/jam.h"
 #include "body/modal/structure/random_flight.h"
 #include "body/modal/structure/search.h"
 #include "body/modal/structure/settle.h"
@@ -421,14 +422,14 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     } else if (coupled || !(fly_far(s, target) || fly(s, target, request))) {
         return VI_STEP_NOT_FINITE;
     }
-    int pair[2];
+    int jammed[VI_PORTS];
     if (!is_finite(s)) {
         return VI_STEP_NOT_FINITE;
     }
     if (vi_structure_grows(s->model) && state->unbounded) {
         return VI_STEP_UNBOUNDED;
     }
-    if (VI_STOPS_MOVE && vi_stop_motions_jam(s, VI_ROUNDING, pair)) {
+    if (VI_STOPS_MOVE && vi_structure_jams(s, VI_ROUNDING, jammed)) {
         return VI_STEP_STANDSTILL;
     }
     vi_structure_settle(s, stops_here(s, target, request));
