@@ -288,8 +288,10 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, stops_here(s, target, request));
         break;
-    /* a sudden load lifts the contact off with an acceleration, unless others hold it; otherwise its force is 0 */
-    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 || vi_structure_is_kept(s, k) ? 2 : 1); break;
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, 2); break;
+    case VI_DRIFT_GENTLE_RELEASE: vi_structure_release(s, k, 3); break;
+    /* with an acceleration, unless others hold it */
+    case VI_DRIFT_LIFT: vi_structure_release(s, k, vi_structure_is_kept(s, k) ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:
         vi_structure_return(s, k);
