@@ -409,6 +409,17 @@ static inline bool vi_structure_watched(const vi_structure *s, int k)
     return s->model->stop[k] != VI_NO_STOP && !s->state->passed;
 }
 
+/* Does any mode move? A body that stands still keeps its state to the last bit. */
+static inline bool vi_structure_moves(const vi_structure *s)
+{
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        if (s->state->p[j] != 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Kinetic energy of the modes, J. */
 double vi_structure_kinetic(const vi_structure *s);
 
