@@ -142,7 +142,10 @@ class StructureBody(BodyTable):
 
     def long_names(self, stops: Stops) -> dict[str, str]:
         """Return the motion of each observed point, contact and mode in words, by its name in a time series."""
-        found: dict[str, str] = {}
+        first = self.first_observed(stops)
+        found = (
+            {} if isinstance(first, PointOfBody) else {name: f"{name} of {_words(first)}" for name in MOTIONS}
+        )
         for motion in MOTIONS:
             found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
             met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
