@@ -250,7 +250,7 @@ static void size_loads(const vi_structure_model *model, const vi_drift_start *st
 {
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        size[j] = vi_mode_force_size(mode) + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
+        size[j] = mode->force_size + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
         size[j] += vi_structure_drag_size(model, j, start->p);
     }
 }

@@ -249,8 +249,10 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS] = {0.0}, impulse[VI_PORTS], impulse_low[VI_PORTS];
-    int in_play[VI_PORTS] = {0}, resting[VI_PORTS];
+    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS], impulse[VI_PORTS], impulse_low[VI_PORTS];
+    int in_play[VI_PORTS], resting[VI_PORTS];
+    change[0] = 0.0; /* there is a contact, which compilers cannot know */
+    in_play[0] = 0;
     const double before = vi_structure_kinetic(s);
     for (int k = 0; k < n; ++k) {
         approach[k] = restitution[k] = change[k] = 0.0;
