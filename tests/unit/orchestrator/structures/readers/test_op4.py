@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support.damaged_bytes import damaged, read_or_refused
@@ -74,6 +74,7 @@ def test_text_files_read_back_to_their_last_digit(
         np.testing.assert_array_equal(found[role], rounded)
 
 
+@settings(max_examples=40)
 @given(SQUARES, st.sampled_from(LAYOUTS), st.sampled_from("<>"), st.sampled_from([4, 8]), st.booleans())
 def test_any_matrix_reads_back_from_binary_and_text(
     full: np.ndarray[Any, np.dtype[np.float64]], layout: Layout, order: str, word: int, text: bool
@@ -149,6 +150,7 @@ def test_a_text_file_that_ends_early_is_refused_at_every_line(layout: Layout) ->
             read(b"".join(lines[:count]))
 
 
+@settings(max_examples=40)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
     layout, text = data.draw(st.sampled_from(LAYOUTS)), data.draw(st.booleans())
