@@ -70,7 +70,16 @@ def table_rows(content: bytes) -> Iterator[tuple[int, Sequence[str]]]:
         if text.strip() and not text.lstrip().startswith("#"):
             if mark is None:
                 mark = next((each for each in "\t;," if each in text), "")
-            yield line, next(csv.reader([text.strip("\r")], delimiter=mark)) if mark else text.split()
+            yield line, _cells(text.strip("\r"), mark, line)
+
+
+def _cells(text: str, mark: str, line: int) -> Sequence[str]:
+    """Return the cells of a line, which a mark separates, or blanks without one."""
+    try:
+        return next(csv.reader([text], delimiter=mark)) if mark else text.split()
+    except csv.Error as problem:
+        got = f"{_quoted([text])} ({problem})"
+        raise UsageError(f"line {line}: expected cells of a table, got {got}.") from problem
 
 
 def _first(names: Sequence[str], columns: Mapping[str, int]) -> int | None:
