@@ -39,7 +39,7 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
         if body.get("kind") == "matrices":
             found.append(_of_matrices(body, path, folder, names, problems))
         elif body.get("kind") == "modes" and "file" in body:
-            found.append(_of_modes(body, path, folder, problems))
+            found.append(_of_modes(body, path, folder, names, problems))
         else:
             found.append(body)
     written = document["body"]
@@ -121,7 +121,9 @@ def _of_matrices(
     return {**kept, **modes.table()}
 
 
-def _of_modes(body: dict[str, Any], path: KeyPath, folder: Path, problems: list[Problem]) -> dict[str, Any]:
+def _of_modes(
+    body: dict[str, Any], path: KeyPath, folder: Path, named: set[str], problems: list[Problem]
+) -> dict[str, Any]:
     """Return the modes of a file as a table, with the keys that the body has itself."""
     from vibroimpact.orchestrator.structures.find import modes_of_file
 
@@ -130,14 +132,18 @@ def _of_modes(body: dict[str, Any], path: KeyPath, folder: Path, problems: list[
         problems.append(Problem(key_path((*path, "file")), "the name of a file", quoted(file)))
         return body
     try:
-        modes = modes_of_file(folder / file)
+        table = modes_of_file(folder / file, named).table()
     except UsageError as error:
         problems.append(_problem((*path, "file"), error))
         return body
-    return modes.table() | {key: value for key, value in body.items() if key != "file"}
+    if "frequencies" in body:
+        del table["angular_frequencies"]
+    return table | {key: value for key, value in body.items() if key != "file"}
 
 
 def _problem(path: KeyPath, error: UsageError) -> Problem:
-    """Return the problem that the error of a file is."""
-    expected, _, got = str(error).partition(", got ")
-    return Problem(key_path(path), expected.removeprefix("expected "), got.removesuffix("."))
+    """Return the problem that the error of a file is: the place in the file follows the key."""
+    said, _, got = str(error).partition(", got ")
+    place, _, expected = said.rpartition("expected ")
+    key = ": ".join(filter(None, (key_path(path), place.removesuffix(": "))))
+    return Problem(key, expected, got.removesuffix("."))

@@ -211,7 +211,7 @@ class Parts(SceneTable):
     @property
     def lists_forces(self) -> bool:
         """Whether the component Structure has the body with a list of forces: several, or beside a moving stop."""
-        return self.has_several_forces or bool(self.moving_stop)
+        return self.has_several_forces or any(stop.moves for stop in self.stops)
 
     @property
     def forcing(self) -> Forcing | None:

@@ -143,7 +143,10 @@ class StructureBody(BodyTable):
     def long_names(self, stops: Stops) -> dict[str, str]:
         """Return the motion of each observed point, contact and mode in words, by its name in a time series."""
         found: dict[str, str] = {}
+        first = self.first_observed(stops)
+        assert not isinstance(first, PointOfBody)  # that of a body alone
         for motion in MOTIONS:
+            found[motion] = f"{motion} of {_words(first)}"
             found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
             met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
             found |= {f"contact_{motion}[{number}]": f"{motion} of {words}" for number, words in met}

@@ -37,7 +37,7 @@ def read_table(content: bytes) -> Found:
     UsageError
         The table has no column of names, or a row has another form.
     """
-    rows = _rows(content)
+    rows = table_rows(content)
     line, heads = next(rows, (1, []))
     columns = {head.strip().lower(): place for place, head in reversed(list(enumerate(heads)))}
     named, node = _first(_NAMES, columns), _first(_NODES, columns)
@@ -63,7 +63,7 @@ def read_table(content: bytes) -> Found:
     return Found(freedoms=tuple(names), coordinates=_coordinates(places, columns) if axes else None)
 
 
-def _rows(content: bytes) -> Iterator[tuple[int, Sequence[str]]]:
+def table_rows(content: bytes) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield number and cells of each line that is neither blank nor a comment."""
     mark: str | None = None
     for line, text in enumerate(content.decode("utf-8-sig", "replace").split("\n"), 1):

@@ -366,3 +366,12 @@ def test_an_exported_structure_moves_as_its_scene_in_another_tool(fmi: str, tmp_
     assert ours.sizes["impact"] > 5
     for name, stored in names.items():
         assert theirs[name][:count] == pytest.approx(ours[stored].values[:count], abs=1e-9), name
+
+
+def test_a_figure_names_the_lines_by_their_points() -> None:
+    series = {"rate": 5, "variables": ["displacement", "contact_displacement[1]"]}
+    found = run(record=TABLES["record"] | {"time_series": series})
+    assert found.displacement.attrs["long_name"] == "displacement of a"
+    legend = vi.draw(found).axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["a", "a relative to b.2"]
