@@ -160,7 +160,7 @@ def _from_eigenvalue(
     """Return natural angular frequency, damping ratio and complex modal mass of a complex mode.
 
     Modal A is phi' (2 lambda M + C) phi, and modal B is -lambda A. Where the damping is proportional, modal A is
-    2 j omega_d times the modal mass.
+    2 j omega_d times the modal mass (docs/equations.md 8.11).
     """
     eigenvalue, modal_a, modal_b = (
         complex(real, imaginary),

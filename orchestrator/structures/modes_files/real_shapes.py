@@ -1,7 +1,7 @@
 """Complex shapes made real: the phase of each mode is turned to its best line, and the rest is left out.
 
 The values of a normal mode lie on one line of the complex plane, and those of a measured one near it. The best line has
-half the angle of the sum of phi^2. The part of the shape phi across it has the least square.
+half the angle of the sum of phi^2. The part of the shape phi across it has the least square (docs/equations.md 8.11).
 """
 
 from __future__ import annotations
