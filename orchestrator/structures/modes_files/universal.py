@@ -158,10 +158,12 @@ def read(content: bytes) -> GivenModes:
 def _units(dataset: Dataset) -> tuple[float, float]:
     """Return the units of length and force in the file per unit of SI."""
     try:
+        if len(dataset.lines) < 2:
+            raise ValueError("expected two lines, got fewer")
         found = reals_of(dataset.lines[1], _FACTOR_WIDTH, 3)
         if not all(0.0 < each < np.inf for each in found):
             raise ValueError(f"expected factors > 0, got {found}")
-    except (ValueError, IndexError) as problem:
+    except ValueError as problem:
         raise UsageError(f"line {dataset.first + 1}: dataset 164: {problem}.") from None
     return found[0], found[1]
 

@@ -245,6 +245,10 @@ def test_values_that_are_zero_in_all_modes_are_no_points() -> None:
         (f"{MARK}    55\nNONE\n", "expected the end of dataset 55 .-1., got the end of the file"),
         (f"{MARK}  none\n{MARK}", "line 2: expected the number of a dataset, got '  none'"),
         ("none\n", "line 1: expected the mark of a dataset"),
+        (
+            f"{MARK}   164\n         1\n{MARK}" + normal(1, SHAPES[0]),
+            "dataset 164: expected two lines, got fewer",
+        ),
         (units(0.0) + normal(1, SHAPES[0]), "line 4: dataset 164: expected factors > 0"),
     ],
 )
