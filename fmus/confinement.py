@@ -19,6 +19,7 @@ PATIENCE = 6.0
 UNKNOWN_MEMORY = 8 * 2**30
 """Memory to assume, byte, where the system does not report it."""
 _CGROUP = Path("/sys/fs/cgroup/memory.max")
+_MEMORY = Path("/proc/meminfo")
 #: Numbers of the system calls, equal on all architectures with Python packages.
 _CREATE_RULESET, _RESTRICT_SELF = 444, 446
 _ASK_VERSION = 1
@@ -75,6 +76,16 @@ def machine_memory() -> int:
     except OSError:
         return found
     return min(found, int(limit)) if limit.isdecimal() else found
+
+
+def available_memory() -> int:
+    """Return the memory that this machine can still give, byte; all of it where the system does not report more."""
+    try:
+        lines = _MEMORY.read_text(encoding="ascii").splitlines()
+    except OSError:
+        return machine_memory()
+    found = [int(line.split()[1]) << 10 for line in lines if line.startswith("MemAvailable:")]
+    return min([machine_memory(), *found])
 
 
 def _let_signals_end_it() -> None:

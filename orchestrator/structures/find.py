@@ -8,8 +8,11 @@ from itertools import islice
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.structures.kept import kept_modes
 from vibroimpact.orchestrator.structures.modes import Modes
 from vibroimpact.orchestrator.structures.modes_files import read_modes
+from vibroimpact.orchestrator.structures.readers import Sources, read_matrices
+from vibroimpact.orchestrator.structures.reduction import reduce
 from vibroimpact.orchestrator.structures.request import Request
 
 MOST_MODES, MOST_POINTS = 64, 1024
@@ -24,7 +27,33 @@ def find_modes(request: Request) -> Modes:
     UsageError
         A file cannot be read, or the matrices are none of a structure: `expected ..., got ...`.
     """
-    raise NotImplementedError
+    sources = Sources(
+        stiffness=request.stiffness,
+        mass=request.mass,
+        damping=request.damping or "",
+        file="" if request.file is None else str(request.file),
+        freedoms="" if request.freedoms is None else str(request.freedoms),
+        folder=request.folder,
+    )
+    files = sources.hashes()
+    keys = replace(request, folder=Path())
+    found = kept_modes(f"{sorted(files.items())} {keys}", lambda: _reduced(sources, request))
+    return replace(found, files=files)
+
+
+def _reduced(sources: Sources, request: Request) -> Modes:
+    """Return the modes of the matrices of files."""
+    points = dict(request.points) | {name: {name: 1.0} for name in request.named}
+    return reduce(
+        read_matrices(sources),
+        points,
+        modes=request.modes,
+        tolerance=request.tolerance,
+        residual=request.residual,
+        base=request.base,
+        damping_ratio=request.damping_ratio,
+        rayleigh=request.rayleigh,
+    )
 
 
 def modes_of_file(path: Path, named: Collection[str] = ()) -> Modes:
