@@ -87,6 +87,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
     from vibroimpact.sobol import sensitivity as sensitivity
     from vibroimpact.studies import accuracy as accuracy
     from vibroimpact.studies import effects as effects
+    from vibroimpact.structures import modes as modes
 
     __version__: str
 
@@ -133,6 +134,7 @@ _NAMES = {
     "simulation": ("cost_of", "run", "runner"),
     "sobol": ("sensitivity",),
     "studies": ("accuracy", "effects"),
+    "structures": ("modes",),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}
