@@ -30,6 +30,7 @@ def modes(
     points: Mapping[str, str | Mapping[str, float]] | None = None,
     modes: int | Literal["auto"] | None = None,
     tolerance: float | None = None,
+    residual: bool = True,
     base: str | None = None,
     damping_ratio: float | None = None,
     body: str | None = None,
@@ -57,6 +58,8 @@ def modes(
         Number of modes, 1 to 64, residual vectors among them (20), or the fewest that meet the tolerance.
     tolerance : float, optional
         Largest relative error of the flexibility at the points for `"auto"` (1e-3).
+    residual : bool
+        Whether residual vectors of the points are among the modes.
     base : str, optional
         Direction of a base that moves, such as `"z"`: gives the participation of each mode.
     damping_ratio : float, optional
@@ -93,6 +96,7 @@ def modes(
         points=points,
         modes=modes,
         tolerance=tolerance,
+        residual=None if residual else False,
         base=base,
         damping_ratio=damping_ratio,
     )

@@ -13,6 +13,16 @@ sys.path.insert(0, str(Path(__file__).parent))
 # Cells of tutorials start `vibroimpact`, the program of this environment.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
+# Tutorials run in folders of their own. This start-up file of IPython puts the examples of a clone there.
+ROOT = Path(__file__).resolve().parents[2]
+START = ROOT / "build" / "docs" / "ipython" / "profile_default" / "startup" / "examples.py"
+START.parent.mkdir(parents=True, exist_ok=True)
+START.write_text(
+    f"from pathlib import Path\nif not Path('examples').exists():\n    Path('examples').symlink_to({str(ROOT / 'examples')!r})\n",
+    encoding="utf-8",
+)
+os.environ["IPYTHONDIR"] = str(START.parents[2])
+
 project = "vibroimpact"
 author = "vibroimpact developers"
 copyright = author

@@ -47,6 +47,7 @@ def show_modes(options: ShowModes) -> None:
         points=_points(options.points) if options.points else None,
         modes=_count(options.modes),
         tolerance=options.tolerance,
+        residual=None if options.residual else False,
         base=options.base,
         damping_ratio=options.damping_ratio,
     )
@@ -57,7 +58,7 @@ def show_modes(options: ShowModes) -> None:
             choices,
             body=options.body,
             changes=tuple(options.changes or ()),
-            figure=options.figure is not None,
+            figure=options.figure is not None or (options.output is not None and options.output.suffix == ".nc"),
         )
     _print(found, str(options.file))
     if options.output is not None:

@@ -65,6 +65,9 @@ class ShowModes(Operation):
     tolerance: Annotated[
         float | None, Option(help="auto: largest relative error of the flexibility at the points.")
     ] = None
+    residual: Annotated[
+        bool, Option("--residual/--no-residual", help="Whether residual vectors of the points are among the modes.")
+    ] = True
     base: Annotated[str | None, Option(help="Direction of a base that moves, such as z.")] = None
     damping_ratio: Annotated[float | None, Option(help="Damping ratio of all modes.")] = None
     body: Annotated[str | None, Option(help="Name of the body of a scene with several.")] = None

@@ -70,6 +70,7 @@ class Choices:
         Degree of freedom at each named point, or weights of several.
     modes : int, "auto" or None
     tolerance, damping_ratio : float or None
+    residual : False or None
     base : str or None
     """
 
@@ -80,6 +81,7 @@ class Choices:
     points: Mapping[str, str | Weights] | None = None
     modes: int | Literal["auto"] | None = None
     tolerance: float | None = None
+    residual: bool | None = None
     base: str | None = None
     damping_ratio: float | None = None
 

@@ -19,6 +19,8 @@ _ON_A_LINE = 0.02
 """Width of nodes over their length, below which they lie on a line."""
 _LARGEST = 0.15
 """Largest displacement in a drawn shape, over the length of the structure."""
+_LONGEST_EDGE = 4.0
+"""Largest distance of joined nodes over that of the loneliest node from its nearest one."""
 _DIRECTIONS = "xyz"
 _VIEW = np.array([[0.819, -0.574, 0.0], [0.287, 0.410, 0.866]])
 """Directions to the right and upwards on the page, for a view from above along -x and -y."""
@@ -37,9 +39,10 @@ def draw_modes(dataset: xr.Dataset) -> Figure:
     )
     drawn = np.flatnonzero(is_residual == 0)[:_MOST_PANELS]
     nodes, places, moves = _at_nodes(dataset)
+    view = _view(places, moves)
     rows = -(-len(drawn) // _COLUMNS)
     with page_style():
-        figure = canvas(4 + _panel_height(places) * rows)
+        figure = canvas(4 + _panel_height(places, view) * rows)
         axes = np.atleast_1d(figure.subplots(rows, min(_COLUMNS, len(drawn)), squeeze=False)).ravel()
         for axis, mode in zip(axes, drawn, strict=False):
             hertz = float(dataset["frequency"].values[mode])
@@ -50,7 +53,7 @@ def draw_modes(dataset: xr.Dataset) -> Figure:
             elif _is_line(places):
                 _draw_line(axis, places, moves[:, :, mode])
             else:
-                _draw_nodes(axis, places, moves[:, :, mode])
+                _draw_nodes(axis, places, moves[:, :, mode], view)
         for axis in axes[len(drawn) :]:
             axis.remove()
         if len(nodes) >= 3 and _is_line(places):
@@ -58,11 +61,11 @@ def draw_modes(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _panel_height(places: Floats) -> float:
+def _panel_height(places: Floats, view: Floats) -> float:
     """Return the height of a panel, mm: nodes in space need that of their projection."""
     if len(places) < 3 or _is_line(places):
         return 36.0
-    wide, high = np.ptp(places @ _VIEW.T, axis=0)
+    wide, high = np.ptp(places @ view.T, axis=0)
     room = 2.0 * _LARGEST * float(np.ptp(places, axis=0).max())
     return float(np.clip(8.0 + 38.0 * (high + room) / (wide + room), 16.0, 60.0))
 
@@ -85,43 +88,39 @@ def _at_nodes(dataset: xr.Dataset) -> tuple[list[str], Floats, Floats]:
     return list(nodes), where, np.array([moves for _, moves in own]).reshape(-1, 3, shapes.shape[1])
 
 
-def _axis_of(places: Floats) -> tuple[Floats, Floats]:
-    """Return the extents of nodes along their principal axes, and the coordinate along the first."""
-    from_middle = places - places.mean(axis=0)
-    _, _, directions = np.linalg.svd(from_middle, full_matrices=False)
-    along = from_middle @ directions.T
-    return np.ptp(along, axis=0), along[:, 0] * (1.0 if directions[0].sum() >= 0.0 else -1.0)
-
-
 def _is_line(places: Floats) -> bool:
-    extents, _ = _axis_of(places)
+    """Return whether nodes lie on a line, to the width that a figure can show."""
+    extents = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
     return bool(extents[1:].max(initial=0.0) <= _ON_A_LINE * extents[0])
 
 
 def _draw_line(axis: Axes, places: Floats, moves: Floats) -> None:
-    """Draw the displacement in each direction over the place along a line."""
-    _, along = _axis_of(places)
-    order = np.argsort(along)
+    """Draw the displacement in each direction over the coordinate in which the line is longest."""
+    longest = int(np.argmax(np.ptp(places, axis=0)))
+    order = np.argsort(places[:, longest])
     for direction, name in enumerate(_DIRECTIONS):
         if np.abs(moves[:, direction]).max() > 0.0:
-            axis.plot(
-                along[order] - along.min(),
-                moves[order, direction],
-                color=COLOURS[direction],
-                label=f"along {name}",
-            )
+            axis.plot(places[order, longest], moves[order, direction], color=COLOURS[direction], label=f"along {name}")
     axis.axhline(0.0, color=STOP, linewidth=0.4, zorder=0)
-    axis.set(xlabel="place (m)", ylabel="shape (kg$^{-1/2}$)")
+    axis.set(xlabel=f"{_DIRECTIONS[longest]} (m)", ylabel="shape (kg$^{-1/2}$)")
 
 
-def _draw_nodes(axis: Axes, places: Floats, moves: Floats) -> None:
+def _view(places: Floats, moves: Floats) -> Floats:
+    """Return the directions of the page: those of a plane structure that stays in its plane, or a view from above."""
+    for across in range(3):
+        if len(places) and np.ptp(places[:, across]) == 0.0 and not moves[:, across].any():
+            return np.delete(np.eye(3), across, axis=0)
+    return _VIEW
+
+
+def _draw_nodes(axis: Axes, places: Floats, moves: Floats, view: Floats) -> None:
     """Draw nodes at rest and displaced, joined with their neighbours, in parallel projection."""
     length = float(np.ptp(places, axis=0).max())
     largest = float(np.linalg.norm(moves, axis=1).max())
     moved = places + moves * (_LARGEST * length / largest if largest > 0.0 else 0.0)
     edges = _neighbours(places)
     for nodes, colour, width in ((places, STOP, 0.3), (moved, COLOURS[0], 0.7)):
-        flat = nodes @ _VIEW.T
+        flat = nodes @ view.T
         axis.add_collection(LineCollection(list(flat[edges]), colors=colour, linewidths=width))
         axis.plot(*flat.T, ".", color=colour, markersize=1.5)
     axis.set_aspect("equal")
@@ -129,15 +128,20 @@ def _draw_nodes(axis: Axes, places: Floats, moves: Floats) -> None:
 
 
 def _neighbours(places: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-    """Return pairs of nodes, shape (pair, 2): no third node lies in the ball whose diameter joins them (Gabriel)."""
+    """Return pairs of nodes, shape (pair, 2): no third node lies in the ball whose diameter joins them (Gabriel).
+
+    Pairs much further apart than any node and its nearest neighbour are left out: the feet of a frame.
+    """
     squares = ((places[:, None] - places[None]) ** 2).sum(axis=2)
+    alone = squares + np.diag(np.full(len(places), np.inf))
+    longest = _LONGEST_EDGE**2 * alone.min(axis=1).max()
     found = []
     for first in range(len(places)):
         # a third node lies in the ball where the two squared distances to it add up to less than the pair's
         nearest = (squares[first][None, :] + squares).astype(np.float64)
         nearest[:, first] = np.inf
         np.fill_diagonal(nearest, np.inf)
-        joined = nearest.min(axis=1) > squares[first] * (1.0 + 1e-9)
+        joined = (nearest.min(axis=1) > squares[first] * (1.0 + 1e-9)) & (squares[first] <= longest)
         found += [(first, second) for second in np.flatnonzero(joined).tolist() if second > first]
     return np.array(found, dtype=np.intp).reshape(-1, 2)
 
