@@ -255,8 +255,9 @@ class Draft(DraftTables):
         if not whole or not parts or len(parts) < len(self.names):
             return None
         observed = () if self.record is None else self.record.observed
+        driven = self.written("replay").get("at")
         return StructureBody.model_construct(
-            names=tuple(names), parts=parts, links=tuple(links), observed=observed
+            names=tuple(names), parts=parts, links=tuple(links), observed=observed, driven=driven
         )
 
     @property

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
+from vibroimpact.orchestrator.scene.changes import changed_key
+from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted, read_table
 
 PATHS = ("file", "stiffness", "mass", "damping", "freedoms")
 """Keys of a body by matrices that name files."""
 START = ("displacement_start", "velocity_start")
 """Keys of the modes that a body by files may have."""
+LARGEST_TOLERANCE = 0.5
+MODES = (
+    "frequencies",
+    "angular_frequencies",
+    "damping_ratio",
+    "damping_matrix",
+    "shapes",
+    "participation",
+    *START,
+)
+"""Keys of the modes, which may be changed once they are known."""
 
 
 def files_named(document: Mapping[str, Any]) -> Iterator[str]:
@@ -23,9 +36,13 @@ def files_named(document: Mapping[str, Any]) -> Iterator[str]:
     ['body[1].file']
     """
     for path, body in _bodies(document):
-        kind = body.get("kind")
-        keys = PATHS if kind == "matrices" else ("file",) if kind == "modes" else ()
-        yield from (key_path((*path, key)) for key in keys if key in body)
+        yield from (key_path((*path, key)) for key in _keys_of_files(body))
+
+
+def _keys_of_files(body: Mapping[str, Any]) -> Iterator[str]:
+    kind = body.get("kind")
+    keys = PATHS if kind == "matrices" else ("file",) if kind == "modes" else ()
+    yield from (key for key in keys if key in body)
 
 
 def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
@@ -34,16 +51,36 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
         return document, []
     problems: list[Problem] = []
     found: list[Any] = []
+    tolerance = _tolerance(document)
     for path, body in _bodies(document):
         names = set(_named_points(document, str(body.get("name", path[0]))))
         if body.get("kind") == "matrices":
-            found.append(_of_matrices(body, path, folder, names, problems))
+            found.append(_of_matrices(body, path, folder, names, tolerance, problems))
         elif body.get("kind") == "modes" and "file" in body:
             found.append(_of_modes(body, path, folder, names, problems))
         else:
             found.append(body)
     written = document["body"]
     return {**document, "body": found if isinstance(written, list) else found[0]}, problems
+
+
+def apart_from_modes(document: Mapping[str, Any], changes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the changes to make before bodies by files have their modes, and those of the modes themselves.
+
+    >>> apart_from_modes({"body": {"kind": "matrices"}}, ["body.modes=8", "body.frequencies[1]=20"])
+    (['body.modes=8'], ['body.frequencies[1]=20'])
+    """
+    owners = {tuple(path) for path, body in _bodies(document) if any(_keys_of_files(body))}
+
+    def is_of_modes(text: str) -> bool:
+        path = changed_key(text)
+        depth = next((len(owner) for owner in owners if path[: len(owner)] == owner), len(path))
+        key = path[depth:]
+        known = known_keys(MatricesBody) if key else ()
+        return key[:1] != () and key[0] in MODES and (len(key) > 1 or key[0] not in known)
+
+    before = [text for text in changes if not is_of_modes(text)]
+    return before, [text for text in changes if is_of_modes(text)]
 
 
 def with_bodies_in_text(text: str, document: Mapping[str, Any]) -> str:
@@ -84,8 +121,21 @@ def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
                     yield rest
 
 
+def _tolerance(document: Mapping[str, Any]) -> dict[str, float]:
+    """Return the tolerance of a scene for `modes = "auto"`; none that the checks of the scene refuse."""
+    execution = document.get("execution")
+    given = execution.get("tolerance") if isinstance(execution, dict) else None
+    is_valid = isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE
+    return {"tolerance": float(given)} if is_valid else {}
+
+
 def _of_matrices(
-    body: dict[str, Any], path: KeyPath, folder: Path, named: set[str], problems: list[Problem]
+    body: dict[str, Any],
+    path: KeyPath,
+    folder: Path,
+    named: set[str],
+    tolerance: Mapping[str, float],
+    problems: list[Problem],
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
     from vibroimpact.orchestrator.structures.find import find_modes  # scipy takes time
@@ -112,13 +162,18 @@ def _of_matrices(
         base=table.base,
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
+        **(tolerance if table.modes == "auto" else {}),
     )
     try:
         modes = find_modes(request)
     except UsageError as error:
         problems.append(_problem(path, error))
         return body
-    return {**kept, **modes.table()}
+    one_ratio = rayleigh is None and not isinstance(table.damping_ratio, tuple)
+    ratio = (
+        {"damping_ratio": table.damping_ratio} if one_ratio else {}
+    )  # a key for all modes, as it is written
+    return {**kept, **modes.table(), **ratio}
 
 
 def _of_modes(
@@ -136,8 +191,8 @@ def _of_modes(
     except UsageError as error:
         problems.append(_problem((*path, "file"), error))
         return body
-    if "frequencies" in body:
-        del table["angular_frequencies"]
+    if "angular_frequencies" in body:
+        del table["frequencies"]
     return table | {key: value for key, value in body.items() if key != "file"}
 
 

@@ -122,7 +122,7 @@ def test_modes_written_as_toml_are_read_back_to_the_bit_with_their_origin(tmp_pa
     path = tmp_path / "modes.toml"
     draw = np.random.default_rng(3)
     known = Modes(
-        np.sort(draw.random(4)) * 1e3,
+        2.0 * np.pi * np.sort(draw.random(4)) * 1e3,
         draw.standard_normal(4),
         np.diag(draw.random(4)),
         {"tip": draw.standard_normal(4), "812.z": draw.standard_normal(4)},
