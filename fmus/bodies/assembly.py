@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies.beam import BeamPoints
 from vibroimpact.fmus.bodies.impacting_body import Floats, Integers, Numbers
@@ -17,6 +18,10 @@ from vibroimpact.fmus.errors import UsageError
 
 TAKES_PART = 1e-8
 """Displacement times sqrt(mass) above which a coordinate sets the sign of a mode, as in a chain."""
+ELONGATES = 1e-9
+"""Elongation of a spring by a motion, relative to its row, below which the motion leaves the spring alone."""
+CANCELS = 8.0 * float(np.finfo(np.float64).eps)
+"""Difference of two displacements by a rigid-body mode, relative to their moduli, up to which it is rounding."""
 COMMUTES = 32.0 * float(np.finfo(np.float64).eps)
 """Entry of C M^-1 K - K M^-1 C, relative to the moduli of its terms, up to which it is rounding."""
 
@@ -49,6 +54,16 @@ class Part(ABC):
     @abstractmethod
     def elements(self) -> list[Element]:
         """The springs and dashpots of the body."""
+
+    @property
+    def is_rigid(self) -> NDArray[np.bool_]:
+        """Whether each coordinate is a given rigid-body mode, shape (coordinate,)."""
+        return np.zeros(len(self.masses), dtype=bool)
+
+    @property
+    def damping(self) -> Floats | None:
+        """Damping matrix besides the dashpots, shape (coordinate, coordinate)."""
+        return None
 
     @property
     @abstractmethod
@@ -173,16 +188,20 @@ class ModesPart(Part):
 
     @property
     def elements(self) -> list[Element]:
-        """The spring and the dashpot of each mode, and a dashpot for each part of the further damping."""
+        """The spring and the dashpot of each mode."""
         stiffness, damping = self._natural**2, 2.0 * self._natural * self._ratios
         rows = np.eye(len(self.masses))
-        found = [Element(*each) for each in zip(rows, stiffness.tolist(), damping.tolist(), strict=True)]
-        if self._damping.any():
-            sizes, ways = np.linalg.eigh(self._damping)
-            found += [
-                Element(way, 0.0, float(size)) for size, way in zip(sizes, ways.T, strict=True) if size != 0.0
-            ]
-        return found
+        return [Element(*each) for each in zip(rows, stiffness.tolist(), damping.tolist(), strict=True)]
+
+    @property
+    def is_rigid(self) -> NDArray[np.bool_]:
+        """Modes with a frequency of 0."""
+        return np.asarray(self._natural == 0.0)
+
+    @property
+    def damping(self) -> Floats | None:
+        """The further modal damping, if there is some."""
+        return self._damping if self._damping.any() else None
 
     @property
     def participation(self) -> Floats:
@@ -233,15 +252,13 @@ class Assembly:
         self.parts = tuple(parts)
         self.masses = np.concatenate([part.masses for part in parts])
         self._first = np.cumsum([0, *(len(part.masses) for part in parts)])
+        self._is_rigid = np.concatenate([part.is_rigid for part in parts])
         elements = [
             Element(self._own(number, each.shape), each.stiffness, each.damping)
             for number, part in enumerate(parts)
             for each in part.elements
         ]
-        elements += [
-            Element(self.point(each.first) - self.point(each.second), each.stiffness, each.damping)
-            for each in joints
-        ]
+        elements += [Element(self._elongation(each), each.stiffness, each.damping) for each in joints]
         self.elements = tuple(elements)
         self.frequencies, self.shapes = self._modes()
         self.damping = self._modal_damping()
@@ -258,6 +275,13 @@ class Assembly:
             return np.zeros(len(self.masses))
         part, where = place
         return self._own(part, self.parts[part].point(where))
+
+    def _elongation(self, joint: Joint) -> Floats:
+        """Return the elongation of a joint for 1 m of each coordinate; 0 for rigid-body modes that keep its length."""
+        first, second = self.point(joint.first), self.point(joint.second)
+        found = first - second
+        cancels = np.abs(found) <= CANCELS * (np.abs(first) + np.abs(second))
+        return np.where(self._is_rigid & cancels, 0.0, found)
 
     def in_modes(self, shape: Floats) -> Floats:
         """Return the displacement that belongs to a shape over the coordinates for 1 kg^(1/2) m of each mode."""
@@ -303,7 +327,7 @@ class Assembly:
         return found, shapes * self._signs(shapes, root)
 
     def _rigid(self) -> Floats:
-        """Return the shape of each group of masses that springs join but do not tie down, shape (group, mass)."""
+        """Return the shapes of motions that no spring resists, mass-normalised, shape (motion, coordinate)."""
         springs = [each.shape for each in self.elements if each.stiffness != 0.0]
         group = np.arange(len(self.masses))
         for shape in springs:
@@ -312,9 +336,22 @@ class Assembly:
         found = []
         for number in np.unique(group):
             own = group == number
-            if all(shape[own].sum() == 0.0 for shape in springs):
+            if self._is_rigid[own].any():
+                found += self._unsprung(own, springs)
+            elif all(shape[own].sum() == 0.0 for shape in springs):
                 found.append(own / np.sqrt(self.masses[own].sum()))
         return np.array(found).reshape(-1, len(self.masses))
+
+    def _unsprung(self, own: NDArray[np.bool_], springs: Sequence[Floats]) -> list[Floats]:
+        """Return the motions of a group that its springs do not resist, where it has given rigid-body modes."""
+        root = np.sqrt(self.masses[own])
+        rows = np.array([shape[own] for shape in springs if shape[own].any()]).reshape(-1, len(root)) / root
+        found = []
+        for motion in _without_elongation(rows):
+            whole = np.zeros(len(self.masses))
+            whole[own] = motion / root
+            found.append(whole)
+        return found
 
     def _signs(self, shapes: Floats, root: Floats) -> Floats:
         """Return 1 or -1 for each mode, so that its first coordinate that takes part moves to the positive side."""
@@ -331,6 +368,11 @@ class Assembly:
             if each.damping != 0.0:
                 elongation = self.in_modes(each.shape)
                 found = found + each.damping * elongation[:, None] * elongation
+        for number, part in enumerate(self.parts):
+            if part.damping is not None:
+                shapes = self.shapes[self._first[number] : self._first[number + 1]]
+                forces = np.array([_times(row, shapes) for row in part.damping])
+                found = found + np.array([_times(mode, forces) for mode in shapes.T])
         return found
 
     @property
@@ -347,6 +389,10 @@ class Assembly:
     def _commutes(self) -> bool:
         """Return whether C M^-1 K = K M^-1 C within rounding."""
         stiffness, damping = self._matrix("stiffness"), self._matrix("damping")
+        for first, part in zip(self._first, self.parts, strict=False):
+            if part.damping is not None:
+                end = first + len(part.masses)
+                damping[first:end, first:end] += part.damping
         one = damping[:, :, None] * (stiffness / self.masses[:, None])[None]
         other = stiffness[:, :, None] * (damping / self.masses[:, None])[None]
         size = (np.abs(one) + np.abs(other)).sum(axis=1)
@@ -366,4 +412,35 @@ def _times(row: Floats, matrix: Floats) -> Floats:
     found = np.zeros(matrix.shape[1])
     for place in np.flatnonzero(row):
         found = found + row[place] * matrix[place]
+    return found
+
+
+def _without_elongation(rows: Floats) -> list[Floats]:
+    """Return orthonormal vectors that the rows of springs do not elongate, by elimination with complete pivoting.
+
+    Sums have a fixed order: the same bits on each machine.
+    """
+    count = rows.shape[1]
+    left = rows / np.abs(rows).max(axis=1, initial=0.0)[:, None]
+    pivots: list[int] = []
+    for step in range(min(rows.shape)):
+        rest = np.abs(left[step:])
+        row, column = divmod(int(rest.argmax()), count)
+        if rest[row, column] <= ELONGATES:
+            break
+        left[[step, step + row]] = left[[step + row, step]]
+        left[step] /= left[step, column]
+        others = np.arange(len(left)) != step
+        left[others] -= left[others, column][:, None] * left[step]
+        left[others, column] = 0.0
+        pivots.append(column)
+    found: list[Floats] = []
+    for free in sorted(set(range(count)) - set(pivots)):
+        motion = np.zeros(count)
+        motion[free] = 1.0
+        motion[pivots] = -left[: len(pivots), free]
+        for _ in range(2):
+            for other in found:
+                motion = motion - _times(motion, other[:, None])[0] * other
+        found.append(motion / np.sqrt(_times(motion, motion[:, None])[0]))
     return found

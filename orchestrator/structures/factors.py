@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.structures.ordering import elimination_order
 BYTES_PER_ENTRY = 10
 """Memory of an entry of SuperLU's factors, bytes: 8 and its share of indices, measured for solids and beams."""
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
-"""Strain energy x'Kx over |x|'|K||x|, below which a motion is rigid: rounding of the entries."""
+"""Sum over the moduli of its terms, below which it is rounding; a motion of such a strain energy is rigid."""
 CLEARLY_HELD = 1e-11
 """Eigenvalue of a stiffness with a diagonal of 1, above which no motion is rigid."""
 SHIFTS = (1e-14, 1e-11, 1e-8)
@@ -56,7 +56,6 @@ class Flexibility:
         _refuse_beyond_memory(self.entries, len(order))
         self._order, self._names = order, [matrices.freedoms[place] for place in order]
         self._matrix, self._scale = scaled(matrices.stiffness[order][:, order].tocsc())
-        self._size = abs(self._matrix)
         self._free = np.arange(len(order))
         self._factors = _factors(self._matrix)
         motions = np.zeros((len(order), 0))
@@ -70,11 +69,13 @@ class Flexibility:
                 )
         self.rigid = self._mass_normalised(motions)
         self._momentum = self._mass @ self.rigid
-        del self._size
 
     def __call__(self, loads: Floats) -> Floats:
         """Return the displacements for loads, less their motion as a rigid body, both of shape (freedom, load)."""
-        balanced = loads - self._momentum @ (self.rigid.T @ loads)
+        moves = self.rigid.T @ loads
+        balanced = loads - self._momentum @ moves
+        terms = np.abs(loads) + np.abs(self._momentum) @ np.abs(moves)
+        balanced[np.abs(balanced) <= ROUNDING * terms] = 0.0
         found, places = np.zeros_like(balanced), self._order[self._free]
         scale = self._scale[self._free, None]
         found[places] = scale * self._factors.solve(scale * balanced[places])
@@ -137,11 +138,19 @@ class Flexibility:
             rigid = found
         return moves, energies
 
+    def energies(self, shapes: Floats) -> tuple[Floats, Floats]:
+        """Return twice the strain energy x'Kx of motions, shape (freedom, motion), and the sum of its moduli."""
+        return self._sums(shapes[self._order] / self._scale[:, None])
+
+    def _sums(self, moves: Floats) -> tuple[Floats, Floats]:
+        """Return x'Kx and |x|'|K||x| of motions in scaled coordinates."""
+        sizes = np.abs(moves)
+        return (moves * (self._matrix @ moves)).sum(axis=0), (sizes * (abs(self._matrix) @ sizes)).sum(axis=0)
+
     def _energies(self, moves: Floats) -> Floats:
-        """Return x'Kx over |x|'|K||x| for each motion."""
-        energy = (moves * (self._matrix @ moves)).sum(axis=0)
-        size = (np.abs(moves) * (self._size @ np.abs(moves))).sum(axis=0)
-        return np.asarray(energy / np.where(size > 0.0, size, 1.0))
+        """Return x'Kx over |x|'|K||x| for each unit motion, in coordinates whose stiffness is about 1."""
+        energies, terms = self._sums(moves)
+        return np.asarray(energies / np.maximum(terms, 1.0))
 
     def _mass_normalised(self, motions: Floats) -> Floats:
         moves = np.empty_like(motions)

@@ -15,6 +15,8 @@ CONVERGED = 1e-10
 """Residual of a mode over its flexibility, below which the mode has converged."""
 NOTHING_NEW = 1e-14
 """Length of a new vector over the largest flexibility, below which the vector is rounding."""
+LEAST = 1e-12
+"""Flexibility of a mode over the largest, below which rounding hides the mode."""
 DEPENDENT = 1e-13
 """Eigenvalue of the correlations of a block, below which its vectors are dependent."""
 SURPLUS = 160
@@ -61,7 +63,16 @@ class Lanczos:
             if len(found) == len(before) and np.allclose(found, before, rtol=1e-9, atol=0.0):
                 break
         values, ways = self._ritz()
-        return 1.0 / values[:count], self._basis[:, : self._done] @ ways[:, :count]
+        shapes = self._basis[:, : self._done] @ ways[:, :count]
+        squares = self._squares(values[:count], shapes)
+        order = np.argsort(squares)
+        return squares[order], shapes[:, order]
+
+    def _squares(self, values: Floats, shapes: Floats) -> Floats:
+        """Return w^2 from the flexibility of slow modes, and from the strain energy of fast ones: where it is exact."""
+        energies, terms = self._flexibility.energies(shapes)
+        is_fast = terms / np.maximum(energies, 1e-300) < self._largest / values
+        return np.asarray(np.where(is_fast, energies, 1.0 / values))
 
     def _converge(self, count: int, most: int) -> None:
         """Process blocks until the first modes have converged, or no block is left."""
@@ -76,7 +87,7 @@ class Lanczos:
             raise UsageError(
                 "expected stiffness that is positive semi-definite, got a mode of negative stiffness."
             )
-        above = values > NOTHING_NEW * self._largest
+        above = values > LEAST * self._largest
         return values[above], ways[:, above]
 
     def _has_converged(self, count: int) -> bool:

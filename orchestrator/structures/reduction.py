@@ -168,19 +168,19 @@ class _Reduction:
     def of(self, count: int, band: float | None) -> _Found:
         """Return a number of modes, residual vectors among them."""
         rigid = self._rigid.shape[1]
-        vectors = min(self._loads.shape[1], count) if self._residual else 0
+        vectors = min(self._loads.shape[1], max(count - max(rigid, 1), 0)) if self._residual else 0
         while True:
-            elastic = count - rigid - vectors
-            if elastic < 0 or count == vectors:
-                raise UsageError(
-                    f"expected more modes than {rigid} rigid-body modes and {vectors} residual vectors, got {count}."
-                )
-            squares, shapes = self._lanczos.modes(elastic)
+            squares, shapes = self._lanczos.modes(max(count - rigid - vectors, 0))
             rest, away = self._rest(squares, shapes)
             found = len(rest.vectors()[0]) if self._residual else 0
-            if found == vectors or len(squares) < elastic:
+            if found >= vectors:
                 break
-            vectors = found  # dependent points need fewer, and leave room for natural modes
+            vectors = found  # points that depend on each other leave room for natural modes
+        if max(rigid, 1) + found > count or rigid > count:
+            raise UsageError(
+                f"expected at least {max(rigid, 1) + found} modes ({rigid} of a rigid body, {found} residual vectors, 1 "
+                f"natural one), got {count}."
+            )
         return self._kept(squares, shapes, rest, away, band, count)
 
     def fewest(self, tolerance: float, band: float | None) -> _Found:

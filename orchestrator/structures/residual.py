@@ -59,7 +59,10 @@ class Rest:
         sizes = np.concatenate([self.flexibility, np.abs(wide[0].diagonal()[len(one) :])])
         reference = _Flexibility.of(np.vstack([one, two * ratio]), *_modes(*wide, sizes))
         kept = _Flexibility.of(one, *self.vectors()) if residual else None
-        unit = np.sqrt(np.outer(self.flexibility, self.flexibility))
+        own = np.where(
+            self.flexibility > 0.0, self.flexibility, np.inf
+        )  # a point that only rigid-body modes move
+        unit = np.sqrt(np.outer(own, own))
         worst = 0.0
         for each in np.linspace(0.0, angular, FREQUENCIES) ** 2:
             if each >= reference.lowest or (kept is not None and each >= kept.lowest):
