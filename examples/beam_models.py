@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,26 +11,39 @@ HERE = Path(__file__).parent
 STEEL = {"modulus": 2.1e11, "density": 7850.0}  # Pa, kg/m^3
 
 
-def element(length: float, area: float, inertia: float, modulus: float, density: float) -> tuple[np.ndarray, np.ndarray]:
+def element(
+    length: float, area: float, inertia: float, modulus: float, density: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return stiffness and consistent mass of a plane beam: u, w and rotation at both ends (axis along u)."""
     axial = modulus * area / length * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    slope = length * np.array([[0.0, 1.0, 0.0, 1.0], [1.0, 0.0, -1.0, 0.0], [0.0, -1.0, 0.0, -1.0], [1.0, 0.0, -1.0, 0.0]])
-    bending = modulus * inertia / length**3 * (
-        np.diag([12.0, 4.0 * length**2, 12.0, 4.0 * length**2])
-        + 6.0 * slope
-        + np.diag([0.0, 2.0 * length**2], 2)
-        + np.diag([0.0, 2.0 * length**2], -2)
-        - 12.0 * (np.eye(4, k=2) * [[1], [0], [0], [0]] + np.eye(4, k=-2) * [[0], [0], [1], [0]])
+    slope = length * np.array(
+        [[0.0, 1.0, 0.0, 1.0], [1.0, 0.0, -1.0, 0.0], [0.0, -1.0, 0.0, -1.0], [1.0, 0.0, -1.0, 0.0]]
+    )
+    bending = (
+        modulus
+        * inertia
+        / length**3
+        * (
+            np.diag([12.0, 4.0 * length**2, 12.0, 4.0 * length**2])
+            + 6.0 * slope
+            + np.diag([0.0, 2.0 * length**2], 2)
+            + np.diag([0.0, 2.0 * length**2], -2)
+            - 12.0 * (np.eye(4, k=2) * [[1], [0], [0], [0]] + np.eye(4, k=-2) * [[0], [0], [1], [0]])
+        )
     )
     mass = density * area * length
     rod = mass / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    moving = mass / 420.0 * np.array(
-        [
-            [156.0, 22.0 * length, 54.0, -13.0 * length],
-            [22.0 * length, 4.0 * length**2, 13.0 * length, -3.0 * length**2],
-            [54.0, 13.0 * length, 156.0, -22.0 * length],
-            [-13.0 * length, -3.0 * length**2, -22.0 * length, 4.0 * length**2],
-        ]
+    moving = (
+        mass
+        / 420.0
+        * np.array(
+            [
+                [156.0, 22.0 * length, 54.0, -13.0 * length],
+                [22.0 * length, 4.0 * length**2, 13.0 * length, -3.0 * length**2],
+                [54.0, 13.0 * length, 156.0, -22.0 * length],
+                [-13.0 * length, -3.0 * length**2, -22.0 * length, 4.0 * length**2],
+            ]
+        )
     )
     stiffness, inertial = np.zeros((6, 6)), np.zeros((6, 6))
     for whole, along, across in ((stiffness, axial, bending), (inertial, rod, moving)):
@@ -41,7 +55,7 @@ def assembled(nodes: np.ndarray, section: dict[str, float]) -> tuple[np.ndarray,
     """Return the matrices of a polygon of beams over x, z and rotation at each node; nodes has the shape (node, 2)."""
     size = 3 * len(nodes)
     stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
-    for first, (start, end) in enumerate(zip(nodes, nodes[1:], strict=False)):
+    for first, (start, end) in enumerate(pairwise(nodes)):
         length = float(np.hypot(*(end - start)))
         cosine, sine = (end - start) / length
         turn = np.kron(np.eye(2), [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -62,7 +76,7 @@ def tube() -> tuple[np.ndarray, np.ndarray, np.ndarray, list[int]]:
 
 
 def frame() -> tuple[np.ndarray, np.ndarray, np.ndarray, list[int]]:
-    """Return the matrices of a portal frame, 3 m high and 4 m wide, of tubes 60 x 60 x 3 mm, clamped at its feet."""
+    """Return the matrices of a portal frame, 3 m x 4 m, of tubes 60 x 60 x 3 mm, clamped at its feet."""
     section = {"area": 0.06**2 - 0.054**2, "inertia": (0.06**4 - 0.054**4) / 12.0}
     left = [(0.0, height) for height in np.arange(0.0, 3.0, 0.5)]
     top = [(place, 3.0) for place in np.arange(0.0, 4.0, 0.5)]
@@ -73,10 +87,10 @@ def frame() -> tuple[np.ndarray, np.ndarray, np.ndarray, list[int]]:
 
 def write_table(path: Path, nodes: np.ndarray, kept: list[int]) -> None:
     """Write the table of the degrees of freedom: node from 1, direction, and the place of the node."""
-    rows = [
-        f"{freedom // 3 + 1}, {('x', 'z', 'ry')[freedom % 3]}, {nodes[freedom // 3][0]:g}, 0, {nodes[freedom // 3][1]:g}"
-        for freedom in kept
-    ]
+    rows = []
+    for node, direction in (divmod(freedom, 3) for freedom in kept):
+        x, z = nodes[node]
+        rows.append(f"{node + 1}, {('x', 'z', 'ry')[direction]}, {x:g}, 0, {z:g}")
     path.write_text("\n".join(["node, direction, x, y, z", *rows, ""]), encoding="utf-8")
 
 

@@ -17,10 +17,12 @@ os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.envir
 ROOT = Path(__file__).resolve().parents[2]
 START = ROOT / "build" / "docs" / "ipython" / "profile_default" / "startup" / "examples.py"
 START.parent.mkdir(parents=True, exist_ok=True)
-START.write_text(
-    f"from pathlib import Path\nif not Path('examples').exists():\n    Path('examples').symlink_to({str(ROOT / 'examples')!r})\n",
-    encoding="utf-8",
+LINES = (
+    "from pathlib import Path",
+    "if not Path('examples').exists():",
+    f"    Path('examples').symlink_to({str(ROOT / 'examples')!r})",
 )
+START.write_text("\n".join((*LINES, "")), encoding="utf-8")
 os.environ["IPYTHONDIR"] = str(START.parents[2])
 
 project = "vibroimpact"

@@ -58,7 +58,8 @@ def show_modes(options: ShowModes) -> None:
             choices,
             body=options.body,
             changes=tuple(options.changes or ()),
-            figure=options.figure is not None or (options.output is not None and options.output.suffix == ".nc"),
+            figure=options.figure is not None
+            or (options.output is not None and options.output.suffix == ".nc"),
         )
     _print(found, str(options.file))
     if options.output is not None:

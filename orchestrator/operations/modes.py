@@ -66,7 +66,10 @@ class ShowModes(Operation):
         float | None, Option(help="auto: largest relative error of the flexibility at the points.")
     ] = None
     residual: Annotated[
-        bool, Option("--residual/--no-residual", help="Whether residual vectors of the points are among the modes.")
+        bool,
+        Option(
+            "--residual/--no-residual", help="Whether residual vectors of the points are among the modes."
+        ),
     ] = True
     base: Annotated[str | None, Option(help="Direction of a base that moves, such as z.")] = None
     damping_ratio: Annotated[float | None, Option(help="Damping ratio of all modes.")] = None

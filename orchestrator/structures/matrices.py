@@ -66,8 +66,7 @@ class Matrices:
         """Whether each degree of freedom is that of a node: one with a known place, or any where no place is known."""
         if self.coordinates is None or np.isnan(self.coordinates).all():
             return np.ones(len(self.freedoms), dtype=np.bool_)
-        found: NDArray[np.bool_] = ~np.isnan(self.coordinates).any(axis=1)
-        return found
+        return np.asarray(~np.isnan(self.coordinates).any(axis=1), dtype=np.bool_)
 
     def rigid(self, direction: str) -> Floats:
         """Return the motion of all degrees of freedom for 1 m of the base: those whose name ends in `.direction`.

@@ -18,6 +18,9 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.changes import changed_document
+from vibroimpact.orchestrator.scene.file import parse_scene_toml, read_scene_text
+from vibroimpact.orchestrator.scene.own_structures import apart_from_modes, request_of
 from vibroimpact.orchestrator.scene.body_models.modes import MOST_POINTS, POINT_NAME, ModesBody
 from vibroimpact.orchestrator.scene.body_models.structure import StructureBody
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -127,7 +130,8 @@ def modes_of(
     """
     if isinstance(file, Scene) or is_scene(file):
         choices.refuse("a scene")
-        return _of_scene(opened_scene(file, changes) if isinstance(file, Path) else file, body)
+        name, found = _of_scene(opened_scene(file, changes) if isinstance(file, Path) else file, body)
+        return _with_nodes(found, file, name, changes) if figure and isinstance(file, Path) else found
     for name, given in (("body", body), ("set", changes)):
         if given:
             raise UsageError(message(Argument(name), ": expected a scene with it, got another file."))
@@ -185,8 +189,22 @@ def _request(file: Path, choices: Choices, figure: bool) -> Request:
     return Request(**{**matrices, **given, "points": points, "folder": Path(), "shown": shown})
 
 
-def _of_scene(scene: Scene, body: str | None) -> Modes:
-    """Return the modes of a body of a scene."""
+def _with_nodes(modes: Modes, file: Path, name: str, changes: tuple[str, ...]) -> Modes:
+    """Return modes of a body of a scene with shapes at further nodes and with places, if its matrices give them."""
+    if file.suffix != ".toml":
+        return modes
+    written = parse_scene_toml(read_scene_text(file, str(file)), str(file))
+    before, _ = apart_from_modes(written, changes)
+    document = changed_document(written, before)[0] if before else written
+    request = request_of(document, name, file.parent)
+    if request is None:
+        return modes
+    found = find_modes(replace(request, shown=MOST_POINTS - len(modes.shapes)))
+    return replace(modes, shapes={**found.shapes, **modes.shapes}, coordinates=found.coordinates)
+
+
+def _of_scene(scene: Scene, body: str | None) -> tuple[str, Modes]:
+    """Return the name and the modes of a body of a scene."""
     whole = scene.bodies[0]
     parts = dict(zip(whole.names, whole.parts, strict=True)) if isinstance(whole, StructureBody) else {}
     there = {name: part for name, part in parts.items() if isinstance(part, ModesBody)}
@@ -200,7 +218,8 @@ def _of_scene(scene: Scene, body: str | None) -> Modes:
         )
     if body is not None and body not in there:
         raise UsageError(message(Argument("body"), f": expected one of {', '.join(there)}, got {body!r}."))
-    return _of_body(there[body or next(iter(there))])
+    name = body or next(iter(there))
+    return name, _of_body(there[name])
 
 
 def _of_body(body: ModesBody) -> Modes:

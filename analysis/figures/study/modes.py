@@ -100,7 +100,12 @@ def _draw_line(axis: Axes, places: Floats, moves: Floats) -> None:
     order = np.argsort(places[:, longest])
     for direction, name in enumerate(_DIRECTIONS):
         if np.abs(moves[:, direction]).max() > 0.0:
-            axis.plot(places[order, longest], moves[order, direction], color=COLOURS[direction], label=f"along {name}")
+            axis.plot(
+                places[order, longest],
+                moves[order, direction],
+                color=COLOURS[direction],
+                label=f"along {name}",
+            )
     axis.axhline(0.0, color=STOP, linewidth=0.4, zorder=0)
     axis.set(xlabel=f"{_DIRECTIONS[longest]} (m)", ylabel="shape (kg$^{-1/2}$)")
 

@@ -13,6 +13,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.modes import Modes
+from vibroimpact.orchestrator.structures.modes_files.node_places import DOUBLE
 from vibroimpact.orchestrator.structures.modes_files.universal import MARK
 from vibroimpact.orchestrator.structures.readers.found import DIRECTIONS
 
@@ -66,12 +67,23 @@ def _refuse_damping_matrix(modes: Modes, words: str) -> None:
 
 
 def _universal(modes: Modes) -> Iterator[str]:
-    """Yield the lines of a universal file: units of SI, then a dataset of each mode."""
+    """Yield the lines of a universal file: units of SI, the places of nodes, then a dataset of each mode."""
     _refuse_damping_matrix(modes, "a universal file")
     nodes, values = _at_nodes(modes)
+    places = {
+        int(name.partition(".")[0]): place
+        for name, place in modes.coordinates.items()
+        if name in modes.shapes
+    }
     yield from (MARK, f"{164:6d}", f"{1:10d}{'SI: Meter (newton)':20}{2:10d}")
     yield f"{1.0:25.17E}{1.0:25.17E}{1.0:25.17E}".replace("E", "D")
     yield from (f"{273.15:25.17E}".replace("E", "D"), MARK)
+    if places:
+        yield from (MARK, f"{DOUBLE:6d}")
+        for node, place in sorted(places.items()):
+            yield f"{node:10d}{1:10d}{1:10d}{11:10d}"
+            yield "".join(f"{each:25.16E}" for each in place).replace("E", "D")
+        yield MARK
     width = values.shape[1]
     for place, (natural, ratio) in enumerate(zip(modes.natural, modes.damping_ratios, strict=True)):
         frequency = natural / (2.0 * np.pi)

@@ -71,12 +71,16 @@ def test_a_residual_vector_makes_the_flexibility_of_its_point_exact(
 @pytest.mark.parametrize("ending", ["toml", "csv", "nc", "uff"])
 def test_written_modes_are_read_back_and_are_a_body(folder: Path, ending: str) -> None:
     points = {"1.x": "1.x", "4.x": "4.x"}
-    made = vi.modes("chain.npz", f"m.{ending}", freedoms="freedoms.csv", points=points, modes=3, damping_ratio=0.02)
+    made = vi.modes(
+        "chain.npz", f"m.{ending}", freedoms="freedoms.csv", points=points, modes=3, damping_ratio=0.02
+    )
     digits = 1e-5 if ending == "uff" else 1e-15
     found = vi.modes(f"m.{ending}")
     assert found.frequency.values == pytest.approx(made.frequency.values, rel=digits)
     at = found.sel(point=list(points)).shape.values
     assert at == pytest.approx(made.sel(point=list(points)).shape.values, rel=digits)
+    if ending in ("nc", "uff"):
+        assert found.sel(point=list(points)).x.values.tolist() == [0.0, 3.0]
     scene = {
         "body": [{"name": "b", "kind": "modes", "file": f"m.{ending}"}],
         "forcing": [{"at": "b.1.x", "amplitude": 1.0, "angular_frequency": 2.0}],
@@ -85,7 +89,9 @@ def test_written_modes_are_read_back_and_are_a_body(folder: Path, ending: str) -
     }
     body = vi.modes(scene)
     assert body.frequency.values == pytest.approx(found.frequency.values, rel=1e-15)
-    assert len(vi.draw(body).axes) == 3
+    assert len(vi.draw(body).axes) == (
+        1 if ending in ("toml", "nc") else 3
+    )  # which says what is a residual vector
 
 
 def test_the_command_prints_writes_and_draws(folder: Path) -> None:
@@ -100,6 +106,19 @@ def test_the_command_prints_writes_and_draws(folder: Path) -> None:
     again = in_this_process("modes", "m.toml", "-o", "m.csv")
     assert (again.returncode, again.stderr) == (0, "")
     assert Path("m.csv").read_text().splitlines()[-1].startswith("gap,")
+
+
+def test_a_body_by_matrices_of_a_scene_is_drawn_over_the_places_of_its_nodes() -> None:
+    found = vi.modes(EXAMPLES / "frame.toml")
+    assert found.point.values[0] == "roof"
+    assert found.sizes["point"] == 1 + 57
+    assert found.attrs["residual_vectors"] == 1
+    assert float(found.sel(point="roof").x) == 2.0
+    assert len(vi.draw(found).axes) == 6
+    changed = in_this_process("modes", EXAMPLES / "frame.toml", "--set", "body[1].modes=3")
+    assert changed.returncode == 0
+    rows = [line.split() for line in changed.stdout.splitlines() if "residual vector" in line]
+    assert rows[0][0] == "3"
 
 
 SCENE = """
