@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
 from vibroimpact.orchestrator.scene.changes import changed_key
 from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted, read_table
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.structures.request import Request
 
 PATHS = ("file", "stiffness", "mass", "damping", "freedoms")
 """Keys of a body by matrices that name files."""
@@ -62,6 +65,16 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
             found.append(body)
     written = document["body"]
     return {**document, "body": found if isinstance(written, list) else found[0]}, problems
+
+
+def request_of(document: Mapping[str, Any], name: str, folder: Path) -> Request | None:
+    """Return the request of a body by matrices in a document that is a scene; None of any other body."""
+    for path, body in _bodies(document):
+        if body.get("name", path[0]) == name and body.get("kind") == "matrices":
+            table = _table(body, path, [])
+            named = set(_named_points(document, name))
+            return None if table is None else _request(table, folder, named, _tolerance(document))
+    return None
 
 
 def apart_from_modes(document: Mapping[str, Any], changes: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -139,16 +152,32 @@ def _of_matrices(
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
     from vibroimpact.orchestrator.structures.find import find_modes  # scipy takes time
-    from vibroimpact.orchestrator.structures.request import Request
 
-    kept = {key: body[key] for key in ("name", *START) if key in body}
-    table = read_table(
-        MatricesBody, {key: value for key, value in body.items() if key not in kept}, path, problems
-    )
+    table = _table(body, path, problems)
     if table is None:
         return body
+    try:
+        modes = find_modes(_request(table, folder, named, tolerance))
+    except UsageError as error:
+        problems.append(_problem(path, error))
+        return body
+    one_ratio = table.rayleigh is None and not isinstance(table.damping_ratio, tuple)
+    # a key for all modes, as it is written
+    ratio = {"damping_ratio": table.damping_ratio} if one_ratio else {}
+    return {key: body[key] for key in ("name", *START) if key in body} | modes.table() | ratio
+
+
+def _table(body: Mapping[str, Any], path: KeyPath, problems: list[Problem]) -> MatricesBody | None:
+    """Return the table of a body by matrices, without its name and its start."""
+    own = {key: value for key, value in body.items() if key not in ("name", *START)}
+    return read_table(MatricesBody, own, path, problems)
+
+
+def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapping[str, float]) -> Request:
+    from vibroimpact.orchestrator.structures.request import Request
+
     rayleigh = table.rayleigh
-    request = Request(
+    return Request(
         stiffness=table.stiffness,
         mass=table.mass,
         damping=table.damping,
@@ -164,16 +193,6 @@ def _of_matrices(
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
         **(tolerance if table.modes == "auto" else {}),
     )
-    try:
-        modes = find_modes(request)
-    except UsageError as error:
-        problems.append(_problem(path, error))
-        return body
-    one_ratio = rayleigh is None and not isinstance(table.damping_ratio, tuple)
-    ratio = (
-        {"damping_ratio": table.damping_ratio} if one_ratio else {}
-    )  # a key for all modes, as it is written
-    return {**kept, **modes.table(), **ratio}
 
 
 def _of_modes(

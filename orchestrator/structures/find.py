@@ -44,8 +44,9 @@ def find_modes(request: Request) -> Modes:
 def _reduced(sources: Sources, request: Request) -> Modes:
     """Return the modes of the matrices of files."""
     points = dict(request.points) | {name: {name: 1.0} for name in request.named}
+    matrices = read_matrices(sources)
     return reduce(
-        read_matrices(sources),
+        matrices,
         points,
         modes=request.modes,
         tolerance=request.tolerance,
@@ -53,6 +54,7 @@ def _reduced(sources: Sources, request: Request) -> Modes:
         base=request.base,
         damping_ratio=request.damping_ratio,
         rayleigh=request.rayleigh,
+        shown=[name for name in matrices.spread(request.shown) if name not in points],
     )
 
 

@@ -34,6 +34,8 @@ class Modes:
         SHA-256 of each file by its name.
     remarks : tuple of str
         What was changed or left out on the way, one sentence each.
+    coordinates : mapping of str to tuple of float
+        Place x, y, z of the node of each point that is a degree of freedom, m, where it is known.
     """
 
     natural: Floats
@@ -45,6 +47,7 @@ class Modes:
     error: float | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    coordinates: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def table(self) -> dict[str, Any]:
         """Return the table `[body]` of these modes, with where they come from."""

@@ -48,9 +48,10 @@ def _reader_of(name: str, content: bytes) -> Reader:
 
 def packed(modes: Modes, digest: str) -> tuple[dict[str, Any], list[Any]]:
     """Return modes as facts for JSON, and their arrays."""
-    facts = {
+    facts: dict[str, Any] = {
         "points": list(modes.shapes),
         "has": [modes.damping is not None, modes.participation is not None],
+        "places": [name for name in modes.shapes if name in modes.coordinates],
         "residual_vectors": modes.residual_vectors,
         "error": modes.error,
         "files": dict(modes.files),
@@ -58,7 +59,8 @@ def packed(modes: Modes, digest: str) -> tuple[dict[str, Any], list[Any]]:
         "sha256": digest,
     }
     shapes = np.array(list(modes.shapes.values()))
-    arrays = [modes.natural, modes.damping_ratios, shapes, modes.damping, modes.participation]
+    places = np.array([modes.coordinates[name] for name in facts["places"]])
+    arrays = [modes.natural, modes.damping_ratios, shapes, modes.damping, modes.participation, places]
     return facts, [np.ascontiguousarray(each, dtype=np.float64) for each in arrays if each is not None]
 
 
@@ -74,6 +76,7 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> tuple[Mo
     damping = next(arrays).reshape(count, count) if has_damping else None
     participation = next(arrays) if has_participation else None
     rows = shapes.reshape(len(points), count)
+    places = [(x, y, z) for x, y, z in next(arrays).reshape(-1, 3).tolist()]
     if len(ratios) != count or (participation is not None and len(participation) != count):
         raise ValueError("arrays of modes differ in size")
     error = None if facts["error"] is None else float(facts["error"])
@@ -89,5 +92,6 @@ def unpacked(facts: Mapping[str, Any], buffers: Sequence[bytearray]) -> tuple[Mo
         error,
         files,
         remarks,
+        dict(zip(map(str, facts["places"]), places, strict=True)),
     )
     return found, str(facts["sha256"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,8 @@ class GivenModes:
         The table `origin` of a body.
     is_angular : bool
     remarks : tuple of str
+    coordinates : mapping of str to tuple of float
+        Known places x, y, z of points, m.
     """
 
     frequencies: Sequence[float]
@@ -58,6 +60,7 @@ class GivenModes:
     origin: Mapping[str, Any] | None = None
     is_angular: bool = False
     remarks: tuple[str, ...] = ()
+    coordinates: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 def checked_modes(given: GivenModes) -> Modes:
@@ -86,6 +89,9 @@ def checked_modes(given: GivenModes) -> Modes:
         participation = _each("participation", given.participation, count)[order]
     origin = given.origin or {}
     residual_vectors, error = origin.get("residual_vectors", 0), origin.get("error")
+    if not 0 <= residual_vectors <= count or not (error is None or 0.0 <= error < np.inf):
+        expected = f"0 to {count} residual vectors and an error >= 0"
+        raise UsageError(f"origin: expected {expected}, got {residual_vectors} and {error}.")
     if residual_vectors and (order != np.arange(count)).any():
         raise UsageError("expected ascending frequencies beside residual vectors, got another order.")
     return Modes(
@@ -98,6 +104,7 @@ def checked_modes(given: GivenModes) -> Modes:
         error,
         dict(origin.get("files", {})),
         (*origin.get("remarks", ()), *given.remarks, *remarks),
+        {name: place for name, place in given.coordinates.items() if np.isfinite(place).all()},
     )
 
 

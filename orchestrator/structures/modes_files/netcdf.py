@@ -1,7 +1,8 @@
 """Modes in NetCDF: `frequency` (mode), `damping_ratio` (mode) and `shape` (mode, point) with the names `point`.
 
 `angular_frequency` may take the place of `frequency`. `modal_mass`, `participation` (mode), `damping_matrix` (mode,
-mode) and `shape_imaginary` are optional.
+mode), `shape_imaginary`, and places `x`, `y`, `z` (point) in m are optional; so are the attributes `residual_vectors`
+and `error`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ _UNITS: Mapping[str, tuple[str, ...]] = {
     "frequency": ("", "Hz", "hertz", "1/s", "s-1", "s^-1"),
     "angular_frequency": ("", "rad/s", "rad s-1", "1/s", "s-1"),
     "modal_mass": ("", "kg"),
+    **dict.fromkeys("xyz", ("", "m")),
 }
 """Units of each variable; others are refused."""
 
@@ -43,6 +45,7 @@ def read(content: bytes) -> GivenModes:
             raise UsageError(f"expected a variable frequency or angular_frequency, got {got}.")
         key = "angular_frequency" if is_angular else "frequency"
         mode = _dimensions(file, key, 1)[0]
+        frequencies, points = _numbers(file, key, (mode,)).tolist(), _points(file)
         optional = {
             name: _numbers(file, name, (mode,)).tolist() if name in names else None
             for name in ("damping_ratio", "modal_mass", "participation")
@@ -50,14 +53,16 @@ def read(content: bytes) -> GivenModes:
         ratios = optional["damping_ratio"]
         damping = _numbers(file, "damping_matrix", None) if "damping_matrix" in names else None
         return GivenModes(
-            _numbers(file, key, (mode,)).tolist(),
-            _points(file),
+            frequencies,
+            points,
             _shapes(file, mode),
             0.0 if ratios is None else ratios,
             optional["modal_mass"],
             None if damping is None else damping.tolist(),
             optional["participation"],
+            origin=_origin(file),
             is_angular=is_angular,
+            coordinates=_coordinates(file, points),
         )
 
 
@@ -105,6 +110,22 @@ def _points(file: Any) -> tuple[str, ...]:
     if getattr(values, "ndim", 1) != 1:
         raise UsageError(f"point: expected a name for each point, got {variable.ndim} dimensions.")
     return tuple(_text(each) for each in values)
+
+
+def _origin(file: Any) -> dict[str, Any]:
+    """Return the numbers of residual vectors and the error that the file says, if it says them."""
+    found = {name: getattr(file, name, None) for name in ("residual_vectors", "error")}
+    kinds = {"residual_vectors": np.integer, "error": np.floating}
+    return {name: value.item() for name, value in found.items() if isinstance(value, kinds[name])}
+
+
+def _coordinates(file: Any, points: tuple[str, ...]) -> dict[str, tuple[float, float, float]]:
+    """Return the places of points where the file has x, y and z of each."""
+    if not {"x", "y", "z"} <= set(file.variables):
+        return {}
+    dimensions = file.variables["point"].dimensions[:1]
+    x, y, z = (_numbers(file, name, dimensions).tolist() for name in "xyz")
+    return dict(zip(points, zip(x, y, z, strict=True), strict=True))
 
 
 def _text(value: object) -> str:

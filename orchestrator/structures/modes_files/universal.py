@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from vibroimpact.orchestrator.structures.modes_files.nodal_data import (
     reals_of,
     shape_of,
 )
+from vibroimpact.orchestrator.structures.modes_files.node_places import DOUBLE, SINGLE, Place, places_of
 from vibroimpact.orchestrator.structures.readers.found import DIRECTIONS
 
 MARK = "    -1"
@@ -118,7 +119,8 @@ def read(content: bytes) -> GivenModes:
     """Return the modes of a universal file.
 
     Datasets 55 of normal and of complex modes are read. Shapes are normalised by the modal masses of their records.
-    The points are `node.direction`, such as `12.z`, of all values that are not 0 in every mode.
+    The points are `node.direction`, such as `12.z`, of all values that are not 0 in every mode. Datasets 15 and 2411
+    have the places of their nodes.
 
     Raises
     ------
@@ -130,9 +132,13 @@ def read(content: bytes) -> GivenModes:
     remarks: list[str] = []
     units = _SI
     numbers = 0
+    places: dict[int, Place] = {}
     for dataset in datasets(content):
         if dataset.kind == _UNITS:
             units = _units(dataset)
+            continue
+        if dataset.kind in (SINGLE, DOUBLE):
+            places |= places_of(dataset.kind, dataset.first, dataset.lines, units[0])
             continue
         if dataset.kind != _NODAL:
             continue
@@ -152,7 +158,7 @@ def read(content: bytes) -> GivenModes:
     if units != _SI:
         remarks.append("The units of the file are converted to SI.")
     remarks += [f"Datasets of {why} are left out ({times})." for why, times in left_out.items()]
-    return _given(_without_conjugates(modes, remarks), remarks)
+    return _given(_without_conjugates(modes, remarks), remarks, places)
 
 
 def _units(dataset: Dataset) -> tuple[float, float]:
@@ -186,7 +192,7 @@ def _without_conjugates(modes: list[NodalMode], remarks: list[str]) -> list[Noda
     return kept or modes
 
 
-def _given(modes: list[NodalMode], remarks: list[str]) -> GivenModes:
+def _given(modes: list[NodalMode], remarks: list[str], places: Mapping[int, Place]) -> GivenModes:
     """Return the modes over all nodes and directions."""
     for number, times in Counter(mode.number for mode in modes).items():
         if times > 1:
@@ -201,12 +207,15 @@ def _given(modes: list[NodalMode], remarks: list[str]) -> GivenModes:
         shapes[np.searchsorted(nodes, mode.nodes), : mode.values.shape[1], place] = mode.values
     flat = shapes.reshape(-1, len(modes))
     there = np.flatnonzero((flat != 0.0).any(axis=1))
+    points = tuple(f"{nodes[place // width]}.{DIRECTIONS[place % width]}" for place in there.tolist())
+    owners = (int(nodes[place // width]) for place in there.tolist())
     return GivenModes(
         [mode.natural for mode in modes],
-        tuple(f"{nodes[place // width]}.{DIRECTIONS[place % width]}" for place in there.tolist()),
+        points,
         flat[there],
         [mode.damping_ratio for mode in modes],
         [mode.modal_mass for mode in modes],
         is_angular=True,
         remarks=tuple(remarks),
+        coordinates={name: places[node] for name, node in zip(points, owners, strict=True) if node in places},
     )

@@ -289,11 +289,26 @@ def test_modes_that_do_not_fit_a_universal_file_are_refused(tmp_path: Path) -> N
         write_modes(tmp_path / "a.uff", Modes(one, one, None, {"tip": one}))
     with pytest.raises(UsageError, match="expected damping ratios alone"):
         write_modes(tmp_path / "a.uff", Modes(one, one, np.eye(1), {"1.x": one}))
-    with pytest.raises(
-        UsageError, match="expected a file of modes ending in .toml, .uff or .unv, got '.csv'"
-    ):
-        write_modes(tmp_path / "a.csv", Modes(one, one, None, {"1.x": one}))
+    with pytest.raises(UsageError, match="ending in .toml, .csv, .uff, .unv, got '.dat'"):
+        write_modes(tmp_path / "a.dat", Modes(one, one, None, {"1.x": one}))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", [15, 2411])
+def test_places_of_nodes_are_read_in_metres(kind: int) -> None:
+    node = f"{NODES[0]:10d}"
+    record = f"{node}{0:10d}{0:10d}{8:10d}"
+    places = {
+        15: "".join(f"{each:13.5E}" for each in (1500.0, -2.0, 0.0)),
+        2411: "\n   1.5000000000000000D+03  -2.0000000000000000D+00   0.0D+00",
+    }
+    nodes = f"{MARK}{kind:6d}\n{record}{places[kind]}\n{MARK}"
+    found = read(units(1000.0), nodes, normal(1, SHAPES[0]))
+    assert found.coordinates
+    assert {name.partition(".")[0] for name in found.coordinates} == {str(NODES[0])}
+    assert set(found.coordinates.values()) == {(1.5, -0.002, 0.0)}
+    with pytest.raises(UsageError, match=rf"line \d+: dataset {kind}: expected"):
+        read(nodes.replace(node, "       one", 1), normal(1, SHAPES[0]))
 
 
 WHOLE = (
