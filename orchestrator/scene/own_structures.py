@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -134,12 +135,13 @@ def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
                     yield rest
 
 
-def _tolerance(document: Mapping[str, Any]) -> dict[str, float]:
-    """Return the tolerance of a scene for `modes = "auto"`; none that the checks of the scene refuse."""
+def _tolerance(document: Mapping[str, Any]) -> float | None:
+    """Return the tolerance of a scene for `modes = "auto"`; None without one that the checks of the scene take."""
     execution = document.get("execution")
     given = execution.get("tolerance") if isinstance(execution, dict) else None
-    is_valid = isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE
-    return {"tolerance": float(given)} if is_valid else {}
+    if not isinstance(given, int | float) or not 0.0 < given <= LARGEST_TOLERANCE:
+        return None
+    return float(given)
 
 
 def _of_matrices(
@@ -147,7 +149,7 @@ def _of_matrices(
     path: KeyPath,
     folder: Path,
     named: set[str],
-    tolerance: Mapping[str, float],
+    tolerance: float | None,
     problems: list[Problem],
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
@@ -173,11 +175,11 @@ def _table(body: Mapping[str, Any], path: KeyPath, problems: list[Problem]) -> M
     return read_table(MatricesBody, own, path, problems)
 
 
-def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapping[str, float]) -> Request:
+def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: float | None) -> Request:
     from vibroimpact.orchestrator.structures.request import Request
 
     rayleigh = table.rayleigh
-    return Request(
+    found = Request(
         stiffness=table.stiffness,
         mass=table.mass,
         damping=table.damping,
@@ -191,8 +193,8 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapp
         base=table.base,
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
-        **(tolerance if table.modes == "auto" else {}),
     )
+    return replace(found, tolerance=tolerance) if table.modes == "auto" and tolerance else found
 
 
 def _of_modes(

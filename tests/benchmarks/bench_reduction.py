@@ -33,8 +33,8 @@ from pathlib import Path
 from vibroimpact.orchestrator.structures.find import find_modes
 from vibroimpact.orchestrator.structures.request import Request
 folder, kind, *points = sys.argv[1:]
-request = Request(f"stiffness.{{kind}}", f"mass.{{kind}}", Path(folder), {{}}, freedoms="freedoms.csv", named=tuple(points),
-                  modes={modes})
+request = Request(f"stiffness.{{kind}}", f"mass.{{kind}}", Path(folder), {{}}, freedoms="freedoms.csv",
+                  named=tuple(points), modes={modes})
 found = find_modes(request)
 print(found.natural[0] / 6.283185307179586, found.residual_vectors, found.error)
 """

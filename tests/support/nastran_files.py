@@ -148,7 +148,7 @@ def _card(name: str, fields: Sequence[Any], style: Style) -> str:
     lines = []
     for at in range(0, len(fields), count):
         part = [str(each) for each in fields[at : at + count]]
-        first = (name if at == 0 else "" if not large else "") + ("*" if large else "")
+        first = (name if at == 0 else "") + ("*" if large else "")
         if style.startswith("free"):
             lines.append(",".join([first or "+", *part]))
         else:

@@ -9,7 +9,7 @@ from vibroimpact.orchestrator.scene.body_models.oscillator import OscillatorBody
 from vibroimpact.orchestrator.scene.body_models.points import OneBody
 from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone, LinkTable, StructureBody
 
-Body = OscillatorBody | ChainBody | BeamBody | StructureBody
+Body = OscillatorBody | ChainBody | BeamBody | ModesBody | StructureBody
 
 BODY_MODELS: dict[str, type[OneBody]] = {
     "oscillator": OscillatorBody,

@@ -176,13 +176,13 @@ def test_a_normal_mode_with_complex_values_is_made_real_and_its_error_is_told() 
 def test_complex_shapes_of_any_size_are_made_real(scale: float) -> None:
     found = read(normal(1, SHAPES[0] * np.exp(1j) * scale))
     np.testing.assert_allclose(np.abs(rows(found)[:, 0]) / scale, np.abs(SHAPES[0].ravel()), rtol=1e-4)
-    with pytest.raises(UsageError, match="3.x: expected finite numbers, got another in mode 1"):
+    with pytest.raises(UsageError, match=r"3.x: expected finite numbers, got another in mode 1"):
         read(normal(1, SHAPES[0] * 1e300, mass=1e-30))
 
 
 def test_a_mode_far_from_real_is_refused_by_its_number() -> None:
     with pytest.raises(
-        UsageError, match="mode 1: expected a shape within 10 % of a real one, got [0-9.]+ % of it"
+        UsageError, match=r"mode 1: expected a shape within 10 % of a real one, got [0-9.]+ % of it"
     ):
         read(normal(1, SHAPES[0] + 0.5j * SHAPES[1]))
 
@@ -289,7 +289,7 @@ def test_modes_that_do_not_fit_a_universal_file_are_refused(tmp_path: Path) -> N
         write_modes(tmp_path / "a.uff", Modes(one, one, None, {"tip": one}))
     with pytest.raises(UsageError, match="expected damping ratios alone"):
         write_modes(tmp_path / "a.uff", Modes(one, one, np.eye(1), {"1.x": one}))
-    with pytest.raises(UsageError, match="ending in .toml, .csv, .uff, .unv, got '.dat'"):
+    with pytest.raises(UsageError, match=r"ending in .toml, .csv, .uff, .unv, got '.dat'"):
         write_modes(tmp_path / "a.dat", Modes(one, one, None, {"1.x": one}))
     assert not list(tmp_path.iterdir())
 

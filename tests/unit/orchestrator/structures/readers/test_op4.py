@@ -119,7 +119,7 @@ def test_matrices_that_are_none_of_a_structure_are_refused_by_name(
 def test_a_wide_matrix_a_missing_one_and_one_that_comes_twice_are_refused(write: Any) -> None:
     with pytest.raises(UsageError, match="K: expected a square matrix, got one of 2 x 3"):
         read(write({"K": np.ones((2, 3))}), Wanted({"stiffness": "K"}))
-    with pytest.raises(UsageError, match="expected a matrix 'KGG' .stiffness., got 'KAA', 'MAA'"):
+    with pytest.raises(UsageError, match=r"expected a matrix 'KGG' .stiffness., got 'KAA', 'MAA'"):
         read(write(NAMED), Wanted({"stiffness": "KGG"}))
     with pytest.raises(UsageError, match="expected a matrix KAA once, got it 2 times"):
         read(write(NAMED) + write(NAMED))
@@ -202,7 +202,7 @@ def test_long_words_that_overflow_are_refused(at: int, value: int) -> None:
 def test_a_text_line_with_wider_numbers_is_refused_with_its_line() -> None:
     content = op4_text({"K": np.eye(2)}).replace(b" 1.0000000000000000E+00", b" 1.00000000000000000E+01", 1)
     with pytest.raises(
-        UsageError, match="line 3: expected 1 numbers of 23 characters, 3 in a line, got '1.00"
+        UsageError, match=r"line 3: expected 1 numbers of 23 characters, 3 in a line, got '1.00"
     ):
         read(content, Wanted({"stiffness": "K"}))
 
@@ -212,7 +212,7 @@ def test_a_text_whose_long_string_has_a_line_of_another_length_is_refused_with_i
     lines[3] = lines[3][:-1]
     lines[2] += b"0"
     with pytest.raises(
-        UsageError, match="K: line 3: expected numbers of 23 characters, 3 in a line, got '1.5"
+        UsageError, match=r"K: line 3: expected numbers of 23 characters, 3 in a line, got '1.5"
     ):
         read(b"\n".join(lines), Wanted({"stiffness": "K"}))
 
@@ -220,7 +220,7 @@ def test_a_text_whose_long_string_has_a_line_of_another_length_is_refused_with_i
 @pytest.mark.parametrize("wrong", [b"nan", b"1_0", b"0x1", b"1 2", b"", b"1e", b"--1"])
 def test_texts_that_are_no_numbers_are_refused_with_their_line(wrong: bytes) -> None:
     content = op4_text({"K": np.eye(3)}).replace(b" 1.0000000000000000E+00", wrong.rjust(23), 1)
-    with pytest.raises(UsageError, match="line 3: expected .*numbers of 23 characters"):
+    with pytest.raises(UsageError, match=r"line 3: expected .*numbers of 23 characters"):
         read(content, Wanted({"stiffness": "K"}))
 
 
