@@ -51,7 +51,7 @@ def _keys_of_files(body: Mapping[str, Any]) -> Iterator[str]:
 
 def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
     """Return a document whose bodies by files have their modes as numbers, and the problems of their tables."""
-    if not any(files_named(document)):
+    if not any(body.get("kind") == "matrices" or "file" in body for _, body in _bodies(document)):
         return document, []
     problems: list[Problem] = []
     found: list[Any] = []
@@ -172,7 +172,14 @@ def _of_matrices(
 def _table(body: Mapping[str, Any], path: KeyPath, problems: list[Problem]) -> MatricesBody | None:
     """Return the table of a body by matrices, without its name and its start."""
     own = {key: value for key, value in body.items() if key not in ("name", *START)}
-    return read_table(MatricesBody, own, path, problems)
+    table = read_table(MatricesBody, own, path, problems)
+    for key in ("stiffness", "mass"):
+        if table is not None and table.file is None and getattr(table, key) is None:
+            problems.append(
+                Problem(key_path((*path, key)), "a file", "nothing", "Or give file, which holds both.")
+            )
+            return None
+    return table
 
 
 def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: float | None) -> Request:
@@ -180,8 +187,8 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: floa
 
     rayleigh = table.rayleigh
     found = Request(
-        stiffness=table.stiffness,
-        mass=table.mass,
+        stiffness=table.stiffness or "",
+        mass=table.mass or "",
         damping=table.damping,
         file=None if table.file is None else Path(table.file),
         freedoms=None if table.freedoms is None else Path(table.freedoms),

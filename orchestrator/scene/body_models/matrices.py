@@ -26,8 +26,22 @@ class MatricesBody(SceneTable):
         Name | None,
         Rule(_FILE, doc="a file that holds all matrices; the keys below are then their names in it"),
     ] = None
-    stiffness: Annotated[Name, Rule("a file, or a name within `file`", doc="symmetric, N/m")]
-    mass: Annotated[Name, Rule("a file, or a name within `file`", doc="symmetric, kg")]
+    stiffness: Annotated[
+        Name | None,
+        Rule(
+            "a file, or a name within `file`",
+            doc="symmetric, N/m",
+            default="required without `file`; else its usual name",
+        ),
+    ] = None
+    mass: Annotated[
+        Name | None,
+        Rule(
+            "a file, or a name within `file`",
+            doc="symmetric, kg",
+            default="required without `file`; else its usual name",
+        ),
+    ] = None
     damping: Annotated[
         Name | None, Rule("a file, or a name within `file`", doc="symmetric, N s/m", default="none")
     ] = None
