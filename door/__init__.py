@@ -85,6 +85,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
     from vibroimpact.simulation import run as run
     from vibroimpact.simulation import runner as runner
     from vibroimpact.sobol import sensitivity as sensitivity
+    from vibroimpact.structures import modes as modes
     from vibroimpact.studies import accuracy as accuracy
     from vibroimpact.studies import effects as effects
 
@@ -132,6 +133,7 @@ _NAMES = {
     "service.client": ("Service",),
     "simulation": ("cost_of", "run", "runner"),
     "sobol": ("sensitivity",),
+    "structures": ("modes",),
     "studies": ("accuracy", "effects"),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}

@@ -152,7 +152,7 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
 
 
 def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
-    """Return the positions (m) of the stops that limit each sampled displacement, by its name."""
+    """Return the positions (m) of the stops at rest that limit each sampled displacement, by its name."""
     found: dict[str, list[float]] = {}
     if not scene.is_one_body:
         return found
@@ -161,6 +161,8 @@ def _stops(scene: Scene, names: Sequence[str]) -> dict[str, list[float]]:
     for name in names:
         word, _, number = name.rstrip("]").partition("[")
         for place, stop in enumerate(scene.stops, start=1):
+            if stop.moves:
+                continue
             point = body.place_of(stop)
             limited = {
                 "displacement": point == observed and not number,
@@ -178,6 +180,8 @@ def _left_out(scene: Scene, watched: Scene, record: RunRecord) -> list[str]:
     own, shown = scene.record.recorded_periods, watched.record.recorded_periods
     if own and shown and shown < own:
         found.append(f"The first {shown} of {own} recorded periods are shown.")
+    if scene.moving_stop:
+        found.append("Stops that move are not drawn.")
     samples = 0 if record.samples is None else len(record.samples)
     if samples > MOST_SAMPLES:
         found.append(f"One of {_every(samples)} of {samples} samples is drawn.")

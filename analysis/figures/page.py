@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,6 +37,8 @@ MARK = "#D55E00"
 STOP = "0.45"
 # Distinguishable with every kind of colour vision (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_OF_POINTS = re.compile(r"(displacement|velocity|acceleration|force) (of|on|between) ")
+"""First words of the long names of motions and forces at points of several bodies."""
 STOP_LINE: dict[str, Any] = {"color": STOP, "linestyle": "--", "linewidth": 0.6, "zorder": 0}
 
 
@@ -115,8 +118,14 @@ def label(variable: xr.DataArray) -> str:
 
 
 def title(variable: xr.DataArray) -> str:
-    """Return the title of a variable: its name in its component, or its own name in words."""
-    return str(variable.attrs.get("component_variable") or str(variable.name).replace("_", " "))
+    """Return the title of a variable: its name in its component, or its own name in words.
+
+    Among several bodies it is the long name, which has their points: "displacement of frame - ball".
+    """
+    name, words = str(variable.name).replace("_", " "), str(variable.attrs.get("long_name", ""))
+    if _OF_POINTS.match(words) and name.removeprefix("contact ").startswith(words.partition(" ")[0]):
+        name = words.replace(" relative to ", " - ")
+    return str(variable.attrs.get("component_variable") or name)
 
 
 def unit_symbol(variable: xr.DataArray) -> str:

@@ -116,9 +116,9 @@ def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
 def contact_label(dataset: xr.Dataset, number: int) -> str:
     """Return the name of a contact, counted from 1: a stop by its number, contacts of bodies by their points."""
     meanings = str(dataset.variables["impact_contact"].attrs.get("flag_meanings", "")).split()
-    if meanings:
-        return meanings[number - 1]
     written = limiting_tables(dataset)
+    if meanings and not written:
+        return meanings[number - 1]
     points = written[number - 1].get("between") if number <= len(written) else None
     return " - ".join(points) if points else f"stop {number}"
 

@@ -277,13 +277,11 @@ def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
     (True, 0.75)
     """
     if not (orbit.velocities > 0.0).all():
-        raise UsageError(f"energies: {orbit.name}: expected impacts with a speed, got a graze.")
+        raise UsageError("energies: expected impacts with a speed, got a graze.")
     if not orbit.body.has_one_sine:
         raise UsageError(
-            f"energies: {orbit.name}: expected one sine and stops that do not move, got several sines or a moving stop."
+            "energies: expected one sine and stops that do not move, got several sines or a moving stop."
         )
     if orbit.body.held[: orbit.body.loose].any():
-        raise UsageError(
-            f"energies: {orbit.name}: expected no constant force on bodies without a spring, got one."
-        )
+        raise UsageError("energies: expected no constant force on bodies without a spring, got one.")
     return OrbitEnergies(orbit)

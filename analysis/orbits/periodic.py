@@ -75,13 +75,14 @@ class PeriodicOrbit:
 
     @property
     def full_name(self) -> str:
-        """P(p,q), with the stops of its impacts if the body has several: `P(1,1) at stop 2`."""
+        """P(p,q), with the stops and contacts of its impacts if there are several: `P(1,1) at stop 2`."""
         if len(self.body.contacts) < 2:
             return self.name
-        stops, counts = np.unique(self.contacts + 1, return_counts=True)
-        if stops.size == 1:
-            return f"{self.name} at stop {stops[0]}"
-        parts = (f"{count} at stop {stop}" for stop, count in zip(stops, counts, strict=True))
+        places, counts = np.unique(self.contacts, return_counts=True)
+        names = [self.body.contacts[place].name or f"stop {place + 1}" for place in places]
+        if len(names) == 1:
+            return f"{self.name} at {names[0]}"
+        parts = (f"{count} at {name}" for name, count in zip(names, counts, strict=True))
         return f"{self.name}, {', '.join(parts)}"
 
     @cached_property

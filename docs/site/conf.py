@@ -13,6 +13,18 @@ sys.path.insert(0, str(Path(__file__).parent))
 # Cells of tutorials start `vibroimpact`, the program of this environment.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
+# Tutorials run in folders of their own. This start-up file of IPython puts the examples of a clone there.
+ROOT = Path(__file__).resolve().parents[2]
+START = ROOT / "build" / "docs" / "ipython" / "profile_default" / "startup" / "examples.py"
+START.parent.mkdir(parents=True, exist_ok=True)
+LINES = (
+    "from pathlib import Path",
+    "if not Path('examples').exists():",
+    f"    Path('examples').symlink_to({str(ROOT / 'examples')!r})",
+)
+START.write_text("\n".join((*LINES, "")), encoding="utf-8")
+os.environ["IPYTHONDIR"] = str(START.parents[2])
+
 project = "vibroimpact"
 author = "vibroimpact developers"
 copyright = author

@@ -105,6 +105,11 @@ def kinds() -> dict[str, Picture]:
             "effects", "parts", "vibroimpact effects examples/thesis/figure_7_11.toml -o parts.nc"
         ),
         "sensitivity": _of("sensitivity", "shares", "vibroimpact sensitivity tolerances.nc -o shares.nc"),
+        "modes": _of(
+            "modes",
+            "shapes",
+            "vibroimpact modes examples/bracket/bracket.sti.gz --point tip=42.z -o shapes.nc",
+        ),
         "resonances": _of(
             "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
         ),

@@ -36,6 +36,8 @@ class Contact:
         Coefficient of restitution, 0 to 1.
     motion : mapping of int to complex
         Complex amplitudes of the stop's motion, m, by their harmonic n: position + Re(amplitude e^(i n phase)).
+    name : str
+        Name of a contact of two points, such as `contact 1`; empty for a stop.
     """
 
     shape: Floats
@@ -43,6 +45,7 @@ class Contact:
     position: float
     restitution: float
     motion: Mapping[int, complex] = field(default_factory=dict)
+    name: str = ""
 
     @cached_property
     def mass(self) -> float:

@@ -21,6 +21,7 @@ from vibroimpact.orchestrator.hard_cases.finding import CASES as FINDING
 from vibroimpact.orchestrator.hard_cases.growing import CASES as GROWING
 from vibroimpact.orchestrator.hard_cases.impacts import CASES as IMPACTS
 from vibroimpact.orchestrator.hard_cases.limits import CASES as LIMITS
+from vibroimpact.orchestrator.hard_cases.loose import CASES as LOOSE
 from vibroimpact.orchestrator.hard_cases.places import CASES as PLACES
 from vibroimpact.orchestrator.hard_cases.rests import CASES as RESTS
 from vibroimpact.orchestrator.hard_cases.scales import CASES as SCALES
@@ -29,7 +30,7 @@ from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
 
 CASES: tuple[HardCase, ...] = (
     *(*FINDING, *IMPACTS, *PLACES, *RESTS),
-    *(*YIELDING, *SEVERAL, *GROWING, *SCALES, *LIMITS),
+    *(*YIELDING, *SEVERAL, *GROWING, *LOOSE, *SCALES, *LIMITS),
 )
 """In the order of docs/hard_cases.md."""
 _ONLY = Argument("only")

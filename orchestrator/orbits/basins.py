@@ -32,6 +32,7 @@ from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "basins of attraction found by vibroimpact"
@@ -65,6 +66,8 @@ POINTS = 200
 MOST_STARTS = 16_000_000
 BLOCK = 16_384
 """Starts followed in one call; Ctrl-C takes effect between calls."""
+ROUNDING = 1e-13
+"""Part of a span by which its ends stay away from the contacts that cut it off."""
 REACH = 2.0
 """Default half width of the plane, over the size of the scene's own motion."""
 
@@ -169,7 +172,29 @@ def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span,
         for contact in body.contacts:
             stop = contact.stop_at(body.phase)
             x = (x[0], min(x[1], stop)) if contact.direction > 0 else (max(x[0], stop), x[1])
+    elif plane.x is None and isinstance(scene.body, StructureBody):
+        x = _free_span(scene, body, own[:, :half], _axes(scene, plane.number)[0], x)
     return (x, y), (size, speed)
+
+
+def _free_span(scene: Scene, body: ImpactingBody, own: Floats, across: int, span: Span) -> Span:
+    """Return the part of a span of one displacement that no stop or contact cuts off; all of it without such a part.
+
+    The other displacements are those of the scene's start, `own`, shape (1, displacement).
+    """
+    ends = np.repeat(own, 2, axis=0)
+    ends[:, across] = 0.0, 1.0
+    at_0, at_1 = modal_displacements(scene, ends)
+    low, high = span
+    for contact in body.contacts:
+        slope = contact.direction * float((at_1 - at_0) @ contact.shape)
+        room = contact.direction * (contact.stop_at(body.phase) - float(at_0 @ contact.shape))
+        if slope > 0.0:
+            high = min(high, room / slope)
+        elif slope < 0.0:
+            low = max(low, room / slope)
+    inner = ROUNDING * (high - low)  # an end on a contact stays on its free side
+    return (low + inner, high - inner) if low < high else span
 
 
 def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,10 @@ def impacting_body(scene: Scene) -> ImpactingBody:
     for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
         if not contact.shape @ contact.shape > 0.0:
             refuse_orbits(scene, [Seen("held", key, "one that is held")])
+    if any(key.startswith("contact") for key in scene.stop_keys):
+        keys = (key.replace("[", " ").removesuffix("]") for key in scene.stop_keys)
+        named = [replace(each, name=name) for each, name in zip(found.contacts, keys, strict=True)]
+        return replace(found, contacts=tuple(named))
     return found
 
 

@@ -309,7 +309,7 @@ def _print_matrices(console: Terminal, found: xr.Dataset) -> None:
 def _print_all(found: xr.Dataset) -> None:
     reasons = [str(text) for text in found.reason.values.ravel() if str(text) != "no run"]
     there = reasons.count("")
-    say(f"{found.attrs.get('title', '')}: {there} of {len(reasons)} runs have a periodic orbit.")
+    say(f"{found.attrs.get('title', '')}: {there} of {len(reasons)} runs have energies of a periodic orbit.")
     if there:
         worst = float(np.nanmax(found.identity_error.values))
         away = float(np.nanmax(found.transient.values))

@@ -28,7 +28,10 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 #: Power of the natural frequency in each kind of number: 1 in frequencies, 2 in stiffnesses.
-_FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
+_FREQUENCY_POWER = {
+    **dict.fromkeys(("frequency", "frequencies", "angular_frequencies"), 1.0),
+    **dict.fromkeys(("stiffness", "flexural_rigidity", "youngs_modulus"), 2.0),
+}
 MOST_ALIGNMENTS = 6
 #: Condition of the scaled normal matrix above which two numbers are inseparable: their difference is derivative noise.
 MOST_CONDITION = 1e8

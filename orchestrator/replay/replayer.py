@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.replay.drive import VOLTS, DriveSignal, drive_of, 
 from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.fields import field_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.replay_models import Compared, Replay
@@ -151,6 +152,11 @@ class Replayer:
         if self.execution == "coupled" and self.scene.exciter is not None:
             raise UsageError(
                 f"{self.scene.source}: exciter: expected a fused replay beside it, got a coupled one. Leave it fused."
+            )
+        if self.execution == "coupled" and isinstance(self.scene.body, StructureBody):
+            raise UsageError(
+                f"{self.scene.source}: expected a fused replay of several bodies or given modes, got a coupled one. "
+                "Leave it fused."
             )
         if self.execution != "coupled" or self.drive is None:
             return Session(self.scene, names, execution=self.execution)
@@ -320,7 +326,8 @@ def _reading(compared: Compared, scene: Scene, recording: Recording) -> ChannelR
     measured = measured_unit(channel.unit)
     stored = file_name_of(variable)
     rule = sample_rule(stored)
-    simulated = rule.unit if rule is not None else known_unit(stored)
+    motion = variable.partition("[")[0]  # of an observed point, whose name follows
+    simulated = rule.unit if rule is not None else known_unit(stored) or known_unit(motion)
     if scene.units == "nondimensional" or measured.si == simulated:
         return ChannelReading(compared, variable, channel, is_sensor, same_kind=True)
     if not is_sensor:

@@ -36,6 +36,7 @@ from vibroimpact.orchestrator.scene.body_models.structure import (
 )
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
+from vibroimpact.orchestrator.scene.models import ContactTable
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sweep import expand, shared_dimensions
 
@@ -76,6 +77,14 @@ class DatasetForm:
             known = scene.body.long_names(scene.stops)
             own = {stored[name]: {"long_name": known[name]} for name in scene.sampled if name in known}
             self._attributes |= own | self._of_further(scene.body)
+            if records_impacts(scene) and any(isinstance(stop, ContactTable) for stop in scene.stops):
+                for name, words in (
+                    ("impact_contact", "that is hit"),
+                    ("stick_contact", "that is rested on"),
+                ):
+                    named = _named_contacts(scene.stop_keys)
+                    named["long_name"] = f"number of the stop or contact {words}, from 1"
+                    self._attributes[name] = named
         own = _attributes_of_forces(scene)
         self._attributes |= {stored[name]: own[name] for name in scene.sampled if name in own}
         if not scene.is_one_body and records_impacts(scene):

@@ -51,7 +51,7 @@ def _body(scene: Scene) -> str:
     body = scene.body
     if isinstance(body, StructureBody):
         count = f"{body.size} mode{'' if body.size == 1 else 's'}"
-        return f"{body.FMU}, {', '.join(body.names)}: {count} of all of them"
+        return f"{body.FMU}, {', '.join(body.names)}: {count} in all"
     if not body.IS_STRUCTURE:
         yields = any(not LAWS[stop.law].is_rigid for stop in scene.stops)
         how = "as a structure because a stop yields" if yields else "closed form between impacts"

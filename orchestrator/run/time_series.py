@@ -101,7 +101,9 @@ class TimeSeriesPlan:
         forcing = _only(forces)
         if forcing is None or not self._is_relative(forcing):
             return np.zeros(len(times))  # the FMU of several forces has the base
-        return forcing.scalar_amplitude * _cosines(forcing, parameters, times)
+        return forcing.scalar_amplitude * cosines(
+            forcing.angular_frequency, parameters["forcing.phase"], times
+        )
 
     def rows(
         self,
@@ -167,14 +169,10 @@ def _forces_at(
     """Return the sampled variable `forcing` or `forcing[i]`: a force, or under one force that on a mass."""
     number, forcing = number_of_force(name), _only(forces)
     if forcing is not None:
-        return _amplitude(forcing, number) * _cosines(forcing, parameters, times)
+        return _amplitude(forcing, number) * cosines(
+            forcing.angular_frequency, parameters["forcing.phase"], times
+        )
     return Forces(forces, parameters).values(number, times) if forces and number else 0.0
-
-
-def _cosines(
-    forcing: Forcing, parameters: Mapping[str, float], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    return cosines(forcing.angular_frequency, parameters["forcing.phase"], times)
 
 
 def _sums(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -82,6 +82,15 @@ def changed_document(
     return _changed(document, changes, problems, CHANGES), tuple(change.key for change in changes)
 
 
+def changed_key(text: str) -> KeyPath:
+    """Return the path of the key in `KEY=VALUE`, with 0-based places; an empty path without a key.
+
+    >>> changed_key("body.frequencies[2]=70")
+    ('body', 'frequencies', 1)
+    """
+    return _path(text)[0]
+
+
 def changed_values(document: Mapping[str, Any], values: Mapping[str, Any], source: str) -> dict[str, Any]:
     """Return a document with other values by key, in the notation of messages; see `changed_document`."""
     problems, changes = [], []

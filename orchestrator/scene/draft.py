@@ -255,8 +255,9 @@ class Draft(DraftTables):
         if not whole or not parts or len(parts) < len(self.names):
             return None
         observed = () if self.record is None else self.record.observed
+        driven = self.written("replay").get("at")
         return StructureBody.model_construct(
-            names=tuple(names), parts=parts, links=tuple(links), observed=observed
+            names=tuple(names), parts=parts, links=tuple(links), observed=observed, driven=driven
         )
 
     @property
@@ -335,8 +336,8 @@ class Draft(DraftTables):
         spans += [span for span in moved if span is not None]
         if not spans:
             return 0.0, 0.0
-        clock = self.clock
-        periods = 1 if clock is None else clock.periods
+        clock = self.clock if len(spans) > 1 else None
+        periods = 1 if clock is None else clock.periods  # those of one sine are its own
         return spans[0] and (spans[0][0] / periods, spans[0][1] / periods)
 
     def frequency_span(self, key: str) -> tuple[float, float] | None:

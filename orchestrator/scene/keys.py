@@ -45,7 +45,11 @@ START_STATE = (".displacement_start", ".velocity_start")
 """Last parts of the keys of a start state."""
 
 # The second key of each pair overrides the first in its model, so setting the first must clear the second.
-OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
+OVERRIDDEN_BY = {
+    "damping": "damping_ratio",
+    "angular_frequency": "frequency",
+    "angular_frequencies": "frequencies",
+}
 ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
 """Alternative keys of one table for the same quantity; a scene gives one of each pair."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
+from vibroimpact.orchestrator.scene.changes import changed_key
+from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted, read_table
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.structures.request import Request
 
 PATHS = ("file", "stiffness", "mass", "damping", "freedoms")
 """Keys of a body by matrices that name files."""
 START = ("displacement_start", "velocity_start")
 """Keys of the modes that a body by files may have."""
+LARGEST_TOLERANCE = 0.5
+MODES = (
+    "frequencies",
+    "angular_frequencies",
+    "damping_ratio",
+    "damping_matrix",
+    "shapes",
+    "participation",
+    *START,
+)
+"""Keys of the modes, which may be changed once they are known."""
 
 
 def files_named(document: Mapping[str, Any]) -> Iterator[str]:
@@ -23,9 +39,13 @@ def files_named(document: Mapping[str, Any]) -> Iterator[str]:
     ['body[1].file']
     """
     for path, body in _bodies(document):
-        kind = body.get("kind")
-        keys = PATHS if kind == "matrices" else ("file",) if kind == "modes" else ()
-        yield from (key_path((*path, key)) for key in keys if key in body)
+        yield from (key_path((*path, key)) for key in _keys_of_files(body))
+
+
+def _keys_of_files(body: Mapping[str, Any]) -> Iterator[str]:
+    kind = body.get("kind")
+    keys = PATHS if kind == "matrices" else ("file",) if kind == "modes" else ()
+    yield from (key for key in keys if key in body)
 
 
 def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
@@ -34,16 +54,46 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
         return document, []
     problems: list[Problem] = []
     found: list[Any] = []
+    tolerance = _tolerance(document)
     for path, body in _bodies(document):
         names = set(_named_points(document, str(body.get("name", path[0]))))
         if body.get("kind") == "matrices":
-            found.append(_of_matrices(body, path, folder, names, problems))
+            found.append(_of_matrices(body, path, folder, names, tolerance, problems))
         elif body.get("kind") == "modes" and "file" in body:
-            found.append(_of_modes(body, path, folder, problems))
+            found.append(_of_modes(body, path, folder, names, problems))
         else:
             found.append(body)
     written = document["body"]
     return {**document, "body": found if isinstance(written, list) else found[0]}, problems
+
+
+def request_of(document: Mapping[str, Any], name: str, folder: Path) -> Request | None:
+    """Return the request of a body by matrices in a document that is a scene; None of any other body."""
+    for path, body in _bodies(document):
+        if body.get("name", path[0]) == name and body.get("kind") == "matrices":
+            table = _table(body, path, [])
+            named = set(_named_points(document, name))
+            return None if table is None else _request(table, folder, named, _tolerance(document))
+    return None
+
+
+def apart_from_modes(document: Mapping[str, Any], changes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the changes to make before bodies by files have their modes, and those of the modes themselves.
+
+    >>> apart_from_modes({"body": {"kind": "matrices"}}, ["body.modes=8", "body.frequencies[1]=20"])
+    (['body.modes=8'], ['body.frequencies[1]=20'])
+    """
+    owners = {tuple(path) for path, body in _bodies(document) if any(_keys_of_files(body))}
+
+    def is_of_modes(text: str) -> bool:
+        path = changed_key(text)
+        depth = next((len(owner) for owner in owners if path[: len(owner)] == owner), len(path))
+        key = path[depth:]
+        known = known_keys(MatricesBody) if key else ()
+        return key[:1] != () and key[0] in MODES and (len(key) > 1 or key[0] not in known)
+
+    before = [text for text in changes if not is_of_modes(text)]
+    return before, [text for text in changes if is_of_modes(text)]
 
 
 def with_bodies_in_text(text: str, document: Mapping[str, Any]) -> str:
@@ -84,21 +134,50 @@ def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
                     yield rest
 
 
+def _tolerance(document: Mapping[str, Any]) -> dict[str, float]:
+    """Return the tolerance of a scene for `modes = "auto"`; none that the checks of the scene refuse."""
+    execution = document.get("execution")
+    given = execution.get("tolerance") if isinstance(execution, dict) else None
+    is_valid = isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE
+    return {"tolerance": float(given)} if is_valid else {}
+
+
 def _of_matrices(
-    body: dict[str, Any], path: KeyPath, folder: Path, named: set[str], problems: list[Problem]
+    body: dict[str, Any],
+    path: KeyPath,
+    folder: Path,
+    named: set[str],
+    tolerance: Mapping[str, float],
+    problems: list[Problem],
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
     from vibroimpact.orchestrator.structures.find import find_modes  # scipy takes time
-    from vibroimpact.orchestrator.structures.request import Request
 
-    kept = {key: body[key] for key in ("name", *START) if key in body}
-    table = read_table(
-        MatricesBody, {key: value for key, value in body.items() if key not in kept}, path, problems
-    )
+    table = _table(body, path, problems)
     if table is None:
         return body
+    try:
+        modes = find_modes(_request(table, folder, named, tolerance))
+    except UsageError as error:
+        problems.append(_problem(path, error))
+        return body
+    one_ratio = table.rayleigh is None and not isinstance(table.damping_ratio, tuple)
+    # a key for all modes, as it is written
+    ratio = {"damping_ratio": table.damping_ratio} if one_ratio else {}
+    return {key: body[key] for key in ("name", *START) if key in body} | modes.table() | ratio
+
+
+def _table(body: Mapping[str, Any], path: KeyPath, problems: list[Problem]) -> MatricesBody | None:
+    """Return the table of a body by matrices, without its name and its start."""
+    own = {key: value for key, value in body.items() if key not in ("name", *START)}
+    return read_table(MatricesBody, own, path, problems)
+
+
+def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapping[str, float]) -> Request:
+    from vibroimpact.orchestrator.structures.request import Request
+
     rayleigh = table.rayleigh
-    request = Request(
+    return Request(
         stiffness=table.stiffness,
         mass=table.mass,
         damping=table.damping,
@@ -112,16 +191,13 @@ def _of_matrices(
         base=table.base,
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
+        **(tolerance if table.modes == "auto" else {}),
     )
-    try:
-        modes = find_modes(request)
-    except UsageError as error:
-        problems.append(_problem(path, error))
-        return body
-    return {**kept, **modes.table()}
 
 
-def _of_modes(body: dict[str, Any], path: KeyPath, folder: Path, problems: list[Problem]) -> dict[str, Any]:
+def _of_modes(
+    body: dict[str, Any], path: KeyPath, folder: Path, named: set[str], problems: list[Problem]
+) -> dict[str, Any]:
     """Return the modes of a file as a table, with the keys that the body has itself."""
     from vibroimpact.orchestrator.structures.find import modes_of_file
 
@@ -130,14 +206,18 @@ def _of_modes(body: dict[str, Any], path: KeyPath, folder: Path, problems: list[
         problems.append(Problem(key_path((*path, "file")), "the name of a file", quoted(file)))
         return body
     try:
-        modes = modes_of_file(folder / file)
+        table = modes_of_file(folder / file, named).table()
     except UsageError as error:
         problems.append(_problem((*path, "file"), error))
         return body
-    return modes.table() | {key: value for key, value in body.items() if key != "file"}
+    if "angular_frequencies" in body:
+        del table["frequencies"]
+    return table | {key: value for key, value in body.items() if key != "file"}
 
 
 def _problem(path: KeyPath, error: UsageError) -> Problem:
-    """Return the problem that the error of a file is."""
-    expected, _, got = str(error).partition(", got ")
-    return Problem(key_path(path), expected.removeprefix("expected "), got.removesuffix("."))
+    """Return the problem that the error of a file is: the place in the file follows the key."""
+    said, _, got = str(error).partition(", got ")
+    place, _, expected = said.rpartition("expected ")
+    key = ": ".join(filter(None, (key_path(path), place.removesuffix(": "))))
+    return Problem(key, expected, got.removesuffix("."))

@@ -101,6 +101,9 @@ class Parts(SceneTable):
         parts = {name: document.pop(name, None) for name in _NAMED_BY_FORM}
         if not self.record.observed:
             del document["record"]["observed"]
+        for table, key in ((document["replay"], "at"), (parts["bodies"][0], "driven")):
+            if table and table.get(key, "") is None:
+                del table[key]
         forces = document.pop("forces")
         document["forcing"] = forces if len(forces) > 1 else next(iter(forces), None)
         if self.is_one_body:
@@ -211,7 +214,7 @@ class Parts(SceneTable):
     @property
     def lists_forces(self) -> bool:
         """Whether the component Structure has the body with a list of forces: several, or beside a moving stop."""
-        return self.has_several_forces or bool(self.moving_stop)
+        return self.has_several_forces or any(stop.moves for stop in self.stops)
 
     @property
     def forcing(self) -> Forcing | None:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
+from vibroimpact.orchestrator.scene.point_fields import POINT_RULE, Point
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MOST_RECORDINGS = 10_000
@@ -49,6 +50,14 @@ class Replay(SceneTable):
             default="required beside `drive`",
         ),
     ] = Field(None, alias="from")
+    at: Annotated[
+        Point | None,
+        replace(
+            POINT_RULE,
+            doc='point where a force acts on several bodies or on given modes, such as `"board.tip"`',
+            default='required there beside `drive = "force"`',
+        ),
+    ] = None
     recordings: Annotated[
         tuple[_Name, ...],
         Field(strict=False, max_length=MOST_RECORDINGS),

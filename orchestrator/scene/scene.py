@@ -30,7 +30,11 @@ from vibroimpact.orchestrator.scene.file import (
     text_of_tables,
 )
 from vibroimpact.orchestrator.scene.keys import coordinate_name, is_missing, with_alternatives
-from vibroimpact.orchestrator.scene.own_structures import with_bodies_in_text, with_given_modes
+from vibroimpact.orchestrator.scene.own_structures import (
+    apart_from_modes,
+    with_bodies_in_text,
+    with_given_modes,
+)
 from vibroimpact.orchestrator.scene.parts import Parts
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -305,14 +309,18 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = (), *, for_orbi
     """
     written = parse_scene_toml(text, source)
     changed: tuple[str, ...] = ()
-    if changes:
-        written, changed = changed_document(written, changes)
+    before, after = apart_from_modes(written, changes)
+    if before:
+        written, changed = changed_document(written, before)
     given, wrong = with_given_modes(written, Path(source).parent)
     if wrong:
         raise SceneError(lines_of(wrong, source, changed))
     if given != written:
-        text = edited_text(text, lambda before: with_bodies_in_text(before, given), given)
+        text = edited_text(text, lambda text: with_bodies_in_text(text, given), given)
         written = given
+    if after:
+        written, changed_modes = changed_document(written, after)
+        changed = (*changed, *changed_modes)
     one_body = with_one_body(with_resting_start(written) if for_orbits else written)
     document = with_one_force(one_body)
     fields, problems = read_tables(document, Path(source).parent)

@@ -74,12 +74,12 @@ def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iter
             yield Problem(name, f"[{name}] in a scene with [body]", "one beside [component.NAME]", hint)
         elif name not in known:
             problem = unknown_key((name,), known)
-            hint = problem.hint
+            advice = problem.hint
             if named := table_named(name, document):
                 key = f".{next(iter(value))}" if isinstance(value, dict) and len(value) == 1 else ""
-                hint = f"Did you mean {named}{key}?"
+                advice = f"Did you mean {named}{key}?"
             what = "table" if isinstance(value, dict | list) else "key outside any table"
-            general = Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", hint)
+            general = Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", advice)
             yield problem if problem.expected == MODELLED else general
 
 

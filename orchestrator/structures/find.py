@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.kept import kept_modes
 from vibroimpact.orchestrator.structures.modes import Modes
+from vibroimpact.orchestrator.structures.modes_files import read_modes
 from vibroimpact.orchestrator.structures.readers import Sources, read_matrices
 from vibroimpact.orchestrator.structures.reduction import reduce
 from vibroimpact.orchestrator.structures.request import Request
+
+MOST_MODES, MOST_POINTS = 64, 1024
+"""Largest numbers of modes and of points of a body."""
 
 
 def find_modes(request: Request) -> Modes:
@@ -37,8 +44,9 @@ def find_modes(request: Request) -> Modes:
 def _reduced(sources: Sources, request: Request) -> Modes:
     """Return the modes of the matrices of files."""
     points = dict(request.points) | {name: {name: 1.0} for name in request.named}
+    matrices = read_matrices(sources)
     return reduce(
-        read_matrices(sources),
+        matrices,
         points,
         modes=request.modes,
         tolerance=request.tolerance,
@@ -46,15 +54,52 @@ def _reduced(sources: Sources, request: Request) -> Modes:
         base=request.base,
         damping_ratio=request.damping_ratio,
         rayleigh=request.rayleigh,
+        shown=[name for name in matrices.spread(request.shown) if name not in points],
     )
 
 
-def modes_of_file(path: Path) -> Modes:
-    """Return the modes of a file.
+def modes_of_file(path: Path, named: Collection[str] = ()) -> Modes:
+    """Return the modes of a file that fit into a scene.
+
+    Parameters
+    ----------
+    path : Path
+    named : collection of str
+        Points that the scene names.
+
+    Returns
+    -------
+    Modes
+        The lowest 64; of more than 1024 points those that the scene names.
 
     Raises
     ------
     UsageError
-        The file cannot be read, or holds no modes: `expected ..., got ...`.
+        The file cannot be read, or holds no modes: `path: expected ..., got ...`.
     """
-    raise NotImplementedError
+    found = read_modes(path)
+    if len(found.natural) > MOST_MODES:
+        found = _lowest(found, path)
+    if len(found.shapes) <= MOST_POINTS:
+        return found
+    kept = {name: shape for name, shape in found.shapes.items() if name in named}
+    kept = kept or dict(islice(found.shapes.items(), MOST_POINTS))
+    remark = f"{len(found.shapes) - len(kept)} points that the scene does not name are left out."
+    return replace(found, shapes=kept, remarks=(*found.remarks, remark))
+
+
+def _lowest(found: Modes, path: Path) -> Modes:
+    """Return the lowest modes of a file."""
+    if found.residual_vectors:
+        raise UsageError(f"{path}: expected at most {MOST_MODES} modes beside residual vectors, got more.")
+    kept = slice(MOST_MODES)
+    remark = f"{len(found.natural) - MOST_MODES} modes above the lowest {MOST_MODES} are left out."
+    return replace(
+        found,
+        natural=found.natural[kept],
+        damping_ratios=found.damping_ratios[kept],
+        damping=None if found.damping is None else found.damping[kept, kept],
+        shapes={name: shape[kept] for name, shape in found.shapes.items()},
+        participation=None if found.participation is None else found.participation[kept],
+        remarks=(*found.remarks, remark),
+    )

@@ -73,7 +73,9 @@ def _read(path: Path) -> Modes | None:
         name: None if found[name] is None else np.array(found[name]) for name in ("damping", "participation")
     }
     shapes = {name: np.array(shape) for name, shape in found["shapes"].items()}
-    return Modes(**{**found, **arrays, "shapes": shapes, "remarks": tuple(found["remarks"])})
+    places = {name: tuple(place) for name, place in found["coordinates"].items()}
+    tuples = {"remarks": tuple(found["remarks"]), "coordinates": places}
+    return Modes(**{**found, **arrays, **tuples, "shapes": shapes})
 
 
 def _forget_oldest(folder: Path) -> None:

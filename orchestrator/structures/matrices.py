@@ -8,10 +8,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 
+GOLDEN = 0.6180339887498949
+"""Golden ratio less one."""
 Sparse = Any
 """A matrix of scipy.sparse, which carries no types."""
 
@@ -58,6 +61,40 @@ class Matrices:
             found[self._places[name]] = weight
         return found
 
+    @cached_property
+    def _at_nodes(self) -> NDArray[np.bool_]:
+        """Whether each degree of freedom is that of a node: one with a known place, or any where no place is known."""
+        if self.coordinates is None or np.isnan(self.coordinates).all():
+            return np.ones(len(self.freedoms), dtype=np.bool_)
+        return np.asarray(~np.isnan(self.coordinates).any(axis=1), dtype=np.bool_)
+
     def rigid(self, direction: str) -> Floats:
-        """Return the motion of all degrees of freedom for 1 m of the base: those whose name ends in `.direction`."""
-        return np.array([1.0 if name.rpartition(".")[2] == direction else 0.0 for name in self.freedoms])
+        """Return the motion of all degrees of freedom for 1 m of the base: those whose name ends in `.direction`.
+
+        Degrees of freedom within an element have no place (incompatible modes of C3D8I), and do not follow the base.
+        """
+        moves = np.array([name.rpartition(".")[2] == direction for name in self.freedoms])
+        return np.where(moves & self._at_nodes, 1.0, 0.0)
+
+    def places_of(self, points: Mapping[str, Mapping[str, float]]) -> dict[str, tuple[float, float, float]]:
+        """Return the known places of points that are one degree of freedom."""
+        found: dict[str, tuple[float, float, float]] = {}
+        for name, weights in points.items():
+            place = self._places.get(next(iter(weights)), -1) if len(weights) == 1 else -1
+            if self.coordinates is not None and place >= 0 and not np.isnan(self.coordinates[place]).any():
+                x, y, z = self.coordinates[place].tolist()
+                found[name] = x, y, z
+        return found
+
+    def spread(self, most: int) -> tuple[str, ...]:
+        """Return the names of a number of degrees of freedom, those of nodes that spread over all nodes."""
+        nodes: dict[str, list[str]] = {}
+        for name, is_at_node in zip(self.freedoms, self._at_nodes.tolist(), strict=True):
+            if is_at_node:
+                nodes.setdefault(name.rpartition(".")[0] or name, []).append(name)
+        groups = list(nodes.values())
+        count = min(len(groups), most * len(groups) // max(1, sum(map(len, groups))))
+        # multiples of the golden ratio fill [0, 1) evenly, and follow no row of a mesh
+        shares = np.arange(count) * GOLDEN % 1.0 if count < len(groups) else np.arange(count) / count
+        kept = sorted({int(share * len(groups)) for share in shares.tolist()})
+        return tuple(name for place in kept for name in groups[place])

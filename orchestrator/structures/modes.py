@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 
@@ -32,6 +34,8 @@ class Modes:
         SHA-256 of each file by its name.
     remarks : tuple of str
         What was changed or left out on the way, one sentence each.
+    coordinates : mapping of str to tuple of float
+        Place x, y, z of the node of each point that is a degree of freedom, m, where it is known.
     """
 
     natural: Floats
@@ -43,12 +47,13 @@ class Modes:
     error: float | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    coordinates: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def table(self) -> dict[str, Any]:
         """Return the table `[body]` of these modes, with where they come from."""
         found: dict[str, Any] = {
             "kind": "modes",
-            "angular_frequencies": self.natural.tolist(),
+            "frequencies": in_hertz(self.natural).tolist(),
             "damping_ratio": self.damping_ratios.tolist(),
             "shapes": {name: shape.tolist() for name, shape in self.shapes.items()},
         }
@@ -60,3 +65,15 @@ class Modes:
         origin |= {} if self.error is None else {"error": self.error}
         origin |= {"remarks": list(self.remarks)} if self.remarks else {}
         return found | {"origin": origin}
+
+
+def in_hertz(natural: Floats) -> Floats:
+    """Return frequencies, Hz, of angular ones; 2 pi times each is the angular one to the last bit where a number is.
+
+    >>> 2.0 * np.pi * float(in_hertz(np.array([393.7]))[0])
+    393.7
+    """
+    found = natural / (2.0 * np.pi)
+    for near in (np.nextafter(found, 0.0), np.nextafter(found, np.inf)):
+        found = np.where((2.0 * np.pi * found != natural) & (2.0 * np.pi * near == natural), near, found)
+    return found

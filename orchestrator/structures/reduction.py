@@ -36,6 +36,7 @@ def reduce(
     damping_ratio: float | Sequence[float] = 0.0,
     rayleigh: tuple[float, float] = (0.0, 0.0),
     band: float | None = None,
+    shown: Sequence[str] = (),
 ) -> Modes:
     """Return the lowest modes of a structure with residual vectors at points, and the error of its flexibility there.
 
@@ -59,6 +60,8 @@ def reduce(
     band : float or None
         Angular frequency up to which the error is taken, rad/s. None: half of the highest natural frequency that is
         kept; ten times the lowest elastic one for `"auto"`.
+    shown : sequence of str
+        Further degrees of freedom with shapes, which get no residual vectors.
 
     Raises
     ------
@@ -88,15 +91,18 @@ def reduce(
     if sound.damping is not None:
         damping = (0.0 if damping is None else damping) + shapes.T @ (sound.damping @ shapes)
         damping = 0.5 * (damping + damping.T)
+    row_of = {name: row for row, name in enumerate(sound.freedoms)}
+    seen = {name: shapes[row_of[name]] for name in shown if name in row_of}
     return Modes(
         natural=found.natural,
         damping_ratios=ratios,
         damping=damping,
-        shapes=dict(zip(points, loads.T @ shapes, strict=True)),
+        shapes=dict(zip(points, loads.T @ shapes, strict=True)) | seen,
         participation=participation,
         residual_vectors=found.vectors,
         error=found.error,
         remarks=(*remarks, *reduction.remarks, *found.remarks),
+        coordinates=matrices.places_of({**points, **{name: {name: 1.0} for name in seen}}),
     )
 
 

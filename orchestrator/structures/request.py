@@ -13,7 +13,7 @@ Weights = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a body by matrices says.
+    """The request of a body by matrices.
 
     Attributes
     ----------
@@ -40,6 +40,8 @@ class Request:
     damping_ratio : float or tuple of float
     rayleigh : tuple of float
         Factors of the mass, 1/s, and of the stiffness, s, in the damping ratios.
+    shown : int
+        Largest number of further degrees of freedom with shapes, for a figure; they get no residual vectors.
     """
 
     stiffness: str
@@ -56,3 +58,4 @@ class Request:
     base: Weights | str | None = None
     damping_ratio: float | tuple[float, ...] = 0.0
     rayleigh: tuple[float, float] = (0.0, 0.0)
+    shown: int = 0

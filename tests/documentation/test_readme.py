@@ -43,7 +43,7 @@ def test_the_commands_of_the_readme_run_and_leave_their_files(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stop_the_clock(monkeypatch)
-    assert len(COMMANDS) == 8
+    assert len(COMMANDS) == 9
     for command in COMMANDS:
         words = shlex.split(command, comments=True)[1:]
         done = in_this_process(*words)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.places import ROOT
+from support.places import EXAMPLES, ROOT
 
 Names = dict[str, Any]
 
@@ -21,6 +21,7 @@ def run(
 ) -> Callable[[str], tuple[Names, str]]:
     """Return a function that runs the cells of a page in a new folder: their names, and the printed lines."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(EXAMPLES)
     # an FMU of pythonfmu that another test loaded here brings its own copy, which builds FMUs without binaries
     monkeypatch.setattr(
         sys, "path", [place for place in sys.path if not Path(place, "slavemodule.txt").exists()]
@@ -76,3 +77,25 @@ def test_a_foreign_body_meets_a_stop_with_the_speed_of_its_energy(
     assert impacts.impact_restitution.values == pytest.approx(names["restitution"], rel=5e-3)
     assert float(names["gap"].min()) > -2e-3
     assert len(names["hit"].vibroimpact.impacts().impact_time) == 3
+
+
+def test_a_bracket_of_finite_elements_hits_its_stop_and_its_residual_vector_makes_up_for_left_out_modes(
+    run: Callable[[str], tuple[Names, str]],
+) -> None:
+    names, _ = run("tutorial_structure")
+    found = names["found"]
+    assert found.frequency.values[0] == pytest.approx(949.7605, abs=1e-3)  # CalculiX finds the same
+    assert 0.6 * 0.0377 < found.effective_mass.values[0] < 0.0377  # kg, of a bracket of 37.7 g
+    assert 0.1 < names["missing"] < 2.0
+    assert names["impacts"].sizes["impact"] > 20
+    assert names["swept"].displacement_range.max() < 2.0e-4
+
+
+def test_the_modes_of_a_test_rattle_between_stops_and_lack_the_flexibility_of_higher_ones(
+    run: Callable[[str], tuple[Names, str]],
+) -> None:
+    names, said = run("tutorial_measured_modes")
+    assert "[8.54, 34.14, 76.83, 136.59] Hz" in said
+    assert names["found"].shape.values == pytest.approx(names["model"].shape.values[:5, :4], abs=2e-5)
+    assert 0.0 < names["lacking"] < 2.0
+    assert names["impacts"].sizes["impact"] > 50

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support.cut_recordings import in_one_run
 from support.drawn_structures import ENERGIES
 
 import vibroimpact as vi
+from vibroimpact.orchestrator.run.point import driver_of
 from vibroimpact.orchestrator.scene import Scene
 
 MOST_BODIES = 33
@@ -104,3 +106,31 @@ def test_a_ball_that_chatters_to_rest_on_a_moving_body_stays_within_its_clearanc
     assert found.sizes["stick"] > 0
     assert found.contact_displacement_1.values.max() <= 0.01 + 1e-13
     assert energy_error(found) < 1e-9
+
+
+def test_a_run_that_is_cut_at_the_instant_of_a_release_goes_on() -> None:
+    """The force that holds the contact is then rounding: its release and its next decision must read it alike."""
+    bodies = [
+        oscillator("a", 0.428, 17.746, damping=-0.418, velocity_start=0.033),
+        oscillator("b", 2.282, 1.0, damping=0.223, velocity_start=-0.817),
+        {"name": "c", "kind": "beam", "length": 1.0, "mass_per_length": 1.92, "flexural_rigidity": 0.948}
+        | {"boundary": "clamped-free", "modes": 1, "damping_ratio": 0.02},
+    ]
+    contacts: list[dict[str, Any]] = [
+        {"between": ["a", "b"], "clearance": 0.042, "restitution": 0.5},
+        {"between": ["c.0.3", "a"], "clearance": 0.117, "restitution": 1.0},
+        {"between": ["b", "c.0.55"], "clearance": 1e-9, "law": "kelvin_voigt", "stiffness": 10.0},
+    ]
+    link = {"between": ["a", "c.0.55"], "stiffness": 4.294}
+    tables = {"body": bodies, "contact": contacts, "link": [link], "record": {"recorded_time": 4.8}}
+    scene = Scene.from_dict(tables)
+    end = float(vi.run(scene).stick_end.values[0])
+    driver = driver_of(scene, "fused")
+    driver.watch(contacts=len(scene.stops))
+    try:
+        for step in range(-3, 4):
+            cut = end + step * np.spacing(end)
+            parts = in_one_run(driver, scene, [0.0, cut, 4.8])
+            assert len(np.concatenate([part.sticks for part in parts])) == 1
+    finally:
+        driver.close()

@@ -193,3 +193,36 @@ def test_a_row_with_forces_of_unlike_sizes_goes_on() -> None:
         }
     )
     assert int(vi.run(scene).outcome) == 0
+
+
+@pytest.mark.parametrize(
+    ("masses", "restitutions", "below", "loads"),
+    [
+        ([1.07, 1.91, 0.37], [0.92, 0.5], [0.048, 0.084], [1.0, 1.11, -2.0]),
+        ([1.32, 1.72, 1.23], [0.47, 0.85], [0.056, 0.056], [1.0, 1.63, -2.0]),
+        ([0.66, 1.71, 0.34], [0.78, 0.42], [0.045, 0.031], [1.0, 1.76, -2.0]),
+    ],
+)
+def test_two_balls_that_chatter_against_one_plate_come_to_rest(
+    masses: list[float], restitutions: list[float], below: list[float], loads: list[float]
+) -> None:
+    """Each impact of one ball throws the other off, however low both bounce: rounding must not raise them again."""
+    heights = [0.3 - below[0], 0.3 - below[1], 0.3]
+    bodies = [
+        {"name": name, "mass": mass, "stiffness": 1.0, "displacement_start": height}
+        for name, mass, height in zip("abc", masses, heights, strict=True)
+    ]
+    contacts = [
+        {"between": [name, "c"], "clearance": clearance, "restitution": restitution}
+        for name, clearance, restitution in zip("ab", (1e-9, 0.0), restitutions, strict=True)
+    ]
+    forces = [
+        {"signal": "constant", "at": name, "amplitude": load} for name, load in zip("abc", loads, strict=True)
+    ]
+    record = {"recorded_time": 4.0}
+    scene = vi.Scene.from_dict({"body": bodies, "contact": contacts, "forcing": forces, "record": record})
+    run = vi.run(scene)
+    assert (run.impact_velocity.values < 1e-8).sum() < 100
+    assert np.isnan(run.stick_end.values[-2:]).all()
+    ball, other, plate = scene.body.assembly.shapes @ run.final_state.values.reshape(2, -1)[1]
+    assert [ball, other] == pytest.approx([plate, plate], abs=1e-13)

@@ -44,7 +44,7 @@ static const double TURN = 6.283185307179586;
  * change. */
 static const uint64_t BITS = 0xa2c39bb0fe7d6ec7u;
 static const uint64_t BITS_OF_YIELDING = 0xe2aa616ece9fd36cu; /* Kelvin-Voigt stops, time series */
-static const uint64_t BITS_OF_SINES = 0xc3fb6512f25cb87fu; /* further sines */
+static const uint64_t BITS_OF_SINES = 0x0ab2cbdfa7b87b7du; /* further sines */
 static const uint64_t BITS_OF_SAMPLES = 0x9e95a2911ae6a1ceu; /* time series of several modes, and of one between three or four stops */
 
 static void draw_sines(sample *s, int i, const vi_lanes_plan *plan, uint64_t *seed)

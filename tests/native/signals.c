@@ -77,7 +77,10 @@ static void pieces_follow_each_other(vi_signal *s, double begin, int number)
                   "signal %d ends at %.17g, not at %.17g", number, now.high, end_of(s));
             break;
         }
-        before = vi_piece_value(&piece, piece.length);
+        before = 0.0;
+        for (int n = piece.degree; n >= 0; --n) {
+            before = before * piece.length + piece.coefficient[n];
+        }
         now = vi_twofold_sum(now, (vi_twofold){piece.length, 0.0});
     }
     CHECK(jumps <= 2, "signal %d, kind %d: %d jumps", number, (int)s->kind, jumps);

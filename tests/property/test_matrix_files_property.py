@@ -4,30 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeVar
 
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from support.damaged_bytes import damaged, read_or_refused
 from support.matrix_files import ONE_MATRIX, SEVERAL, Floats, calculix
 
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.structures.readers.calculix import read_freedoms, read_nodes
 from vibroimpact.orchestrator.structures.readers.child import Reader, reader_of
+from vibroimpact.orchestrator.structures.readers.found import Found
 from vibroimpact.orchestrator.structures.readers.freedoms import read_table
 from vibroimpact.orchestrator.structures.readers.wanted import Wanted
 
 WANTED = Wanted({"stiffness": ""})
 DAMAGED = tuple(sorted({*ONE_MATRIX, "model.npz"}))
 """Formats whose readers are safe in this process; `soak.grammar_matrices` damages the others."""
-INSERTED = (b"-", b"9" * 30, b"\n", b" ", b"\0", b"nan", b"1e999")
-STARTS = (
-    "expected",
-    "line ",
-    "row ",
-    *(f"{name}.npy" for name in ("K", "data", "format", "indices", "shape")),
-)
-WORDS = ("name", "node", "direction", "x", "y", "z", " ", ",", ";", "\t", "\n", "#", '"', "1", "9.5", "a")
-Found = TypeVar("Found")
+WORDS = ("*NODE", "*node, nset=a", "**", "12.3", "1.7", "name", "node", "direction", "9.5", *'xyz ,;\t\n#"1a')
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -49,18 +42,6 @@ def read(name: str, content: bytes) -> Floats:
     return found
 
 
-def read_or_refused(action: Callable[[], Found]) -> Found | None:
-    """Return the result; None for a refusal of one line that names what is expected."""
-    try:
-        return action()
-    except UsageError as refusal:
-        text = str(refusal)
-    assert "expected" in text
-    assert "damaged" in text or text.startswith(STARTS)
-    assert "\n" not in text
-    return None
-
-
 @settings(max_examples=80, deadline=None)
 @given(st.sampled_from(sorted({*ONE_MATRIX, *SEVERAL})), matrices())
 def test_a_matrix_is_read_back_to_the_bit(name: str, matrix: Floats) -> None:
@@ -74,17 +55,8 @@ def test_a_matrix_is_read_back_to_the_bit(name: str, matrix: Floats) -> None:
 @given(st.sampled_from(DAMAGED), st.data())
 def test_damage_is_refused_in_a_line_or_leaves_a_sound_matrix(name: str, data: st.DataObject) -> None:
     matrix = np.diag([2.0, 3.0, 1e-9]) + math.pi
-    content = bytearray(written(name, matrix))
-    for _ in range(data.draw(st.integers(1, 3))):
-        place = data.draw(st.integers(0, len(content) - 1))
-        match data.draw(st.sampled_from(["flip", "cut", "insert"])):
-            case "flip":
-                content[place] ^= 1 << data.draw(st.integers(0, 7))
-            case "cut":
-                del content[max(1, place) :]
-            case _:
-                content[place:place] = data.draw(st.sampled_from(INSERTED))
-    got = read_or_refused(lambda: read(name, bytes(content)))
+    content = data.draw(damaged(written(name, matrix)))
+    got = read_or_refused(lambda: read(name, content))
     if got is not None:
         assert np.all(np.isfinite(got))
     if got is not None and name.endswith(".npz"):  # its numbers have checksums
@@ -100,10 +72,18 @@ def test_a_cut_file_of_calculix_is_refused_or_smaller(matrix: Floats, data: st.D
     assert got is None or len(got) < len(matrix)
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.one_of(st.text(max_size=80), st.lists(st.sampled_from(WORDS), max_size=30).map("".join)))
-def test_any_text_is_a_table_or_refused_in_a_line(text: str) -> None:
-    found = read_or_refused(lambda: read_table(text.encode("utf-8", "surrogatepass")))
-    if found is not None:
+@settings(max_examples=200, deadline=None)
+@given(
+    st.sampled_from((read_table, read_freedoms, read_nodes)),
+    st.one_of(st.text(max_size=80), st.lists(st.sampled_from(WORDS), max_size=30).map("".join)),
+)
+def test_any_text_names_freedoms_or_nodes_or_is_refused_in_a_line(
+    reader: Callable[[bytes], Found | tuple[Floats, Floats]], text: str
+) -> None:
+    found = read_or_refused(lambda: reader(text.encode("utf-8", "surrogatepass")))
+    if isinstance(found, Found):
         assert found.freedoms
         assert found.coordinates is None or found.coordinates.shape == (len(found.freedoms), 3)
+    elif found is not None:
+        assert found[1].shape == (len(found[0]), 3)
+        assert np.all(np.isfinite(found[1]))

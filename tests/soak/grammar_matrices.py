@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gzip
 import random
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from support import matrix_files
+from support import matrix_files, nastran_files
 
 from soak import _drawn_files as files
 from vibroimpact.fmus.errors import UsageError
@@ -17,7 +19,26 @@ from vibroimpact.orchestrator.structures.readers import Sources, read_matrices
 
 CASES, SAMPLE, SECONDS = files.CASES, 20, files.SECONDS
 
-WRITERS = {**matrix_files.ONE_MATRIX, **matrix_files.SEVERAL}
+SEVERAL: Mapping[str, Callable[[Mapping[str, Any]], bytes]] = {
+    **matrix_files.SEVERAL,
+    **{
+        f"{layout}{word}{order == '>'}.op4": partial(
+            nastran_files.op4_binary, layout=layout, word=word, order=order
+        )
+        for layout in nastran_files.LAYOUTS
+        for word in (4, 8)
+        for order in "<>"
+    },
+    **{
+        f"{layout}_text.op4": partial(nastran_files.op4_text, layout=layout)
+        for layout in nastran_files.LAYOUTS
+    },
+}
+NASTRAN = "model.pch"
+"""A file of DMIG cards, which names its degrees of freedom; its table may have them in another order."""
+KINDS = sorted({*matrix_files.ONE_MATRIX, *SEVERAL, NASTRAN})
+DIGITS = {".sti": 1e-13, ".pch": 1e-9, "text.op4": 1e-15}
+"""Relative rounding of texts with fewer digits than the numbers, by the end of the name."""
 INSERTED = (
     b" ", b"\n", b"\r", b"\t", b"\0", b"%", b"#", b",", b"-", b"9" * 30, b"1e999", b"nan", b"0x1p3", b"\x1b[31m",
     b"\xe2\x80\xae", b"1 1 1\n", b"999999999 999999999 1\n", b"%%MatrixMarket matrix array real general\n9 9\n",
@@ -56,6 +77,13 @@ def _names(draw: random.Random, size: int) -> tuple[list[str], str]:
         )
     rows = zip(numbers, directions, strict=True)
     return names, f"node{mark}direction\n" + "".join(f"{node}{mark}{way}\n" for node, way in rows)
+
+
+def _named(name: str, written: dict[str, Any]) -> dict[str, Any]:
+    """Return the matrices by the names of a file; Nastran's have eight characters at most."""
+    return (
+        {"KAA": written["stiffness"], "MAA": written["mass"]} if name.endswith((".op4", NASTRAN)) else written
+    )
 
 
 def _odd_table(draw: random.Random) -> str:
@@ -107,19 +135,30 @@ def _unsound(found: Matrices) -> str | None:
     return None
 
 
+def _contents(name: str, written: dict[str, Any], names: list[str]) -> tuple[dict[str, bytes], Sources]:
+    """Return the files of matrices by name, and their description."""
+    if name == NASTRAN:
+        cards = [nastran_files.dmig(each, one, names) for each, one in _named(name, written).items()]
+        return {name: b"".join(cards)}, Sources(file=name, freedoms="freedoms.csv")
+    if name in SEVERAL:
+        return {name: SEVERAL[name](_named(name, written))}, Sources(file=name, freedoms="freedoms.csv")
+    contents = {f"{role}_{name}": matrix_files.ONE_MATRIX[name](one) for role, one in written.items()}
+    stiffness, mass = contents
+    return contents, Sources(stiffness, mass, freedoms="freedoms.csv")
+
+
 def check(seed: int) -> str | None:
     """Read the matrices of one structure."""
     draw = random.Random(seed)
     chance = np.random.default_rng(seed)
-    name, size = draw.choice(sorted(WRITERS)), draw.randint(1, 12)
+    name, size = draw.choice(KINDS), draw.randint(1, 12)
     written = {role: matrix_files.drawn_matrix(chance, size) for role in ("stiffness", "mass")}
     names, table = _names(draw, size)
-    if name in matrix_files.SEVERAL:
-        contents = {name: matrix_files.SEVERAL[name](written)}
-        sources = Sources(file=name, freedoms="freedoms.csv")
-    else:
-        contents = {f"{role}_{name}": matrix_files.ONE_MATRIX[name](one) for role, one in written.items()}
-        sources = Sources(*contents, freedoms="freedoms.csv")
+    if name == NASTRAN:
+        names.sort(key=lambda one: int(one.partition(".")[0]))
+        for matrix in written.values():
+            matrix[np.diag_indices(size)] += 1.0  # a degree of freedom without a card is not there
+    contents, sources = _contents(name, written, names)
     contents["freedoms.csv"] = table.encode()
     kind = draw.random()
     if kind > 0.4:
@@ -135,5 +174,5 @@ def check(seed: int) -> str | None:
         Path(file).unlink()
     if isinstance(found, str):
         return found or (f"a sound file is refused: {name}" if kind <= 0.4 else None) or grown()
-    digits = 1e-13 if name == "model.sti" else 0.0
+    digits = next((each for end, each in DIGITS.items() if name.endswith(end)), 0.0)
     return (_differs(found, written, names, digits) if kind <= 0.4 else _unsound(found)) or grown()

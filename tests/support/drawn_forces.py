@@ -194,7 +194,7 @@ def _duration(random: np.random.Generator, tables: Tables) -> Tables:
     """Return the keys of a duration: in periods of a clock, if a force or a stop has a sine."""
     clocks = [force["angular_frequency"] for force in tables["forcing"] if force["signal"] == "sine"]
     clocks += [
-        stop["motion_angular_frequency"] for stop in tables.get("stop", []) if stop.get("motion_amplitude")
+        stop["motion_angular_frequency"] for stop in tables.get("stop", []) if "motion_amplitude" in stop
     ]
     if not clocks:
         return {"transient_time": pick(random, 0.0, 1.3), "recorded_time": LENGTH}

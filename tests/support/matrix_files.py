@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.io import savemat
 
+from support.nastran_files import op4_binary, op4_text
+
 Floats = NDArray[np.float64]
 
 
@@ -101,6 +103,8 @@ SEVERAL: Mapping[str, Callable[[Mapping[str, Any]], bytes]] = {
     "model.mat": matlab,
     "packed.mat": lambda matrices: matlab(matrices, packed=True),
     "new.mat": matlab_7_3,
+    "binary.op4": lambda matrices: op4_binary(matrices, "sparse"),
+    "text.op4": lambda matrices: op4_text(matrices, "big"),
 }
 """Writers of several matrices by the name of a file."""
 

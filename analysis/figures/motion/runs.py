@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.figures.motion.layers import draw_turns
 from vibroimpact.analysis.figures.motion.series import (
     count_time,
@@ -167,10 +168,12 @@ def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> No
     period = np.arange(1, run.sizes["period"] + 1)
     axis.plot(period, run["displacement_max"].values, "^", color=MARK, markersize=2.5, label="largest")
     axis.plot(period, run["displacement_min"].values, "v", color=LINE, markersize=2.5, label="smallest")
-    for position in fixed_positions(observed):
-        axis.axhline(position, **STOP_LINE, label="stop")
+    for place, position in enumerate(fixed_positions(observed)):
+        axis.axhline(position, **STOP_LINE, label="_" if place else "stop")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("recorded forcing period (-)")
+    if str(run["displacement_max"].attrs.get("long_name")) == OF_ALL_PERIODS["displacement_max"]:
+        axis.set(xlabel="all recorded forcing periods together", xticks=[])
     axis.set_ylabel(label(run["final_displacement"].rename("displacement")))
     legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
 

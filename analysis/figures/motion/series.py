@@ -41,6 +41,11 @@ _LINE_LETTERS = 7
 _MOST_LINES, _TICKS_FROM = 25, 0.94
 # Parts of a name that separate variables of one quantity: contact_displacement_1, displacement_2; energy_kinetic.
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
+# The point or mode in a long name; the number and the signal of a force.
+_PLACE = re.compile(
+    r"(?:displacement|velocity|acceleration|force|energy) (?:of|on|between) (?:the body at )?(.+)"
+)
+_FORCE = re.compile(r"(force [0-9]+) of the scene(, .+)")
 _CONTACT_FORCE = re.compile(r"contact_force(?:_([0-9]+))?$")
 # First instant, over the width of the panel, above which time counts from it.
 _LATE_START = 10.0
@@ -200,7 +205,7 @@ def _draw_lines(axis: Axes, time: Floats, variables: list[xr.DataArray]) -> list
             variable.values,
             color=COLOURS[place % len(COLOURS)],
             linestyle=_STYLES[place // len(COLOURS) % len(_STYLES)],
-            label=title(variable),
+            label=_line_name(variable),
             rasterized=True,
         )
     return lines
@@ -303,7 +308,21 @@ def _last_name(name: str) -> str:
     return name.rpartition(".")[2].partition("[")[0]
 
 
+def _line_name(variable: xr.DataArray) -> str:
+    """Return the name of a line: its point, mode or force in words, else its title.
+
+    >>> words = {"long_name": "displacement of frame relative to ball"}
+    >>> _line_name(xr.DataArray(0.0, name="contact_displacement_1", attrs=words))
+    'frame relative to ball'
+    """
+    long_name = str(variable.attrs.get("long_name", ""))
+    if "." not in str(variable.attrs.get("component_variable", "")):
+        for words in filter(None, (_PLACE.fullmatch(long_name), _FORCE.fullmatch(long_name))):
+            return "".join(words.groups())
+    return title(variable)
+
+
 def _columns(variables: list[xr.DataArray]) -> int:
     """Return the number of names that fit in a row above a panel."""
-    longest = max(len(title(variable)) for variable in variables)
+    longest = max(len(_line_name(variable)) for variable in variables)
     return max(1, _ROW_LETTERS // (longest + _LINE_LETTERS))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.families import Drawing, Family, register, whole
 from vibroimpact.analysis.figures.page import canvas, legend_outside
 from vibroimpact.analysis.orbits.found import FoundOrbits
+from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import DatasetError
 
 _SAMPLES = 400
@@ -33,12 +34,24 @@ def draw_orbits(orbits: FoundOrbits) -> Figure:
         words = f"{orbit.name}, {orbit.stability}"
         style = "-" if orbit.is_stable else (0, (3, 1.5))
         axis.plot(x, v, linestyle=style, linewidth=0.9, color=_COLOURS[number % len(_COLOURS)], label=words)
-    for position in sorted({contact.position for contact in orbits[0].body.contacts}):
+    for position in _stops_of_the_point(orbits[0].body):
         axis.axvline(position, color="0.6", linewidth=0.6, zorder=0)
     unit = ("m", "m/s") if orbits.units == "SI" else ("-", "-")
     axis.set(xlabel=f"displacement ({unit[0]})", ylabel=f"velocity ({unit[1]})")
     legend_outside(figure, axis, ncols=2)
     return figure
+
+
+def _stops_of_the_point(body: ImpactingBody) -> list[float]:
+    """Return the positions of the stops at rest that limit the observed point, m, ascending."""
+    size = float(np.abs(body.observed).max())
+    return sorted(
+        {
+            contact.position
+            for contact in body.contacts
+            if not contact.motion and np.allclose(contact.shape, body.observed, rtol=0.0, atol=1e-9 * size)
+        }
+    )
 
 
 register(

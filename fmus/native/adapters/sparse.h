@@ -1,7 +1,7 @@
 /* Bytes that are mostly zero, without their blocks of zeros.
  *
- * The packed form has one bit for each whole block of 64 bytes, then the blocks that are not zero, then the rest of the
- * bytes, which fill no block.
+ * The packed form begins with one bit for each whole block of 64 bytes. The blocks that are not zero follow, and then the
+ * bytes that fill no block.
  */
 #ifndef VIBROIMPACT_SPARSE_H
 #define VIBROIMPACT_SPARSE_H

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.scene.body_models.base import BodyTable, NoPoint, Stops
 from vibroimpact.orchestrator.scene.body_models.growing import has_negative
+from vibroimpact.orchestrator.scene.body_models.modes import ModesBody
 from vibroimpact.orchestrator.scene.body_models.points import (
     ALL,
     GROUND,
@@ -75,6 +76,7 @@ class StructureBody(BodyTable):
     parts: Annotated[tuple[OneBody, ...], Rule(sweepable=False)]
     links: Annotated[tuple[LinkTable, ...], Rule(sweepable=False)] = ()
     observed: Annotated[tuple[Observed, ...], Rule(sweepable=False)] = ()
+    driven: Annotated[Point | None, Rule(sweepable=False)] = None
 
     @property
     def size(self) -> int:
@@ -109,6 +111,7 @@ class StructureBody(BodyTable):
             parts=tuple(new[: len(self.parts)]),
             links=tuple(new[len(self.parts) :]),
             observed=self.observed,
+            driven=self.driven,
         )
 
     # ---- points ----
@@ -124,8 +127,11 @@ class StructureBody(BodyTable):
         return self.observed[0] if self.observed else self.limited_point(stops)
 
     def limited_point(self, stops: Stops) -> str | PointOfBody:
-        """Return the point of the first stop, else of the first contact, else the last body."""
-        return stops[0].at or stops[0].between[0] if stops else self.names[-1]
+        """Return the point of the first stop, else of the first contact, else of the last body."""
+        if stops:
+            return stops[0].at or stops[0].between[0]
+        name, last = self.names[-1], self.parts[-1]
+        return f"{name}.{last.points[0]}" if isinstance(last, ModesBody) else name
 
     def limited_by(self, stop: Stop) -> Observed | PointOfBody:
         """Return the point that a stop limits, or the two points of a contact."""
@@ -143,7 +149,10 @@ class StructureBody(BodyTable):
     def long_names(self, stops: Stops) -> dict[str, str]:
         """Return the motion of each observed point, contact and mode in words, by its name in a time series."""
         found: dict[str, str] = {}
+        first = self.first_observed(stops)
+        assert not isinstance(first, PointOfBody)  # that of a body alone
         for motion in MOTIONS:
+            found[motion] = f"{motion} of {_words(first)}"
             found |= {f"{motion}[{label_of(each)}]": f"{motion} of {_words(each)}" for each in self.observed}
             met = enumerate((_words(stop.at or stop.between) for stop in stops), start=1)
             found |= {f"contact_{motion}[{number}]": f"{motion} of {words}" for number, words in met}
@@ -160,7 +169,11 @@ class StructureBody(BodyTable):
     def observing_one(self) -> Self:
         """Return these bodies without the observed points that only a record needs."""
         return self.model_construct(
-            names=self.names, parts=self.parts, links=self.links, observed=self.observed[:1]
+            names=self.names,
+            parts=self.parts,
+            links=self.links,
+            observed=self.observed[:1],
+            driven=self.driven,
         )
 
     # ---- modes ----
@@ -233,7 +246,7 @@ class StructureBody(BodyTable):
         if forcing is not None and forcing.at is not None:
             force = self._load_at_point(forcing)
         else:
-            force = assembly.in_modes(self._shape_of(self.limited_point(stops)))
+            force = assembly.in_modes(self._shape_of(self.driven or self.limited_point(stops)))
         rows = {
             "angular_frequency": assembly.frequencies,
             "observed_shape": assembly.in_modes(observed),

@@ -115,18 +115,22 @@ def _in_a_structure(draft: Draft, each: _Read) -> Iterator[Problem]:
             f"{key}.at", 'it with kind = "force"', "it with base_acceleration", "The base moves all bodies."
         )
     elif force.kind == "base_acceleration":
-        for number, part in enumerate(draft.parts, start=1):
-            if isinstance(part.body, ModesBody) and not part.body.participation:
-                where = f"body[{number}].participation"
-                yield Problem(
-                    where, "it beside base_acceleration", "nothing", "It is phi' M r for 1 m of the base."
-                )
+        yield from base_moves_given_modes(draft)
     if isinstance(force.amplitude, tuple):
         got = f"an array of {len(force.amplitude)}"
         yield Problem(f"{key}.amplitude", "one number beside [[body]]", got, "Write the number alone.")
     for name in ("location", "mode"):
         if name in written:
             yield Problem(f"{key}.{name}", f"{name} {ALONE}", "it beside [[body]]", f"Remove {name}.")
+
+
+def base_moves_given_modes(draft: Draft) -> Iterator[Problem]:
+    """Given modes have their participation beside a base that moves."""
+    for number, part in enumerate(draft.parts, start=1):
+        if isinstance(part.body, ModesBody) and not part.body.participation:
+            where = f"body[{number}].participation"
+            hint = "It is phi' M r for 1 m of the base; a body by matrices has it by its key base."
+            yield Problem(where, "it beside base_acceleration", "nothing", hint)
 
 
 # ---- frequencies ----

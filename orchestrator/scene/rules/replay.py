@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
+from vibroimpact.orchestrator.scene.rules.forcing import base_moves_given_modes
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
 
 SENSOR = "sensor."
@@ -41,6 +42,7 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
     if replay.drive == "force" and draft.body is not None and "force" in draft.body.AMPLITUDES:
         hint = "A force on one mass is not replayed yet; the base's acceleration is."
         yield Problem("replay.drive", '"base_acceleration" for a chain', '"force"', hint)
+    yield from _drive_reaches_the_bodies(draft)
     spans = [("replay.peaks", replay.peaks)] if replay.peaks is not None else []
     spans += [(f"replay.windows[{place}]", span) for place, span in enumerate(replay.windows, start=1)]
     for where, span in spans:
@@ -52,12 +54,25 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
         yield Problem("replay.stop", "a time after replay.start", quoted(replay.stop))
 
 
+def _drive_reaches_the_bodies(draft: Draft) -> Iterator[Problem]:
+    replay = draft.replay
+    assert replay is not None
+    if replay.drive == "base_acceleration":
+        yield from base_moves_given_modes(draft)
+    if draft.is_structure and replay.drive == "force" and replay.at is None:
+        hint = "Several bodies, and given modes, have many points."
+        yield Problem("replay.at", "the point where the force acts", "nothing", hint)
+    elif replay.at is not None and (not draft.is_structure or replay.drive != "force"):
+        expected = 'drive = "force" beside it, on several bodies or given modes'
+        yield Problem("replay.at", expected, quoted(replay.at), "Remove it.")
+
+
 def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
     """Each simulated name is a possible variable of a time series of this scene, and each pair occurs once."""
     if draft.body is None:
         return
     assert draft.replay is not None
-    known = sampled_names(draft.body, len(draft.stops), draft.forces)
+    known = sampled_names(draft.body, len(draft.stops) + len(draft.meetings), draft.forces)
     seen: set[tuple[str, str]] = set()
     for place, compared in enumerate(draft.replay.compare, start=1):
         variable, is_reading = plain_variable(compared.simulated)

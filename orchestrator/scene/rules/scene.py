@@ -65,10 +65,8 @@ def _several_bodies(draft: Draft) -> Iterator[DraftRule]:
 
 def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
     """Yield the rules of a measuring chain, of a time series and of a replay, imported only for scenes with them."""
-    if draft.is_structure:
-        yield _time_series_has_a_rate
-        return
-    if draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES)):
+    measures = draft.channels or not draft.document.keys().isdisjoint(("sensor", *CHAIN_TABLES))
+    if measures and not draft.is_structure:
         from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
 
         yield from MEASURING_RULES

@@ -52,9 +52,13 @@ def structure_problems(draft: Draft) -> Iterator[Problem]:
 
 
 def _tables_of_one_body(draft: Draft) -> Iterator[Problem]:
-    for name in ("sensor", *CHAIN_TABLES, "replay"):
+    reads = "replay" in draft.document  # gain and offset of what is compared
+    for name in CHAIN_TABLES if reads else ("sensor", *CHAIN_TABLES):
         if name in draft.document:
             yield Problem(name, f"[{name}] {ALONE}", "one beside [[body]]", "Remove it, or run one [body].")
+    if reads and "location" in draft.written("sensor"):
+        hint = "Observe its point: observed = [...] in [record]."
+        yield Problem("sensor.location", f"location {ALONE}", "it beside [[body]]", hint)
     if draft.written("execution").get("how") == "coupled":
         hint = "Several bodies are one FMU, with all of their contacts inside."
         yield Problem("execution.how", '"auto" or "fused" beside [[body]]', '"coupled"', hint)
@@ -151,20 +155,21 @@ class _Points:
                 yield from self._all_masses(f"{key}.at")
             elif force is not None and force.at is not None:
                 yield from self._problem(f"{key}.at", force.at)
+        replay = self._draft.replay
+        if replay is not None and replay.at is not None:
+            yield from self._problem("replay.at", replay.at)
         yield from self._observed()
 
     def _all_masses(self, where: str) -> Iterator[Problem]:
         """Yield the problem of a force on all masses where a body has none of its own."""
-        beams = [
-            name
+        without = [
+            f"{'beam' if part.PLACE == 'location' else 'modes'} {quoted(name)}"
             for name, part in zip(self._body.names, self._body.parts, strict=True)
-            if part.PLACE == "location"
+            if not part.HAS_MASSES
         ]
-        if beams:
+        if without:
             hint = 'A base that moves loads all points: kind = "base_acceleration".'
-            yield Problem(
-                where, '"all" for oscillators and chains', f"it beside the beam {quoted(beams[0])}", hint
-            )
+            yield Problem(where, '"all" for oscillators and chains', f"it beside the {without[0]}", hint)
 
     def _observed(self) -> Iterator[Problem]:
         """Yield the problems of observed points: not there, the same twice in a pair, or listed twice."""

@@ -8,6 +8,7 @@ and incompatible modes.
 from __future__ import annotations
 
 import re
+from math import isfinite
 
 import numpy as np
 
@@ -102,6 +103,6 @@ def _node(text: bytes, line: int) -> tuple[int, tuple[float, float, float]]:
         place = [float(field or b"0") for field in fields[1:4]] + [0.0] * (4 - len(fields[:4]))
     except ValueError:
         place, number = [], 0
-    if len(place) != 3 or not 0 < number < 2**31 or not np.all(np.isfinite(place)):
+    if len(place) != 3 or not 0 < number < 2**31 or not all(map(isfinite, place)):
         raise UsageError(f"line {line}: expected a node and three coordinates, got {quoted([text.strip()])}.")
     return number, (place[0], place[1], place[2])

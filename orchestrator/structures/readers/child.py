@@ -40,7 +40,7 @@ SUFFIXES: Mapping[str, Reader] = {
     ".op4": op4.read,
     ".pch": dmig.read,
     ".bdf": dmig.read,
-    ".dat": dmig.read,
+    ".nas": dmig.read,
 }
 """Readers by the first bytes of a file, then by the end of its name; each takes the content and the wanted matrices."""
 

@@ -37,7 +37,7 @@ def read_table(content: bytes) -> Found:
     UsageError
         The table has no column of names, or a row has another form.
     """
-    rows = _rows(content)
+    rows = table_rows(content)
     line, heads = next(rows, (1, []))
     columns = {head.strip().lower(): place for place, head in reversed(list(enumerate(heads)))}
     named, node = _first(_NAMES, columns), _first(_NODES, columns)
@@ -63,14 +63,23 @@ def read_table(content: bytes) -> Found:
     return Found(freedoms=tuple(names), coordinates=_coordinates(places, columns) if axes else None)
 
 
-def _rows(content: bytes) -> Iterator[tuple[int, Sequence[str]]]:
+def table_rows(content: bytes) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield number and cells of each line that is neither blank nor a comment."""
     mark: str | None = None
     for line, text in enumerate(content.decode("utf-8-sig", "replace").split("\n"), 1):
         if text.strip() and not text.lstrip().startswith("#"):
             if mark is None:
                 mark = next((each for each in "\t;," if each in text), "")
-            yield line, next(csv.reader([text.strip("\r")], delimiter=mark)) if mark else text.split()
+            yield line, _cells(text.strip("\r"), mark, line)
+
+
+def _cells(text: str, mark: str, line: int) -> Sequence[str]:
+    """Return the cells of a line, which a mark separates, or blanks without one."""
+    try:
+        return next(csv.reader([text], delimiter=mark)) if mark else text.split()
+    except csv.Error as problem:
+        got = f"{_quoted([text])} ({problem})"
+        raise UsageError(f"line {line}: expected cells of a table, got {got}.") from problem
 
 
 def _first(names: Sequence[str], columns: Mapping[str, int]) -> int | None:

@@ -174,6 +174,17 @@ def test_a_point_has_the_stops_that_limit_it_and_says_what_is_left_out(tmp_path:
     assert found["left_out"] == ["The first 20 of 30 recorded periods are shown."]
 
 
+def test_a_stop_that_moves_is_not_drawn_at_rest(tmp_path: Path) -> None:
+    shaken = "motion_amplitude = 0.01\nmotion_angular_frequency = 1.0\n[record]"
+    text = SCENE.replace("[record]", LOWER).replace("[record]", shaken)
+    text = text[: text.index("[sweep]")] + '[sweep]\n"stop[1].position" = { values = [0.5, 0.7] }\n'
+    run_scene(vi.Scene.from_text(text), tmp_path / "dataset.nc")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    found = simulated(tmp_path / "scene.toml", tmp_path, 1)
+    assert found["stops"] == {"displacement": [0.7]}
+    assert found["left_out"] == ["Stops that move are not drawn."]
+
+
 @pytest.mark.parametrize(
     ("body", "stops"),
     [

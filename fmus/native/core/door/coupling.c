@@ -4,17 +4,12 @@
 #include <math.h>
 
 #include "door/seconds.h"
+#include "door/status.h"
 
-enum { STATUS_WARNING = 1 };
 /* Results of a part of a step, besides VI_COUPLING_*. */
 enum { GO_ON = -1, OVERTAKEN = -2 };
 /* Most repetitions of one step, each up to an earlier event. */
 enum { MOST_REPETITIONS = 1000 };
-
-static bool went_well(int status)
-{
-    return status >= 0 && status <= STATUS_WARNING;
-}
 
 /* ---- calls ---- */
 
@@ -53,7 +48,7 @@ static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_c
     for (size_t i = 0; i < calls->count; ++i) {
         const vi_coupling_call *c = &calls->calls[i];
         const int status = c->kind == VI_CALL_SCALE ? scale(c) : made(plan, c);
-        if (!went_well(status)) {
+        if (!vi_status_is_good(status)) {
             r->at = c->place;
             r->status = status;
             return VI_COUPLING_FAILED;
@@ -161,7 +156,7 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
         return VI_COUPLING_CUT;
     }
     r->status = call_step(plan, c);
-    if (!went_well(r->status) || !rounding_is_usual()) {
+    if (!vi_status_is_good(r->status) || !rounding_is_usual()) {
         return VI_COUPLING_STEPPED;
     }
     if (c->step.kind == VI_CALL_STEP2) {

@@ -4,16 +4,11 @@
 
 #include "body/record.h"
 #include "door/seconds.h"
+#include "door/status.h"
 
-enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 enum { NOT_BEGUN = 0, BEFORE_RECORDING = 1, RECORDING = 2, AT_END = 3 };
 /* Results of a part of a run, besides VI_RUNS_*. */
 enum { GO_ON = 0, RUN_ENDS = -1 };
-
-static bool went_well(int status)
-{
-    return status >= 0 && status <= STATUS_WARNING;
-}
 
 /* Start where the previous run ended; a body beyond a stop that has moved starts on this stop at rest. */
 static void carry(const vi_runs_plan *plan, const double carried[2], double values[])
@@ -46,17 +41,17 @@ static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
     }
     const uint64_t logged = f->log->count;
     const bool good =
-        went_well(f->reset(f->instance))
-        && went_well(f->set_float64(f->instance, plan->parameters.references, plan->parameters.count, values,
+        vi_status_is_good(f->reset(f->instance))
+        && vi_status_is_good(f->set_float64(f->instance, plan->parameters.references, plan->parameters.count, values,
                                     plan->parameters.count))
         && (plan->integers.count == 0
-            || went_well(f->set_int64(f->instance, plan->integers.references, plan->integers.count,
+            || vi_status_is_good(f->set_int64(f->instance, plan->integers.references, plan->integers.count,
                                       plan->integer_values, plan->integers.count)))
         && (plan->booleans.count == 0
-            || went_well(f->set_boolean(f->instance, plan->booleans.references, plan->booleans.count,
+            || vi_status_is_good(f->set_boolean(f->instance, plan->booleans.references, plan->booleans.count,
                                         plan->boolean_values, plan->booleans.count)))
-        && went_well(f->enter_initialization(f->instance, false, 0.0, 0.0, false, 0.0))
-        && went_well(f->exit_initialization(f->instance)) && f->log->count == logged;
+        && vi_status_is_good(f->enter_initialization(f->instance, false, 0.0, 0.0, false, 0.0))
+        && vi_status_is_good(f->exit_initialization(f->instance)) && f->log->count == logged;
     p->time = p->spent = 0.0;
     p->rows_of[p->at] = 0;
     p->stage = BEFORE_RECORDING;
@@ -70,7 +65,7 @@ static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_poi
         return VI_RUNS_FULL;
     }
     int64_t count = 0;
-    if (!went_well(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
+    if (!vi_status_is_good(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
         return VI_RUNS_REFUSED;
     }
     if (count == 0) {
@@ -78,8 +73,8 @@ static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_poi
     }
     double *rows = p->rows + p->rows_used * VI_RECORD_WIDTH;
     const size_t size = (size_t)plan->row_capacity * VI_RECORD_WIDTH;
-    if (!went_well(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
-        || !went_well(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
+    if (!vi_status_is_good(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
+        || !vi_status_is_good(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
         return VI_RUNS_REFUSED;
     }
     p->rows_used += count;
@@ -94,10 +89,10 @@ static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
     double reached = p->time;
     const int status =
         f->step(f->instance, p->time, end - p->time, false, &needs_event, &ends, &early, &reached);
-    if (ends || (status != STATUS_DISCARD && (!went_well(status) || needs_event))) {
+    if (ends || (status != VI_STATUS_DISCARD && (!vi_status_is_good(status) || needs_event))) {
         return VI_RUNS_REFUSED;
     }
-    if (status == STATUS_DISCARD) {
+    if (status == VI_STATUS_DISCARD) {
         p->time = reached;
         p->outcome[p->at] = VI_RUN_IMPACT_LIMIT;
         return RUN_ENDS;
@@ -139,9 +134,9 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
     }
     double *finals = p->finals + (size_t)p->at * plan->finals.count;
     bool *flags = p->flags + (size_t)p->at * plan->flags.count;
-    if (!went_well(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals, plan->finals.count))
+    if (!vi_status_is_good(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals, plan->finals.count))
         || (plan->flags.count > 0
-            && !went_well(f->get_boolean(f->instance, plan->flags.references, plan->flags.count, flags,
+            && !vi_status_is_good(f->get_boolean(f->instance, plan->flags.references, plan->flags.count, flags,
                                          plan->flags.count)))
         || !isfinite(finals[0])) {
         return VI_RUNS_REFUSED;
@@ -167,7 +162,7 @@ static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
     if (result == GO_ON && p->stage == BEFORE_RECORDING) {
         result = advance(f, plan, p, p->begin[p->at], call);
         if (result == GO_ON) {
-            const bool good = went_well(f->set_boolean(f->instance, plan->switches.references, plan->switches.count,
+            const bool good = vi_status_is_good(f->set_boolean(f->instance, plan->switches.references, plan->switches.count,
                                                        plan->switch_values, plan->switches.count));
             result = good ? GO_ON : VI_RUNS_REFUSED;
             p->stage = RECORDING;

@@ -2,15 +2,10 @@
 
 #include "body/record.h"
 #include "door/seconds.h"
+#include "door/status.h"
 
-enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 /* Longest wall time of one call, s; signals and deadlines are handled between calls. */
 static const double MOST_SECONDS = 0.05;
-
-static bool went_well(int status)
-{
-    return status >= 0 && status <= STATUS_WARNING;
-}
 
 /* Take the rows recorded by the body. */
 static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block *b)
@@ -22,7 +17,7 @@ static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_blo
         return VI_HOLD_AGAIN;
     }
     int64_t count = 0;
-    if (!went_well(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
+    if (!vi_status_is_good(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
         return VI_HOLD_REFUSED;
     }
     if (count == 0) {
@@ -30,8 +25,8 @@ static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_blo
     }
     double *rows = b->rows + b->rows_used * VI_RECORD_WIDTH;
     const size_t size = (size_t)plan->row_capacity * VI_RECORD_WIDTH;
-    if (!went_well(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
-        || !went_well(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
+    if (!vi_status_is_good(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
+        || !vi_status_is_good(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
         return VI_HOLD_REFUSED;
     }
     b->rows_used += count;
@@ -48,7 +43,7 @@ static int set_input(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_ho
     double values[] = {b->inputs[b->at], b->rates == NULL ? 0.0 : b->rates[b->at]};
     if (plan->magnet != NULL) {
         double displacement = 0.0;
-        if (!went_well(f->get_float64(f->instance, &plan->displacement, 1, &displacement, 1))) {
+        if (!vi_status_is_good(f->get_float64(f->instance, &plan->displacement, 1, &displacement, 1))) {
             return VI_HOLD_REFUSED;
         }
         if (!(vi_magnet_gap(plan->magnet, displacement) > 0.0)) {
@@ -56,7 +51,7 @@ static int set_input(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_ho
         }
         values[0] = vi_magnet_force(plan->magnet, values[0], displacement);
     }
-    return went_well(f->set_float64(f->instance, inputs, 2, values, 2)) ? VI_HOLD_DONE : VI_HOLD_REFUSED;
+    return vi_status_is_good(f->set_float64(f->instance, inputs, 2, values, 2)) ? VI_HOLD_DONE : VI_HOLD_REFUSED;
 }
 
 /* Advance to sample `at`; a long computation or a full record ends the step earlier. */
@@ -67,11 +62,11 @@ static int advance(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block
         bool needs_event = false, ends = false, early = false;
         double reached = b->time;
         const int status = f->step(f->instance, b->time, end - b->time, false, &needs_event, &ends, &early, &reached);
-        if (status == STATUS_DISCARD || (ends && went_well(status))) {
+        if (status == VI_STATUS_DISCARD || (ends && vi_status_is_good(status))) {
             b->time = reached;
             return ends ? VI_HOLD_ENDS : VI_HOLD_LIMIT;
         }
-        if (!went_well(status) || needs_event || ends) {
+        if (!vi_status_is_good(status) || needs_event || ends) {
             return VI_HOLD_REFUSED;
         }
         b->time = early ? reached : end;
@@ -87,7 +82,7 @@ static int read_sample(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_
 {
     const size_t count = plan->outputs.count;
     double *sample = b->samples + (size_t)b->at * count;
-    const bool good = count == 0 || went_well(f->get_float64(f->instance, plan->outputs.references, count, sample, count));
+    const bool good = count == 0 || vi_status_is_good(f->get_float64(f->instance, plan->outputs.references, count, sample, count));
     return good ? VI_HOLD_DONE : VI_HOLD_REFUSED;
 }
 

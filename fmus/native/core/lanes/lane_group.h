@@ -62,6 +62,10 @@ typedef struct vi_lane_sines {
     /* Turns in a period of the clock, less whole turns: multiples of 2^-27 and of 2^-54, and a rest. Products of the
      * first two with a number of periods are exact. */
     vi_lane_array turns[VI_FURTHER_SINES][3];
+    /* Multiple of the clock's frequency, 0 if it is none; drift from this multiple, rad for each rad of the clock. Cosine
+     * and sine of the phase at the start of the clock's period 0. */
+    vi_lane_array harmonic[VI_FURTHER_SINES], drift[VI_FURTHER_SINES];
+    vi_lane_array start_cosine[VI_FURTHER_SINES], start_sine[VI_FURTHER_SINES];
     /* of one mode, as in vi_one_mode */
     vi_lane_array taylor[VI_SINE_ORDER + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
     vi_lane_array middle[VI_SINE_ORDER + 1][VI_FURTHER_SINES][VI_SINE_PARTS];
@@ -71,6 +75,7 @@ typedef struct vi_lane_sines {
     /* of several modes: the steady response of each real mode */
     vi_lane_array steady[VI_FURTHER_SINES][VI_REAL_MODES][VI_SINE_PARTS];
     int64_t count;                            /* of further sines; the members before it are arrays over the lanes */
+    int64_t highest, others;                  /* highest harmonic so far; number of sines so far that are none */
 } vi_lane_sines;
 
 /* Stops that yield, for a body of one mode. While a stop is pressed, the lane's q and p are the depth and its rate. */

@@ -19,6 +19,18 @@ static void split_turns(const vi_sine *sine, int k, int lane, vi_lane_sines *sin
     sines->turns[k][2][lane] = (left - fine) + sine->turns_low;
 }
 
+/* Set the numbers from which lockstep finds the phase of a harmonic of the clock. */
+static void take_harmonic(const vi_sine *sine, int k, int lane, vi_lane_sines *sines)
+{
+    const vi_phase start = vi_sine_phase(sine, (vi_instant){0, 0.0, 0.0});
+    sines->harmonic[k][lane] = (double)sine->harmonic;
+    sines->drift[k][lane] = sine->drift * TURNS_OF_RADIAN;
+    sines->start_cosine[k][lane] = start.cosine;
+    sines->start_sine[k][lane] = start.sine;
+    sines->highest = sine->harmonic > sines->highest ? sine->harmonic : sines->highest;
+    sines->others += sine->harmonic == 0;
+}
+
 bool vi_lane_take_sines(vi_lane_group *g, int lane, const vi_lanes_points *points, int64_t point, const vi_clock *clock,
                         int64_t last)
 {
@@ -34,6 +46,7 @@ bool vi_lane_take_sines(vi_lane_group *g, int lane, const vi_lanes_points *point
         g->sines->rate[k][lane] = w * TURNS_OF_RADIAN;
         g->sines->turn[k][lane] = sine.start + sine.start_low;
         split_turns(&sine, k, lane, g->sines);
+        take_harmonic(&sine, k, lane, g->sines);
     }
     return true;
 }

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "motion/majorant.h"
+
 /* State (q, p, cosine, sine) after some cells, as rows over (q, p, cosine, sine, 1). */
 typedef struct {
     double q[VI_PARTS], p[VI_PARTS];
@@ -93,11 +95,6 @@ typedef struct {
     double q[3], p[3];
 } reach;
 
-static double larger_of(double a, double b)
-{
-    return a > b ? a : b;
-}
-
 /* Bounds of a row at the ends of some pairs. */
 static void reach_row(const vi_lane_array rows[][VI_PARTS], int lane, int pairs, double by[3])
 {
@@ -105,10 +102,10 @@ static void reach_row(const vi_lane_array rows[][VI_PARTS], int lane, int pairs,
     by[1] = by[2] = 0.0;
     for (int i = 0; i <= 2 * pairs; i += 2) {
         const double c = rows[i][VI_OF_COSINE][lane], s = rows[i][VI_OF_SINE][lane];
-        force = larger_of(force, c * c + s * s);
-        held = larger_of(held, fabs(rows[i][VI_OF_ONE][lane]));
-        by[1] = larger_of(by[1], fabs(rows[i][VI_OF_Q][lane]));
-        by[2] = larger_of(by[2], fabs(rows[i][VI_OF_P][lane]));
+        force = vi_max(force, c * c + s * s);
+        held = vi_max(held, fabs(rows[i][VI_OF_ONE][lane]));
+        by[1] = vi_max(by[1], fabs(rows[i][VI_OF_Q][lane]));
+        by[2] = vi_max(by[2], fabs(rows[i][VI_OF_P][lane]));
     }
     by[0] = sqrt(force) + held;
 }
@@ -249,8 +246,8 @@ static void bound_sine(vi_one_mode *tables, const vi_lane_sines *sines, int furt
 {
     double q = 0.0, p = 0.0, third, fourth;
     for (int i = 0; i <= 2 * (far ? VI_PAIRS : VI_NEAR_PAIRS); i += 2) {
-        q = larger_of(q, size_of(sines->end_q[i][further], lane));
-        p = larger_of(p, size_of(sines->end_p[i][further], lane));
+        q = vi_max(q, size_of(sines->end_q[i][further], lane));
+        p = vi_max(p, size_of(sines->end_p[i][further], lane));
     }
     bound_pair(mode, pair, q, p, true, &third, &fourth);
     tables->third_by[far][0][lane] += third;
@@ -280,5 +277,5 @@ void vi_lane_sine_tables(vi_one_mode *tables, vi_lane_sines *sines, int further,
     bound_sine(tables, sines, further, lane, mode, 2.0 * cell, 0);
     bound_sine(tables, sines, further, lane, mode, 2.0 * cell, 1);
     tables->load[lane] += fabs(mode->force);
-    tables->fastest_load[lane] = larger_of(tables->fastest_load[lane], mode->angular_frequency);
+    tables->fastest_load[lane] = vi_max(tables->fastest_load[lane], mode->angular_frequency);
 }

@@ -305,7 +305,7 @@ LANES_INLINE bool one_round(vi_lane_group *g, const vi_lanes_plan *plan, vi_lane
 {
     flight f = begin_round(g, at);
     phases of;
-    phases_at(g, at, further, load(g->periods + at), load(g->rest + at), &of);
+    phases_of_round(g, at, further, f.now.cosine, f.now.sine, &of);
     if (plan->rate > 0.0) {
         sample_from(g, at, f.now.q, f.now.p, f.now.cosine, f.now.sine);
     }

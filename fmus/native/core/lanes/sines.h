@@ -33,6 +33,56 @@ LANES_INLINE void phases_at(const vi_lane_group *g, int at, int further, vector 
     }
 }
 
+/* Set the powers of the clock's turn that the harmonics of each lane are. */
+LANES_INLINE void powers_of(const vi_lane_sines *s, int at, int further, vector cosine, vector sine, phases *power)
+{
+    vector c = cosine, n = sine;
+    for (int k = 0; k < further; ++k) {
+        power->cosine[k] = cosine;
+        power->sine[k] = sine;
+    }
+    for (int64_t order = 2; order <= s->highest; ++order) {
+        const vector next = c * cosine - n * sine;
+        n = n * cosine + c * sine;
+        c = next;
+        for (int k = 0; k < further; ++k) {
+            const mask here = load(s->harmonic[k] + at) == (double)order;
+            power->cosine[k] = choose(here, c, power->cosine[k]);
+            power->sine[k] = choose(here, n, power->sine[k]);
+        }
+    }
+}
+
+/* Set the phases at the start of a round, where the clock's phase has this cosine and sine. Harmonics are powers of its
+ * turn. */
+LANES_INLINE void phases_of_round(const vi_lane_group *g, int at, int further, vector cosine, vector sine, phases *of)
+{
+    const vi_lane_sines *s = g->sines;
+    if (!further) {
+        return;
+    }
+    phases power;
+    const vector periods = load(g->periods + at), rest = load(g->rest + at);
+    const vector turned = 6.283185307179586232 * periods + load(g->angular_frequency + at) * rest;
+    powers_of(s, at, further, cosine, sine, &power);
+    for (int k = 0; k < further; ++k) {
+        const vector drift = load(s->drift[k] + at) * turned, less = 1.0 - 0.5 * drift * drift;
+        const vector c = load(s->start_cosine[k] + at), n = load(s->start_sine[k] + at);
+        const vector start_c = c * less - n * drift, start_n = n * less + c * drift;
+        of->cosine[k] = start_c * power.cosine[k] - start_n * power.sine[k];
+        of->sine[k] = start_n * power.cosine[k] + start_c * power.sine[k];
+    }
+    if (s->others > 0) {
+        phases counted;
+        phases_at(g, at, further, periods, rest, &counted);
+        for (int k = 0; k < further; ++k) {
+            const mask harmonic = load(s->harmonic[k] + at) > 0.0;
+            of->cosine[k] = choose(harmonic, of->cosine[k], counted.cosine[k]);
+            of->sine[k] = choose(harmonic, of->sine[k], counted.sine[k]);
+        }
+    }
+}
+
 /* Set the phases of one lane at several instants. */
 LANES_INLINE void phases_of_lane(const vi_lane_group *g, int lane, int further, vector periods, vector rest, phases *of)
 {

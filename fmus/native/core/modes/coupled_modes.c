@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "modes/reflection.h"
 #include "motion/majorant.h"
 
 /* Part of a held contact's shape left by the others, relative to the shape, above which it is independent. */
@@ -13,24 +14,7 @@ static const double REAL = 1e-12, CRITICAL = 1e-6;
 /* Growth of a rate, relative to the rate, below which it is rounding and set to 0. */
 static const double NO_GROWTH = 1e-13;
 
-static double dot(int n, const double x[], const double y[])
-{
-    double sum = 0.0;
-    for (int j = 0; j < n; ++j) {
-        sum += x[j] * y[j];
-    }
-    return sum;
-}
-
 /* ---- held contacts ---- */
-
-static void reflect(int n, const double unit[], double x[])
-{
-    const double twice = 2.0 * dot(n, unit, x);
-    for (int j = 0; j < n; ++j) {
-        x[j] -= twice * unit[j];
-    }
-}
 
 /* Add the reflection that frees motions with this contact in place of their next first component. False where the
  * contact nearly depends on the earlier ones. */
@@ -40,17 +24,17 @@ static bool add_reflection(int n, const double shape[], vi_coupled_work *work)
     double *v = work->reflection[i];
     memcpy(v, shape, (size_t)n * sizeof *v);
     for (int l = 0; l < i; ++l) {
-        reflect(n, work->reflection[l], v);
+        vi_reflect(n, work->reflection[l], v);
         work->triangle[l][i] = v[l];
         v[l] = 0.0; /* later reflections leave v unchanged */
     }
-    const double length = sqrt(dot(n, v, v));
-    if (!(length > INDEPENDENT * sqrt(dot(n, shape, shape)))) {
+    const double length = sqrt(vi_dot(n, v, v));
+    if (!(length > INDEPENDENT * sqrt(vi_dot(n, shape, shape)))) {
         return false;
     }
     work->triangle[i][i] = v[i] > 0.0 ? -length : length;
     v[i] -= work->triangle[i][i];
-    const double size = sqrt(dot(n, v, v));
+    const double size = sqrt(vi_dot(n, v, v));
     for (int j = 0; j < n; ++j) {
         v[j] /= size;
     }
@@ -72,14 +56,14 @@ static bool reflect_held(const vi_pressed_body *body, vi_coupled_work *work)
 static void reflect_in(const vi_pressed_body *body, const vi_coupled_work *work, double x[])
 {
     for (int i = 0; i < work->reflections; ++i) {
-        reflect(body->modes, work->reflection[i], x);
+        vi_reflect(body->modes, work->reflection[i], x);
     }
 }
 
 static void reflect_out(const vi_pressed_body *body, const vi_coupled_work *work, double x[])
 {
     for (int i = work->reflections - 1; i >= 0; --i) {
-        reflect(body->modes, work->reflection[i], x);
+        vi_reflect(body->modes, work->reflection[i], x);
     }
 }
 
@@ -155,7 +139,7 @@ static void couple(const vi_pressed_body *body, vi_coupled_work *work)
             drag[j] = vi_pressed_drag(body, j, work->shape[i]);
         }
         for (int l = 0; l <= i; ++l) {
-            double sum = dot(body->modes, drag, work->shape[l]);
+            double sum = vi_dot(body->modes, drag, work->shape[l]);
             for (int k = 0; k < body->contacts; ++k) {
                 sum += body->held[k] ? 0.0 : body->damping[k] * work->at[k][i] * work->at[k][l];
             }

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "modes/reflection.h"
+
 /* Cosine of the angle of two vectors up to which they are orthogonal: the rounding of a scalar product of 64 terms. */
 static const double ORTHOGONAL = 8.0 * DBL_EPSILON;
 enum { MOST_SWEEPS = 60 }; /* ten are usual */
@@ -14,15 +16,6 @@ typedef struct {
     double (*a)[VI_MODES];
     int row[VI_ROWS], column[VI_MODES]; /* origins of the rows and columns */
 } elimination;
-
-static double dot(int n, const double x[], const double y[])
-{
-    double sum = 0.0;
-    for (int i = 0; i < n; ++i) {
-        sum += x[i] * y[i];
-    }
-    return sum;
-}
 
 static void swap_vectors(int n, double x[], double y[])
 {
@@ -87,32 +80,23 @@ static int eliminate(elimination *e)
     return step;
 }
 
-/* x - 2 v (v.x) for a unit vector v, from component `first` on. */
-static void reflect(int first, int last, const double v[], double x[])
-{
-    const double twice = 2.0 * dot(last - first, v + first, x + first);
-    for (int i = first; i < last; ++i) {
-        x[i] -= twice * v[i];
-    }
-}
-
 /* X = Q R by Householder's reflections. x[k] is column k on entry, and the unit vector of reflection k afterwards. r[k]
  * is column k of the upper triangle R. */
 static void factor(int rows, int rank, double x[][VI_ROWS], double r[][VI_ROWS])
 {
     for (int k = 0; k < rank; ++k) {
         double *v = x[k];
-        const double length = sqrt(dot(rows - k, v + k, v + k));
+        const double length = sqrt(vi_dot(rows - k, v + k, v + k));
         const double diagonal = v[k] > 0.0 ? -length : length;
         memcpy(r[k], v, (size_t)k * sizeof *v);
         r[k][k] = diagonal;
         v[k] -= diagonal;
-        const double size = sqrt(dot(rows - k, v + k, v + k)); /* >= length, as X has full rank */
+        const double size = sqrt(vi_dot(rows - k, v + k, v + k)); /* >= length, as X has full rank */
         for (int i = k; i < rows; ++i) {
             v[i] /= size;
         }
         for (int later = k + 1; later < rank; ++later) {
-            reflect(k, rows, v, x[later]);
+            vi_reflect(rows - k, v + k, x[later] + k);
         }
     }
 }
@@ -144,11 +128,11 @@ static void rotate(int n, double cosine, double sine, double x[], double y[])
 static bool orthogonalise(int columns, int rank, vi_singular *s, int first, int second)
 {
     double *x = s->right[first], *y = s->right[second];
-    if (dot(columns, x, x) < dot(columns, y, y)) {
+    if (vi_dot(columns, x, x) < vi_dot(columns, y, y)) {
         swap_vectors(columns, x, y);
         swap_vectors(rank, s->left[first], s->left[second]);
     }
-    const double a = dot(columns, x, x), b = dot(columns, y, y), c = dot(columns, x, y);
+    const double a = vi_dot(columns, x, x), b = vi_dot(columns, y, y), c = vi_dot(columns, x, y);
     if (!(fabs(c) > ORTHOGONAL * sqrt(a) * sqrt(b))) {
         return false;
     }
@@ -181,7 +165,7 @@ static void leave_reflections(const elimination *e, int rank, const double (*ref
     double x[VI_ROWS] = {0.0};
     memcpy(x, left, (size_t)rank * sizeof *x);
     for (int k = rank - 1; k >= 0; --k) {
-        reflect(k, e->rows, reflection[k], x);
+        vi_reflect(e->rows - k, reflection[k] + k, x + k);
     }
     for (int i = 0; i < e->rows; ++i) {
         left[e->row[i]] = x[i];
@@ -191,7 +175,7 @@ static void leave_reflections(const elimination *e, int rank, const double (*ref
 static void sort_and_normalise(int rows, int columns, vi_singular *s)
 {
     for (int k = 0; k < s->rank; ++k) {
-        s->value[k] = sqrt(dot(columns, s->right[k], s->right[k]));
+        s->value[k] = sqrt(vi_dot(columns, s->right[k], s->right[k]));
         for (int i = 0; i < columns; ++i) {
             s->right[k][i] /= s->value[k];
         }

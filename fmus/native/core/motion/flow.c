@@ -53,6 +53,7 @@ static void start_steady(vi_mode *mode)
         respond(mode, mode->force, w, &mode->steady_cos, &mode->steady_sin, &mode->steady_amplitude);
     mode->steady_exists = mode->force == 0.0 || exists;
     mode->steady_snap = w * w * w * w * mode->steady_amplitude;
+    mode->force_size = fabs(mode->force);
     for (int k = 0; k < vi_mode_sines(mode); ++k) {
         vi_further *sine = &mode->further[k];
         double amplitude;
@@ -60,6 +61,7 @@ static void start_steady(vi_mode *mode)
         const bool one = respond(mode, sine->force, w, &sine->cosine, &sine->sine, &amplitude);
         mode->steady_exists = mode->steady_exists && (sine->force == 0.0 || one);
         mode->steady_amplitude += amplitude;
+        mode->force_size += fabs(sine->force);
         mode->steady_snap += w * w * w * w * amplitude;
     }
 }
@@ -245,10 +247,7 @@ static inline propagator propagate_segment(const vi_segment *s, double u)
 static double largest_split(const vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
-    double load = fabs(mode->force) + fabs(s->held);
-    for (int k = 0; k < vi_mode_sines(mode); ++k) {
-        load += fabs(mode->further[k].force);
-    }
+    const double load = mode->force_size + fabs(s->held);
     if (mode->regime == VI_OVERDAMPED && mode->decay > 0.0 && mode->fastest * s->length > LONGEST_SERIES) {
         return LARGEST_SPLIT_OVERDAMPED * (fabs(x) + (fabs(v) + load * s->length) / mode->fast);
     }

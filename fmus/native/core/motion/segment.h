@@ -32,6 +32,7 @@ typedef struct {
     double steady_cos, steady_sin; /* steady response = steady_cos cos(phase) + steady_sin sin(phase), m */
     double steady_amplitude;  /* m; the sum over all sines */
     double steady_snap;       /* the largest fourth derivative of the steady response, m/s^4 */
+    double force_size;        /* sum of the sizes of the forces of all sines, m/s^2 */
     double fastest;           /* largest of all rates and all angular frequencies of forces, rad/s */
     int32_t sines;            /* number of further sines */
     vi_further further[VI_SINES_ROOM];

@@ -7,6 +7,11 @@
 
 /* Highest multiple of the clock's frequency whose phase is found as a power of the clock's turn. */
 static const double HIGHEST_HARMONIC = 8.0;
+/* Relative difference from a whole number of turns up to which a sine is a harmonic: that of two rounded frequencies. */
+static const double HARMONIC_ROUNDING = 2.0 * DBL_EPSILON;
+/* Periods for which phases of harmonics are kept. They drift by up to 2e-11 rad meanwhile; the square of a drift is below
+ * their rounding. */
+enum { BLOCK = 1024 };
 static const double TWO_PI = 6.283185307179586232;
 static const double TWO_PI_LOW = 2.449293598294706414e-16;
 
@@ -55,9 +60,10 @@ static void take_turns(vi_sine *sine, const vi_clock *clock)
     sine->turns = turns.high;
     sine->turns_low = turns.low;
     const double whole = floor(turns.high + 0.5);
-    const bool is_whole = whole >= 1.0 && whole <= HIGHEST_HARMONIC
-                          && fabs((turns.high - whole) + turns.low) <= 8.0 * DBL_EPSILON * whole;
+    const double beyond = (turns.high - whole) + turns.low;
+    const bool is_whole = whole >= 1.0 && whole <= HIGHEST_HARMONIC && fabs(beyond) <= HARMONIC_ROUNDING * whole;
     sine->harmonic = clock->angular_frequency > 0.0 && is_whole ? (int64_t)whole : 0;
+    sine->drift = sine->harmonic != 0 ? TWO_PI * beyond : 0.0;
 }
 
 /* Turns of the sine in high + low seconds. */
@@ -113,4 +119,37 @@ vi_phase vi_sine_phase(const vi_sine *sine, vi_instant instant)
     const twofold since = turns_since(sine, instant), sum = sum_of(sine->start, since.high);
     const twofold turns = fraction_of((twofold){sum.high, sum.low + sine->start_low + since.low});
     return vi_phase_of(TWO_PI * turns.high + TWO_PI * turns.low);
+}
+
+/* Set the phases of harmonics at the start of the block of periods that has the instant. */
+static void begin_block(vi_sine_block *block, const vi_sine sine[], int count, vi_instant instant)
+{
+    const int64_t within = ((instant.periods % BLOCK) + BLOCK) % BLOCK, first = instant.periods - within;
+    if (first == block->first) {
+        return;
+    }
+    block->first = first;
+    for (int k = 0; k < count; ++k) {
+        block->phase[k] = sine[k].harmonic != 0 ? vi_sine_phase(&sine[k], (vi_instant){first, 0.0, 0.0})
+                                                : (vi_phase){0.0, 1.0, 0.0};
+    }
+}
+
+void vi_sine_phases(const vi_sine sine[], int count, const vi_clock *clock, vi_instant instant, vi_phase of_clock,
+                    vi_sine_block *block, vi_phase phase[])
+{
+    vi_turns turns = {1, of_clock.cosine, of_clock.sine};
+    begin_block(block, sine, count, instant);
+    const double since = (double)(instant.periods - block->first) + instant.rest / clock->period;
+    for (int k = 0; k < count; ++k) {
+        if (sine[k].harmonic == 0) {
+            phase[k] = vi_sine_phase(&sine[k], instant);
+            continue;
+        }
+        const vi_phase *start = &block->phase[k];
+        const double drift = sine[k].drift * since;
+        phase[k] = (vi_phase){start->angle + (double)sine[k].harmonic * of_clock.angle + drift,
+                              start->cosine - drift * start->sine, start->sine + drift * start->cosine};
+        vi_turn_harmonic(&phase[k], sine[k].harmonic, of_clock.cosine, of_clock.sine, &turns);
+    }
 }

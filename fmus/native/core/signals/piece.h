@@ -27,16 +27,6 @@ static inline void vi_piece_zero(vi_piece *piece, double length)
     *piece = (vi_piece){.length = length};
 }
 
-/* The value after `u` seconds. */
-static inline double vi_piece_value(const vi_piece *piece, double u)
-{
-    double value = piece->coefficient[piece->degree];
-    for (int n = piece->degree - 1; n >= 0; --n) {
-        value = value * u + piece->coefficient[n];
-    }
-    return value;
-}
-
 /* Count a piece of degree 3 or less from `u` seconds later: a Taylor shift. The length stays. */
 static inline void vi_piece_shift(vi_piece *piece, double u)
 {

@@ -11,12 +11,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from support.dataset_examples import dataset_of, opened, record
 from support.impact_sweep import SCENE
+from support.places import EXAMPLES
 
+import vibroimpact as vi
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, OrbitClass
 from vibroimpact.analysis.figures.sweep.classes import OTHER_COLOUR, OWN_COLOURS
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.hard_cases.loose import ball_in_cavity, symmetric_orbit
 
 TWO_STOPS = SCENE + '[[stop]]\nposition = -1.0\nside = "lower"\nrestitution = 0.7\n'
 NONDIMENSIONAL = {"units": "nondimensional"}
@@ -105,9 +108,41 @@ def test_contacts_of_several_bodies_are_named_by_their_points(tmp_path: Path) ->
     axis = figures.draw(opened(sweep, tmp_path), "bifurcation").axes[1]
     assert {str(line.get_label()) for line in axis.lines} == {"stop 1", "frame - ball"}
     coupled = sweep.isel(run=slice(None))
+    coupled.attrs["scene"] = "[component.a]"
     coupled["impact_contact"].attrs.update(flag_values=np.array([1, 2], dtype=np.int8), flag_meanings="a b")
     axis = figures.draw(opened(coupled, tmp_path), "bifurcation").axes[1]
     assert {str(line.get_label()) for line in axis.lines} == {"a", "b"}
+
+
+def test_lines_of_several_bodies_name_their_points(tmp_path: Path) -> None:
+    names = ["displacement", "velocity", "contact_displacement[2]", "contact_force[2]"]
+    scene = vi.Scene.from_file(EXAMPLES / "impact_damper_cavity.toml").with_values(
+        {"record": {"recorded_periods": 8, "time_series": {"rate": 20, "variables": names}}}
+    )
+    run = vi.run(scene)
+    labels = [{str(line.get_label()) for line in axis.lines} for axis in figures.draw(run).axes]
+    assert {"frame", "ball relative to frame"} <= labels[0]
+    assert "frame" in labels[1]
+    assert "ball and frame" in labels[2]
+    assert run.impact_contact.attrs["flag_meanings"] == run.stick_contact.attrs["flag_meanings"]
+    assert run.impact_contact.attrs["flag_meanings"] == "contact_1 contact_2"
+
+
+def test_extremes_of_all_periods_together_are_no_period(tmp_path: Path) -> None:
+    scene = vi.Scene.from_file(EXAMPLES / "inverted_pendulum.toml").unswept()
+    together = vi.run(scene.with_values({"record.each_period": False, "record.transient_periods": 10}))
+    axis = figures.draw(together, "run").axes[0]
+    assert axis.get_xlabel() == "all recorded forcing periods together"
+    assert [str(line.get_label()) for line in axis.lines].count("stop") == 1
+
+
+def test_a_portrait_draws_the_stops_of_its_point_alone() -> None:
+    (phase, _), scene = symmetric_orbit(0.1, 1.4), vi.Scene.from_dict(ball_in_cavity(0.1, 1.4))
+    cavity = vi.find_orbits(scene, seed=[(phase, 1), (phase + np.pi, 2)])
+    assert [orbit.full_name for orbit in cavity][:1] == ["P(2,1), 1 at contact 1, 1 at contact 2"]
+    assert len(figures.draw(cavity).axes[0].lines) == len(cavity)  # a clearance is no place of the frame
+    one = vi.find_orbits(vi.Scene.from_file(EXAMPLES / "single_run.toml"), 1)
+    assert len(figures.draw(one).axes[0].lines) == len(one) + 1
 
 
 def classified(kinds: list[tuple[OrbitClass, int, int]], runs: list[RunRecord]) -> xr.Dataset:

@@ -142,7 +142,7 @@ def test_each_displacement_of_a_chain_has_the_stops_of_its_mass_in_its_colour() 
     lines = figure.axes[0].get_lines()
     stops = {line.get_color(): line.get_ydata()[0] for line in lines if line.get_linestyle() != "-"}
     motion = {line.get_label(): line.get_color() for line in lines if line.get_linestyle() == "-"}
-    assert stops == {motion["displacement 2"]: 0.8, motion["displacement 3"]: -0.9}
+    assert stops == {motion["mass 2"]: 0.8, motion["mass 3"]: -0.9}
     assert fixed_positions(limits(chain(), "contact_displacement_2")) == [-0.9]
     assert limits(chain(), "displacement_1") == limits(chain(), "velocity_3") == []
 
@@ -156,7 +156,7 @@ def test_panels_are_in_the_order_of_the_scene_and_name_quantity_index_and_unit()
     figure = figures.draw(chain())
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "displacement (m)",
-        "velocity 3 (m/s)",
+        "velocity of mass 3 (m/s)",
         "contact force (N)",
     ]
 
@@ -165,7 +165,7 @@ def test_quantities_without_units_have_panels_of_their_own() -> None:
     figure = figures.draw(chain(units="nondimensional"))
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "displacement (-)",
-        "velocity 3 (-)",
+        "velocity of mass 3 (-)",
         "contact force (-)",
     ]
 

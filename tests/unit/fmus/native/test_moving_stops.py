@@ -171,9 +171,8 @@ def test_jaws_that_close_end_the_run_by_name(restitution: float) -> None:
         fmu.step(3.9)
         with pytest.raises(FMICallException):
             fmu.step(0.2)
-    assert (
-        "contact[1], contact[2]: expected room between their stops, of which one moves, got none at 4"
-        in (messages[-1].replace("got none at 3.99999", "got none at 4"))
+    assert "contact[1], contact[2]: expected room between their stops, of which one moves, got none at 4" in (
+        messages[-1].replace("got none at 3.99999", "got none at 4")
     )
 
 

@@ -14,6 +14,7 @@ from support.places import EXAMPLES
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import basins as plane_of_starts
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.hard_cases.loose import ball_in_cavity
 from vibroimpact.orchestrator.orbits import basins as basins_module
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 
@@ -143,9 +144,9 @@ def test_chaotic_attractors_that_are_mirror_images_of_each_other_are_two() -> No
         counts = np.bincount(run.impact_contact.values.astype(int), minlength=3)[1:]
         at = found.sel(displacement_start=x, velocity_start=y, method="nearest")
         ends = found.attractor_impacts.values[int(at.basin)]
-        assert (x, y) == (0.9, -0.7) or np.argmax(ends) == np.argmax(counts), (
-            "next to a border a cell is coarse"
-        )
+        assert (x, y) == (0.9, -0.7) or np.argmax(ends) == np.argmax(
+            counts
+        ), "next to a border a cell is coarse"
 
 
 @pytest.mark.usefixtures("brief_transients")
@@ -161,6 +162,16 @@ def test_one_chaotic_attractor_stays_one_and_says_what_its_sample_may_have_misse
     assert found.attractor_name.values.tolist() == ["chaos"]
     assert found.attrs["chaotic_by_sample"] == 1600 - 256
     assert found.attrs["undetected_share_below"] == pytest.approx(0.0116, abs=2e-4)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_the_plane_of_a_ball_in_a_cavity_ends_at_its_contacts(number: int) -> None:
+    found = vi.basins(vi.Scene.from_dict(ball_in_cavity(0.1, 1.4)), points=(4, 4), number=number)
+    assert found.attractor_name.values.tolist() == ["P(2,1)"]
+    assert (found.basin.values == 0).all()  # no start is beyond a contact
+    metres = [0.1**-0.5, 1.0][number - 1]  # of the ball, or of the frame, for a unit of the mode
+    ends = found.displacement_start.values[[0, -1]] * metres
+    assert ends == pytest.approx([-0.4, 0.4], rel=1e-12)
 
 
 def test_a_chain_and_a_beam_have_basins_of_one_of_their_parts() -> None:

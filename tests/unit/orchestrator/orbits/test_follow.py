@@ -15,6 +15,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.fmus.errors import DatasetError, SceneError
+from vibroimpact.orchestrator.hard_cases.loose import ball_in_cavity, symmetric_orbit
 from vibroimpact.orchestrator.scene.changes import with_resting_start
 
 
@@ -30,6 +31,28 @@ PARAMETER = "forcing.angular_frequency"
 @pytest.fixture(scope="module")
 def branches() -> object:
     return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05)
+
+
+def test_a_branch_of_a_ball_in_a_cavity_is_its_closed_form() -> None:
+    mass, frequency, start = 0.1, 1.4, 0.28
+    phase, _ = symmetric_orbit(mass, frequency, start)
+    found = vi.follow(
+        vi.Scene.from_dict(ball_in_cavity(mass, frequency, start)),
+        "forcing.amplitude",
+        start,
+        0.34,
+        step=0.2,
+        seed=[(phase, 1), (phase + np.pi, 2)],
+        doublings=0,
+    )
+    runs = found.vibroimpact.runs
+    assert runs.sizes["run"] >= 8
+    expected = [symmetric_orbit(mass, frequency, float(size))[1] for size in runs["amplitude"].values]
+    np.testing.assert_allclose(found["impact_velocity"].values.reshape(-1, 2).T, [expected] * 2, rtol=1e-12)
+    stable = runs["orbit_stable"].values > 0
+    last = runs.isel(run=np.flatnonzero(stable)[-1])
+    # the branch loses its symmetry where a multiplier passes 1
+    assert float(last["amplitude"]) < 0.3388 < float(runs["amplitude"].values[~stable].min())
 
 
 def test_branches_are_a_dataset_whose_runs_are_orbits(branches: object) -> None:

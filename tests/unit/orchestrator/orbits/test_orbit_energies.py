@@ -109,7 +109,7 @@ def test_a_dataset_is_told_by_the_command_as_its_scene_is(tmp_path: Path) -> Non
     vi.run(vi.Scene.from_text(CHAIN + SWEEP), file, progress=False)
     done = in_this_process("energies", file, "-o", tmp_path / "e.nc", "--figure", tmp_path / "e.png")
     assert done.returncode == 0, done.stderr
-    assert "runs have a periodic orbit" in done.stdout
+    assert "runs have energies of a periodic orbit" in done.stdout
     assert "without: sticking" in done.stdout
     peaks = in_this_process("resonances", file, "-o", tmp_path / "p.nc", "--figure", tmp_path / "p.png")
     assert peaks.returncode == 0, peaks.stderr

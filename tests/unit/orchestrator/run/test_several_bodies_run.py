@@ -338,7 +338,7 @@ def test_messages_of_the_engine_have_the_names_of_the_scene() -> None:
         {"at": "a", "side": "lower", "position": -1.0, "restitution": 0.5},
     ]
     said = str(run(stop=stops, forcing=TABLES["forcing"] | {"amplitude": 0.1}).message.item())
-    assert "stop[1] and stop[3]: expected room between their stops, of which one moves" in said
+    assert "stop[1], stop[3]: expected room between their stops, of which one moves" in said
     scene = Scene.from_dict(TABLES | {"stop": stops})
     assert in_keys_of(scene, "contact[4].position: expected room between it and contact[3]") == (
         "contact[1].clearance: expected room between it and stop[3]"
@@ -366,3 +366,12 @@ def test_an_exported_structure_moves_as_its_scene_in_another_tool(fmi: str, tmp_
     assert ours.sizes["impact"] > 5
     for name, stored in names.items():
         assert theirs[name][:count] == pytest.approx(ours[stored].values[:count], abs=1e-9), name
+
+
+def test_a_figure_names_the_lines_by_their_points() -> None:
+    series = {"rate": 5, "variables": ["displacement", "contact_displacement[1]"]}
+    found = run(record=TABLES["record"] | {"time_series": series})
+    assert found.displacement.attrs["long_name"] == "displacement of a"
+    legend = vi.draw(found).axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["a", "a relative to b.2"]

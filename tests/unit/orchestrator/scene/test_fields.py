@@ -30,7 +30,7 @@ from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_key
 
 KEY_TABLES = run_path(str(ROOT / "docs" / "site" / "key_tables.py"))
 #: Models with keys of their own.
-MODELS = {
+MODELS: set[type[BaseModel]] = {
     found
     for found in KEY_TABLES["models_of_tables"]().values()
     if found is not StructureBody

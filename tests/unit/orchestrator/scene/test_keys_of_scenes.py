@@ -7,6 +7,6 @@ from support.scene_keys import scene_keys
 
 
 def test_keys_are_those_of_the_list() -> None:
-    assert scene_keys() == SCENE_KEYS.read_text(encoding="utf-8"), (
-        "run python -P tests/support/public_names.py"
-    )
+    assert scene_keys() == SCENE_KEYS.read_text(
+        encoding="utf-8"
+    ), "run python -P tests/support/public_names.py"

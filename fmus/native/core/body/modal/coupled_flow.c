@@ -250,7 +250,7 @@ static void size_loads(const vi_structure_model *model, const vi_drift_start *st
 {
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        size[j] = vi_mode_force_size(mode) + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
+        size[j] = mode->force_size + fabs(start->drive.held[j]) + fabs(mode->stiffness * start->q[j]);
         size[j] += vi_structure_drag_size(model, j, start->p);
     }
 }
@@ -305,12 +305,12 @@ static double reach(const vi_drift *drift, const equation *e, double fastest)
     return REACH;
 }
 
-/* Shorten the segment to where the terms of order `last` - 1 and `last` are below this share of the first. */
-static void shorten_for(vi_drift *drift, const double series[], int last, double share)
+/* Shorten the segment to where the terms of order `last` - 1 and `last` are below this size. */
+static void shorten_for(vi_drift *drift, const double series[], int last, double size)
 {
     for (int n = last - 1; n <= last; ++n) {
         if (series[n] != 0.0) {
-            drift->length = vi_min(drift->length, pow(share * fabs(series[0]) / fabs(series[n]), 1.0 / (double)n));
+            drift->length = vi_min(drift->length, pow(size / fabs(series[n]), 1.0 / (double)n));
         }
     }
 }
@@ -321,10 +321,13 @@ static void shorten(vi_drift *drift, const vi_drift_start *start, bool any_held)
 {
     const double share = SMALLEST_TERM * drift->model->tolerance;
     for (int k = 0; k < drift->model->contacts; ++k) {
-        if (start->press[k].kind == VI_PRESS_POWER) {
-            shorten_for(drift, drift->penetration[k], drift->order, share);
+        const vi_press *press = &start->press[k];
+        const double depth = drift->penetration[k][0];
+        if (press->kind == VI_PRESS_POWER) {
+            shorten_for(drift, drift->penetration[k], drift->order, share * depth);
             if (any_held) {
-                shorten_for(drift, drift->force[k], drift->order - 2, share);
+                const double force = press->stiffness * pow(depth, press->exponent);
+                shorten_for(drift, drift->force[k], drift->order - 2, share * force);
             }
         }
     }

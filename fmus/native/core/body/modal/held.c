@@ -133,7 +133,7 @@ void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const 
     vi_structure_held_now(s, noise->held);
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         const vi_mode *mode = &s->model->mode[j];
-        const double loads = vi_mode_force_size(mode) + fabs(noise->held[j]);
+        const double loads = mode->force_size + fabs(noise->held[j]);
         const double within = mode->natural * fabs(s->state->q[j]) + loads * s->model->radian;
         const double velocity = fabs(drift->modal[1][j]) + within;
         noise->before[j] = 0.0; /* the series begins at the body's place */

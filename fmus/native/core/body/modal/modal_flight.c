@@ -52,7 +52,8 @@ static double start_further(vi_point *point, const vi_flight *flight, const doub
     double start = 0.0, power = 1.0;
     for (int k = 0; k < flight->sines; ++k) {
         vi_point_sine *sine = &point->further[k];
-        *sine = (vi_point_sine){.angular_frequency = model->mode[0].further[k].angular_frequency};
+        const double w = model->mode[0].further[k].angular_frequency;
+        *sine = (vi_point_sine){.angular_frequency = w, .fourth = w * w * w * w};
         for (int j = 0; j < vi_structure_modes(model); ++j) {
             const vi_further *of_mode = &flight->segment[j].mode->further[k];
             const double weight = flight->segment[j].series ? 0.0 : shape[j];
@@ -110,8 +111,7 @@ static void turn_further(const vi_flight *flight, vi_flight_instant *now)
     const vi_drive *drive = &flight->drive;
     const double cosine = now->cosine * drive->phase.cosine + now->sine * drive->phase.sine;
     const double sine = now->sine * drive->phase.cosine - now->cosine * drive->phase.sine;
-    double c = 1.0, s = 0.0; /* of `order` turns */
-    int64_t order = 0;
+    vi_turns turns = {1, cosine, sine};
     for (int k = 0; k < flight->sines; ++k) {
         const int64_t harmonic = flight->model->sine[k].harmonic;
         const vi_phase *start = &drive->further[k];
@@ -120,17 +120,8 @@ static void turn_further(const vi_flight *flight, vi_flight_instant *now)
             now->further[k] = now->u == 0.0 ? *start : vi_phase_of(angle);
             continue;
         }
-        if (harmonic < order) {
-            c = 1.0;
-            s = 0.0;
-            order = 0;
-        }
-        for (; order < harmonic; ++order) {
-            const double turned = c * cosine - s * sine;
-            s = s * cosine + c * sine;
-            c = turned;
-        }
-        now->further[k] = (vi_phase){angle, start->cosine * c - start->sine * s, start->sine * c + start->cosine * s};
+        now->further[k] = (vi_phase){angle, start->cosine, start->sine};
+        vi_turn_harmonic(&now->further[k], harmonic, cosine, sine, &turns);
     }
 }
 
@@ -172,7 +163,7 @@ static void add_further(vi_part *sum, const vi_point *point, const vi_flight *fl
         sum->v += v;
         sum->a -= square * x;
         sum->j -= square * v;
-        sum->snap_bound += square * square * sine->amplitude;
+        sum->snap_bound += sine->fourth * sine->amplitude;
     }
     if (vi_flight_degree(flight) > 1) {
         double value[4] = {0.0};
@@ -254,16 +245,26 @@ void vi_flight_end(const vi_flight *flight, double u, double angle, const vi_pha
     }
 }
 
+/* Turn a cosine and a sine by an angle whose fourth power is negligible. */
+static void turn_slightly(double turn, double *cosine, double *sine)
+{
+    const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn * SIXTH);
+    const double c = *cosine * less - *sine * more;
+    *sine = *sine * less + *cosine * more;
+    *cosine = c;
+}
+
 void vi_flight_end_near(const vi_flight *flight, const vi_flight_instant *instant, double moment, double q[],
                         double p[], vi_phase *phase)
 {
-    const double w = flight->angular_frequency, turn = w * moment, half = 0.5 * moment, third = moment * THIRD;
-    const double less = 1.0 - 0.5 * turn * turn, more = turn * (1.0 - turn * turn * SIXTH);
-    const double c = instant->cosine * less - instant->sine * more, s = instant->sine * less + instant->cosine * more;
+    const double w = flight->angular_frequency, half = 0.5 * moment, third = moment * THIRD;
+    double c = instant->cosine, s = instant->sine;
+    turn_slightly(w * moment, &c, &s);
     const bool is_more = flight->sines > 0 || vi_flight_degree(flight) > 1;
     vi_phase further[VI_SINES_ROOM];
-    if (is_more) {
-        vi_flight_further(flight, instant->u + moment, further);
+    for (int k = 0; k < flight->sines; ++k) {
+        further[k] = instant->further[k];
+        turn_slightly(flight->model->sine[k].angular_frequency * moment, &further[k].cosine, &further[k].sine);
     }
     *phase = (vi_phase){flight->drive.phase.angle + w * (instant->u + moment), c, s};
     for (int j = 0; j < vi_structure_modes(flight->model); ++j) {

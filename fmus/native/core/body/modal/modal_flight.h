@@ -30,6 +30,7 @@ typedef struct {
 /* Response of a point to a further sine: cosine cos(phase) + sine sin(phase). */
 typedef struct {
     double cosine, sine, amplitude, angular_frequency;
+    double fourth; /* power of its angular frequency */
 } vi_point_sine;
 
 /* A point of the body in a flight, seen from its stop: clearance = offset - sign * displacement. */

@@ -6,8 +6,9 @@
 
 /* Rounding of samples, relative to the sum of sizes of a displacement's terms. Less clearance is unresolved. */
 static const double ROUNDING = 1e-12;
-/* Longest level of steps for a single mode: steps beyond .8 radians clear little. */
-enum { LONGEST_OF_ONE = 4 };
+/* Longest level of steps for a single mode: steps beyond .8 radians clear little. Further sines that are fast may be
+ * small: with them steps may be longer. */
+enum { LONGEST_OF_ONE = 4, LONGEST_WITH_SINES = 5 };
 /* Most levels by which the steps grow from one block to the next. */
 enum { STEEPEST_RISE = 3 };
 /* Blocks of samples after which a scan ends where it is. */
@@ -114,12 +115,12 @@ static opening opening_of(const scanner *s, int k, double step)
         o.off_cubic = point->steady * (w * w * w * w * share);
     }
     for (int n = 0; n < s->flight->sines; ++n) {
-        const double amplitude = point->further[n].amplitude, f = point->further[n].angular_frequency;
-        if (ripples(f * f * f * f, share, 1.0)) {
-            o.ripple += amplitude;
-            speed += amplitude * f;
+        const vi_point_sine *sine = &point->further[n];
+        if (ripples(sine->fourth, share, 1.0)) {
+            o.ripple += sine->amplitude;
+            speed += sine->amplitude * sine->angular_frequency;
         } else {
-            o.off_cubic += amplitude * (f * f * f * f * share);
+            o.off_cubic += sine->amplitude * (sine->fourth * share);
         }
     }
     o.off_cubic += vi_flight_degree(s->flight) > 1 ? point->higher_snap * share : 0.0;
@@ -195,7 +196,7 @@ static void sample_further(const scanner *s, const vi_scan_level *level, int k, 
     for (int n = 0; n < s->flight->sines; ++n) {
         const vi_point_sine *sine = &point->further[n];
         const double w = sine->angular_frequency;
-        if (ripples(w * w * w * w, share, 1.0)) {
+        if (ripples(sine->fourth, share, 1.0)) {
             continue;
         }
         const double x = -point->sign * (sine->cosine * s->at.further_cosine[n] + sine->sine * s->at.further_sine[n]);
@@ -326,7 +327,8 @@ static int longest_level(const vi_flight *flight)
 {
     const double growing = vi_structure_grows(flight->model) ? 1.0 : 0.0;
     const double samples = vi_flight_degree(flight) > 1 ? (double)VI_SCAN_SAMPLES : growing;
-    int l = vi_structure_modes(flight->model) == 1 ? LONGEST_OF_ONE : VI_SCAN_LEVELS - 1;
+    const int of_one = flight->sines > 0 ? LONGEST_WITH_SINES : LONGEST_OF_ONE;
+    int l = vi_structure_modes(flight->model) == 1 ? of_one : VI_SCAN_LEVELS - 1;
     while (samples > 0.0 && l >= 0 && vi_scan_step(flight->model, l) * samples > flight->length) {
         --l;
     }
@@ -335,25 +337,25 @@ static int longest_level(const vi_flight *flight)
 
 /* ---- from sample to sample ---- */
 
-/* Move a place on by 1 to VI_SCAN_SAMPLES steps. */
-static void go(place *at, const vi_structure_model *model, const vi_scan_level *level, int steps)
+/* Set the place 1 to VI_SCAN_SAMPLES steps after another, or after itself. */
+static void go(place *to, const place *at, const vi_structure_model *model, const vi_scan_level *level, int steps)
 {
     const int i = steps - 1;
     const double c = at->cosine * level->cosine[i] - at->sine * level->sine[i];
-    at->sine = at->sine * level->cosine[i] + at->cosine * level->sine[i];
-    at->cosine = c;
+    to->sine = at->sine * level->cosine[i] + at->cosine * level->sine[i];
+    to->cosine = c;
     for (int k = 0; k < vi_mode_sines(&model->mode[0]); ++k) {
         const double turned =
             at->further_cosine[k] * level->further_cosine[k][i] - at->further_sine[k] * level->further_sine[k][i];
-        at->further_sine[k] =
+        to->further_sine[k] =
             at->further_sine[k] * level->further_cosine[k][i] + at->further_cosine[k] * level->further_sine[k][i];
-        at->further_cosine[k] = turned;
+        to->further_cosine[k] = turned;
     }
-    at->u += (double)steps * level->step;
+    to->u = at->u + (double)steps * level->step;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const double x = level->x_of_x[j][i] * at->x[j] + level->x_of_v[j][i] * at->v[j];
-        at->v[j] = level->v_of_x[j][i] * at->x[j] + level->v_of_v[j][i] * at->v[j];
-        at->x[j] = x;
+        to->v[j] = level->v_of_x[j][i] * at->x[j] + level->v_of_v[j][i] * at->v[j];
+        to->x[j] = x;
     }
 }
 
@@ -392,7 +394,7 @@ static vi_approach approach_at(const scanner *s, const place *at, int k)
 
 static void advance(scanner *s, const vi_scan_level *level, int steps)
 {
-    go(&s->at, s->flight->model, level, steps);
+    go(&s->at, &s->at, s->flight->model, level, steps);
     s->begins = false;
     for (int k = 0; k < s->contacts; ++k) {
         if (s->looked_for[k]) {
@@ -428,13 +430,14 @@ static double guess(const vi_approach *a, const vi_approach *b, double step)
 /* Bracket the contact in the interval after `steps`. */
 static void bracket(const scanner *s, const vi_scan_level *level, int steps, int k, vi_scan_found *found)
 {
-    place low = s->at, high = s->at;
+    place low, high;
     vi_approach at_low = s->now[k];
+    low.u = s->at.u;
     if (steps > 0) {
-        go(&low, s->flight->model, level, steps);
+        go(&low, &s->at, s->flight->model, level, steps);
         at_low = approach_at(s, &low, k);
     }
-    go(&high, s->flight->model, level, steps + 1);
+    go(&high, &s->at, s->flight->model, level, steps + 1);
     const vi_approach at_high = approach_at(s, &high, k);
     *found = (vi_scan_found){k, low.u, high.u, low.u + guess(&at_low, &at_high, level->step), found->blocks};
 }

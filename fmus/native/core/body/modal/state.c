@@ -84,6 +84,7 @@ void vi_structure_drive(const vi_structure *s, const double force[], double angu
         vi_sine *sine = &s->model->sine[k];
         *sine = vi_sine_from(&s->model->clock, sine->angular_frequency, state->now, further[k].angle);
     }
+    state->harmonics.first = INT64_MAX;
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
         vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
         state->origin[j].known = 0;
@@ -104,7 +105,7 @@ void vi_structure_drive_further(const vi_structure *s, int sines, double (*force
                              : vi_sine_from(&model->clock, angular_frequency[k], state->now, state->further[k].angle);
     }
     model->sines = sines;
-    state->further_at.periods = INT64_MAX; /* no phase is known */
+    state->further_at.periods = state->harmonics.first = INT64_MAX; /* no phase is known */
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         double of_mode[VI_SINES_ROOM];
         for (int k = 0; k < sines && VI_SINES > 0; ++k) {
@@ -126,9 +127,8 @@ const vi_phase *vi_structure_further(const vi_structure *s)
     const vi_instant at = state->further_at, now = state->now;
     if (vi_structure_sines(s->model) > 0
         && !(at.periods == now.periods && at.rest == now.rest && at.rest_low == now.rest_low)) {
-        for (int k = 0; k < vi_structure_sines(s->model); ++k) {
-            state->further[k] = vi_sine_phase(&s->model->sine[k], now);
-        }
+        vi_sine_phases(s->model->sine, vi_structure_sines(s->model), &s->model->clock, now, vi_structure_phase(s),
+                       &state->harmonics, state->further);
         state->further_at = now;
     }
     return state->further;
@@ -240,7 +240,7 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
     double sum = 0.0;
     for (int j = 0; j < vi_structure_modes(model); ++j) {
         const vi_mode *mode = &model->mode[j];
-        const double loads = vi_mode_force_size(mode) + fabs(s->state->held[j]);
+        const double loads = mode->force_size + fabs(s->state->held[j]);
         sum += fabs(model->shape[k][j])
                * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * model->radian);
     }

@@ -138,6 +138,7 @@ typedef struct {
     vi_phase phase;                  /* of the clock's force, as last evaluated */
     vi_instant further_at;           /* instant of `further` */
     vi_phase further[VI_SINES_ROOM]; /* of the further sines, as last evaluated */
+    vi_sine_block harmonics;         /* of the further sines, likewise */
     vi_origin origin[VI_MODES];
     vi_rest_origin rest;
     vi_instant held_since;
@@ -359,16 +360,6 @@ const vi_phase *vi_structure_further(const vi_structure *s);
 /* Drive of the modes from now on; `held` is set to the present loads. */
 vi_drive vi_structure_drive_now(const vi_structure *s, double held[]);
 
-/* Sum of the sizes of the harmonic forces on mode j. */
-static inline double vi_mode_force_size(const vi_mode *mode)
-{
-    double size = fabs(mode->force);
-    for (int k = 0; k < vi_mode_sines(mode); ++k) {
-        size += fabs(mode->further[k].force);
-    }
-    return size;
-}
-
 /* Set the forcing phase found at this instant; it agrees except for whole turns and the rounding of its angle. */
 void vi_structure_phase_is(const vi_structure *s, vi_phase phase);
 
@@ -407,6 +398,17 @@ static inline bool vi_structure_follows_peak(const vi_structure *s, int k)
 static inline bool vi_structure_watched(const vi_structure *s, int k)
 {
     return s->model->stop[k] != VI_NO_STOP && !s->state->passed;
+}
+
+/* Does any mode move? A body that stands still keeps its state to the last bit. */
+static inline bool vi_structure_moves(const vi_structure *s)
+{
+    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
+        if (s->state->p[j] != 0.0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* Kinetic energy of the modes, J. */

@@ -57,11 +57,13 @@ def test_a_missing_axis_is_0_and_an_empty_cell_is_unknown() -> None:
         (f"name\n{'a' * 41}\n", "line 2: expected a name of at most 40 letters"),
         ("name\n\u202ea\n", "line 2: expected a name of at most 40 letters"),
         ("node,direction\n1,w\n", "line 2: expected a direction (x, y, z, rx, ry, rz), got 'w'"),
-        ('name,x\n"a\n', "line 2: expected"),
+        ('name,x\n"a\n', "line 2: expected 2 columns, got 1"),
+        (f'name,x\n"{"a" * 200_000}', "line 2: expected cells of a table, got"),
     ],
 )
 def test_a_wrong_table_is_refused_with_the_line(text: str, said: str) -> None:
     with pytest.raises(UsageError) as refused:
         read_table(text.encode())
     assert said in str(refused.value)
+    assert len(str(refused.value)) < 200
     assert "\n" not in str(refused.value)

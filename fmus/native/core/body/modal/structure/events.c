@@ -159,18 +159,24 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
     const double scale = drift->force_scale[k] * s->model->compliance[k][k] / vi_structure_mobility_left(s, k);
     const double noise = VI_ROUNDING * (scale + size);
     vi_fall fall = {true, 0.0, 1.0};
+    vi_drift_event event = VI_DRIFT_RELEASE;
     /* opposite stops at one place may have left a pull of VI_PORTS roundings: the share of each is rounding */
     if (force[0] <= noise && force[0] >= -VI_PORTS * noise && fabs(thin) <= noise) {
-        divide(force, vi_structure_first_of_force(s, drift, k));
+        const int lead = vi_structure_first_of_force(s, drift, k);
+        event = lead > 1 ? VI_DRIFT_GENTLE_RELEASE : VI_DRIFT_RELEASE;
+        divide(force, lead);
         if (force[0] >= 0.0) {
+            event = VI_DRIFT_RELEASE;
             fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
             fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
         }
     } else if (force[0] + thin >= -noise) {
         fall = force[0] >= -noise ? fall_through(force, length, noise) : fall;
         fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
+    } else {
+        event = VI_DRIFT_LIFT;
     }
-    consider(first, &fall, VI_DRIFT_RELEASE, k);
+    consider(first, &fall, event, k);
 }
 
 /* Rounding of a number with the sign of a compliant force: the force itself or, for a power law, 1 + damping d'. */

@@ -10,7 +10,9 @@
 typedef enum {
     VI_DRIFT_NO_EVENT,
     VI_DRIFT_ARRIVAL,
-    VI_DRIFT_RELEASE,
+    VI_DRIFT_RELEASE,        /* the force of a held contact has fallen to 0 */
+    VI_DRIFT_GENTLE_RELEASE, /* so has the rate of this force */
+    VI_DRIFT_LIFT,           /* a sudden load pulls a held contact off */
     VI_DRIFT_SEPARATION,
     VI_DRIFT_RETURN, /* to the compliant surface that it has left */
     VI_DRIFT_FREE    /* a receding contact is out, or its surface has relaxed */

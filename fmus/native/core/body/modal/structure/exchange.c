@@ -74,7 +74,7 @@ static void find_nominals(const vi_structure *s)
         const vi_mode *mode = &model->mode[j];
         const double own = mode->natural > 0.0 ? mode->natural : mode->angular_frequency;
         const double rate = own > 0.0 ? own : 1.0;
-        const double static_displacement = (vi_mode_force_size(mode) + fabs(state->held[j])) / (rate * rate);
+        const double static_displacement = (mode->force_size + fabs(state->held[j])) / (rate * rate);
         displacement = vi_max(displacement, vi_max(fabs(state->q[j]), static_displacement));
         displacement = vi_max(displacement, fabs(state->p[j]) / rate);
         velocity = vi_max(velocity, vi_max(fabs(state->p[j]), static_displacement * rate));

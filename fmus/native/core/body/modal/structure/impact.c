@@ -12,6 +12,7 @@
 #include "body/modal/stop_motion.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impulses.h"
+#include "body/modal/structure/resolution.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
@@ -49,20 +50,6 @@ static double drag_at(const vi_structure *s, int k)
         drag += model->shape[k][j] * pulled;
     }
     return drag / model->mobility[k][k];
-}
-
-/* Largest difference of displacements that double precision cannot resolve at a contact, m. */
-static double resolution(const vi_structure *s, int k, double pressure, double approach)
-{
-    const bool low = vi_chatter_is_low(pressure, approach, s->model->fastest);
-    return DBL_EPSILON * (low ? fabs(s->contacts[k].position) : vi_structure_displacement_size(s, k));
-}
-
-/* Smallest resolved height of a bounce, limited by rounding, or by the integrator of model exchange. */
-static double bounce_resolution(const vi_structure *s, int k, double pressure, double rebound)
-{
-    const double integrated = s->state->exchange.unresolved * sqrt(s->model->compliance[k][k]);
-    return vi_max(integrated, resolution(s, k, pressure, rebound));
 }
 
 /* Balance the energies of an impact: moving stops do work on the bodies, the contacts lose the rest. before: kinetic
@@ -106,7 +93,7 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
                           .drag = drag_at(s, k),
                           .fastest = s->model->fastest,
                           .moving = s->model->fastest,
-                          .resolution = bounce_resolution(s, k, view.pressure, rebound),
+                          .resolution = vi_structure_bounce_resolution(s, k, view.pressure, rebound),
                           .tiny = tiny};
     const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
     if (chatter.sticks) {
@@ -155,7 +142,7 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
         double acceleration[VI_MODES], force[VI_PORTS];
         vi_structure_accelerate(s, acceleration, force);
         const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
-        graze = vi_chatter_is_graze(approach, a, resolution(s, k, a, approach));
+        graze = vi_chatter_is_graze(approach, a, vi_structure_resolution(s, k, a, approach));
         tiny = is_tiny(a, rebound, fastest, height);
     }
     state->budget.events += 1;
@@ -262,8 +249,10 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS] = {0.0}, impulse[VI_PORTS], impulse_low[VI_PORTS];
-    int in_play[VI_PORTS] = {0}, resting[VI_PORTS];
+    double approach[VI_PORTS], restitution[VI_PORTS], change[VI_PORTS], impulse[VI_PORTS], impulse_low[VI_PORTS];
+    int in_play[VI_PORTS], resting[VI_PORTS];
+    change[0] = 0.0; /* there is a contact, which compilers cannot know */
+    in_play[0] = 0;
     const double before = vi_structure_kinetic(s);
     for (int k = 0; k < n; ++k) {
         approach[k] = restitution[k] = change[k] = 0.0;

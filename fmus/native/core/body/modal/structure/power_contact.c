@@ -49,17 +49,6 @@ static int pressed_contacts(const vi_structure *s, const vi_situation *now, int 
     return found;
 }
 
-/* Does any mode move? A body that stands still keeps its state to the last bit. */
-static bool moves(const vi_structure *s)
-{
-    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
-        if (s->state->p[j] != 0.0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Does a step fit this body, its record and this instant? */
 static bool fits(const vi_structure *s, const vi_situation *now, double length)
 {
@@ -68,7 +57,7 @@ static bool fits(const vi_structure *s, const vi_situation *now, double length)
            && vi_structure_is_plain(s) && !vi_structure_stops_move(s->model) && !vi_structure_grows(s->model)
            && !s->model->coupled && !s->model->varies
            && !now->any_thin && !s->state->follow_energies
-           && length * s->model->fastest > ONE_SEGMENT && moves(s);
+           && length * s->model->fastest > ONE_SEGMENT && vi_structure_moves(s);
 }
 
 /* Time to where a motion from `depth` with this rate and acceleration would be at 0. Where it would not, the distance

@@ -25,17 +25,6 @@ static const double MARGIN = 16.0;
 
 /* ---- is this a long rest? ---- */
 
-/* Does the body move? A body that stands still keeps its state to the last bit. */
-static bool moves(const vi_structure *s)
-{
-    for (int j = 0; j < vi_structure_modes(s->model); ++j) {
-        if (s->state->p[j] != 0.0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Upper bound of the rates of the resting body's motions, rad/s. */
 static double fastest_rate(const vi_structure *s, const int32_t port[], int contacts)
 {
@@ -290,7 +279,7 @@ double vi_structure_rest_on(const vi_structure *s, double length, double room)
 {
     int32_t port[VI_PORTS];
     if (s->pressed == NULL || !vi_structure_is_plain(s) || vi_structure_stops_move(s->model)
-        || vi_structure_grows(s->model) || s->state->series < PATIENCE_HELD || !moves(s)) {
+        || vi_structure_grows(s->model) || s->state->series < PATIENCE_HELD || !vi_structure_moves(s)) {
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);

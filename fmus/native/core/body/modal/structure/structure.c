@@ -288,8 +288,10 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, stops_here(s, target, request));
         break;
-    /* a sudden load lifts the contact off with an acceleration, unless others hold it; otherwise its force is 0 */
-    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 || vi_structure_is_kept(s, k) ? 2 : 1); break;
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, 2); break;
+    case VI_DRIFT_GENTLE_RELEASE: vi_structure_release(s, k, 3); break;
+    /* with an acceleration, unless others hold it */
+    case VI_DRIFT_LIFT: vi_structure_release(s, k, vi_structure_is_kept(s, k) ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:
         vi_structure_return(s, k);
@@ -336,7 +338,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
     fresh.degree = 1;
     fresh.loads_last = HUGE_VAL;
-    fresh.further_at.periods = INT64_MAX; /* no phase is known */
+    fresh.further_at.periods = fresh.harmonics.first = INT64_MAX; /* no phase is known */
     fresh.follow_energies = state->follow_energies;
     fresh.exchange = state->exchange;
     fresh.now = fresh.held_since = fresh.input_since = now;
@@ -373,7 +375,7 @@ static bool loads_are_finite(const vi_structure *s)
 {
     double sum = 0.0;
     for (int j = 0; j < vi_structure_modes(s->model); ++j) {
-        const double load = vi_mode_force_size(&s->model->mode[j]) + fabs(s->state->held[j]);
+        const double load = s->model->mode[j].force_size + fabs(s->state->held[j]);
         sum += load * load;
     }
     return sum <= DBL_MAX;

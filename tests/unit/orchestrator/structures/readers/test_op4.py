@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support.damaged_bytes import damaged, read_or_refused
@@ -74,6 +74,7 @@ def test_text_files_read_back_to_their_last_digit(
         np.testing.assert_array_equal(found[role], rounded)
 
 
+@settings(max_examples=40)
 @given(SQUARES, st.sampled_from(LAYOUTS), st.sampled_from("<>"), st.sampled_from([4, 8]), st.booleans())
 def test_any_matrix_reads_back_from_binary_and_text(
     full: np.ndarray[Any, np.dtype[np.float64]], layout: Layout, order: str, word: int, text: bool
@@ -149,6 +150,7 @@ def test_a_text_file_that_ends_early_is_refused_at_every_line(layout: Layout) ->
             read(b"".join(lines[:count]))
 
 
+@settings(max_examples=40)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
     layout, text = data.draw(st.sampled_from(LAYOUTS)), data.draw(st.booleans())
@@ -185,7 +187,44 @@ def test_a_string_that_leaves_its_column_is_refused() -> None:
             read(bytes(content), Wanted({"stiffness": "K"}))
 
 
+@pytest.mark.parametrize("at", [84, 92])  # the length and the row of the first string
+@pytest.mark.parametrize("value", [2**61 + 3, 2**63 - 1, -(2**63), 0, 3])
+def test_long_words_that_overflow_are_refused(at: int, value: int) -> None:
+    content = bytearray(op4_binary({"K": np.eye(2)}, "big", word=8))
+    assert struct.unpack_from("<qq", content, 84) == (2, 1)
+    struct.pack_into("<q", content, at, value)
+    with pytest.raises(
+        UsageError, match=r"K: column 1: expected (a string within the column|rows 1 to 2), got"
+    ):
+        read(bytes(content), Wanted({"stiffness": "K"}))
+
+
 def test_a_text_line_with_wider_numbers_is_refused_with_its_line() -> None:
     content = op4_text({"K": np.eye(2)}).replace(b" 1.0000000000000000E+00", b" 1.00000000000000000E+01", 1)
-    with pytest.raises(UsageError, match="K: line 3: expected 1 numbers of 23 characters, got '1.00"):
+    with pytest.raises(
+        UsageError, match="line 3: expected 1 numbers of 23 characters, 3 in a line, got '1.00"
+    ):
         read(content, Wanted({"stiffness": "K"}))
+
+
+def test_a_text_whose_long_string_has_a_line_of_another_length_is_refused_with_its_line() -> None:
+    lines = op4_text({"K": np.full((7, 7), 1.5)}).split(b"\n")
+    lines[3] = lines[3][:-1]
+    lines[2] += b"0"
+    with pytest.raises(
+        UsageError, match="K: line 3: expected numbers of 23 characters, 3 in a line, got '1.5"
+    ):
+        read(b"\n".join(lines), Wanted({"stiffness": "K"}))
+
+
+@pytest.mark.parametrize("wrong", [b"nan", b"1_0", b"0x1", b"1 2", b"", b"1e", b"--1"])
+def test_texts_that_are_no_numbers_are_refused_with_their_line(wrong: bytes) -> None:
+    content = op4_text({"K": np.eye(3)}).replace(b" 1.0000000000000000E+00", wrong.rjust(23), 1)
+    with pytest.raises(UsageError, match="line 3: expected .*numbers of 23 characters"):
+        read(content, Wanted({"stiffness": "K"}))
+
+
+@pytest.mark.parametrize("end", [b"\r\n", b"   \n", b" \0\n"])
+def test_blanks_at_the_ends_of_lines_do_not_matter(end: bytes) -> None:
+    found = read(op4_text(NAMED, "sparse").replace(b"\n", end) + b"\x1a")
+    np.testing.assert_array_equal(found["stiffness"], STIFFNESS)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.damaged_bytes import damaged, read_or_refused
 from support.nastran_files import DIGITS, STYLES, Style, dmig
@@ -100,6 +100,7 @@ def test_damaged_cards_are_refused_with_their_line(content: bytes, said: str) ->
         cards.read(content, Wanted({"stiffness": "KAAX"}))
 
 
+@settings(max_examples=40)
 @given(st.sampled_from(STYLES), st.data())
 def test_a_damaged_deck_is_read_or_refused_in_one_line(style: Style, data: st.DataObject) -> None:
     content = data.draw(damaged(b"GRID,3,,1.,2.,3.\n" + dmig("KAAX", SYMMETRIC, FREEDOMS, style)))
