@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,8 +139,9 @@ def _tolerance(document: Mapping[str, Any]) -> dict[str, float]:
     """Return the tolerance of a scene for `modes = "auto"`; none that the checks of the scene refuse."""
     execution = document.get("execution")
     given = execution.get("tolerance") if isinstance(execution, dict) else None
-    is_valid = isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE
-    return {"tolerance": float(given)} if is_valid else {}
+    if isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE:
+        return {"tolerance": float(given)}
+    return {}
 
 
 def _of_matrices(
@@ -177,7 +179,7 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapp
     from vibroimpact.orchestrator.structures.request import Request
 
     rayleigh = table.rayleigh
-    return Request(
+    found = Request(
         stiffness=table.stiffness,
         mass=table.mass,
         damping=table.damping,
@@ -191,8 +193,8 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapp
         base=table.base,
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
-        **(tolerance if table.modes == "auto" else {}),
     )
+    return replace(found, **tolerance) if table.modes == "auto" else found
 
 
 def _of_modes(

@@ -80,9 +80,9 @@ def _universal(modes: Modes) -> Iterator[str]:
     yield from (f"{273.15:25.17E}".replace("E", "D"), MARK)
     if places:
         yield from (MARK, f"{DOUBLE:6d}")
-        for node, place in sorted(places.items()):
-            yield f"{node:10d}{1:10d}{1:10d}{11:10d}"
-            yield "".join(f"{each:25.16E}" for each in place).replace("E", "D")
+        for label, where in sorted(places.items()):
+            yield f"{label:10d}{1:10d}{1:10d}{11:10d}"
+            yield "".join(f"{each:25.16E}" for each in where).replace("E", "D")
         yield MARK
     width = values.shape[1]
     for place, (natural, ratio) in enumerate(zip(modes.natural, modes.damping_ratios, strict=True)):
