@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -10,14 +11,16 @@ from hypothesis import strategies as st
 from support.damaged_bytes import damaged, read_or_refused
 from support.matrix_files import ONE_MATRIX, SEVERAL, Floats, calculix
 
+from vibroimpact.orchestrator.structures.readers.calculix import read_freedoms, read_nodes
 from vibroimpact.orchestrator.structures.readers.child import Reader, reader_of
+from vibroimpact.orchestrator.structures.readers.found import Found
 from vibroimpact.orchestrator.structures.readers.freedoms import read_table
 from vibroimpact.orchestrator.structures.readers.wanted import Wanted
 
 WANTED = Wanted({"stiffness": ""})
 DAMAGED = tuple(sorted({*ONE_MATRIX, "model.npz"}))
 """Formats whose readers are safe in this process; `soak.grammar_matrices` damages the others."""
-WORDS = ("name", "node", "direction", "x", "y", "z", " ", ",", ";", "\t", "\n", "#", '"', "1", "9.5", "a")
+WORDS = ("*NODE", "*node, nset=a", "**", "12.3", "1.7", "name", "node", "direction", "9.5", *'xyz ,;\t\n#"1a')
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -69,10 +72,18 @@ def test_a_cut_file_of_calculix_is_refused_or_smaller(matrix: Floats, data: st.D
     assert got is None or len(got) < len(matrix)
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.one_of(st.text(max_size=80), st.lists(st.sampled_from(WORDS), max_size=30).map("".join)))
-def test_any_text_is_a_table_or_refused_in_a_line(text: str) -> None:
-    found = read_or_refused(lambda: read_table(text.encode("utf-8", "surrogatepass")))
-    if found is not None:
+@settings(max_examples=200, deadline=None)
+@given(
+    st.sampled_from((read_table, read_freedoms, read_nodes)),
+    st.one_of(st.text(max_size=80), st.lists(st.sampled_from(WORDS), max_size=30).map("".join)),
+)
+def test_any_text_names_freedoms_or_nodes_or_is_refused_in_a_line(
+    reader: Callable[[bytes], Found | tuple[Floats, Floats]], text: str
+) -> None:
+    found = read_or_refused(lambda: reader(text.encode("utf-8", "surrogatepass")))
+    if isinstance(found, Found):
         assert found.freedoms
         assert found.coordinates is None or found.coordinates.shape == (len(found.freedoms), 3)
+    elif found is not None:
+        assert found[1].shape == (len(found[0]), 3)
+        assert np.all(np.isfinite(found[1]))

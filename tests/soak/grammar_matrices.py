@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import random
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from vibroimpact.orchestrator.structures.readers import Sources, read_matrices
 
 CASES, SAMPLE, SECONDS = files.CASES, 20, files.SECONDS
 
-SEVERAL = {
+SEVERAL: Mapping[str, Callable[[Mapping[str, Any]], bytes]] = {
     **matrix_files.SEVERAL,
     **{
         f"{layout}{word}{order == '>'}.op4": partial(
@@ -142,7 +143,8 @@ def check(seed: int) -> str | None:
         sources = Sources(file=name, freedoms="freedoms.csv")
     else:
         contents = {f"{role}_{name}": matrix_files.ONE_MATRIX[name](one) for role, one in written.items()}
-        sources = Sources(*contents, freedoms="freedoms.csv")
+        stiffness, mass = contents
+        sources = Sources(stiffness, mass, freedoms="freedoms.csv")
     contents["freedoms.csv"] = table.encode()
     kind = draw.random()
     if kind > 0.4:

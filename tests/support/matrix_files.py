@@ -85,13 +85,6 @@ def matlab_7_3(matrices: Mapping[str, Any]) -> bytes:
     return head.ljust(124) + b"\x00\x02IM" + content.getvalue()[128:]
 
 
-def op4(matrices: Mapping[str, Floats], *, text: bool = False) -> bytes:
-    """Return a file of Nastran with all digits, whose names have at most eight letters."""
-    named = {_OF_NASTRAN.get(name, name): matrix for name, matrix in matrices.items()}
-    return op4_text(named, "big") if text else op4_binary(named, "sparse")
-
-
-_OF_NASTRAN = {"stiffness": "KAA", "mass": "MAA", "damping": "BAA"}
 ONE_MATRIX: Mapping[str, Callable[[Floats], bytes]] = {
     "general.mtx": market,
     "symmetric.mtx": lambda matrix: market(matrix, "symmetric"),
@@ -110,8 +103,8 @@ SEVERAL: Mapping[str, Callable[[Mapping[str, Any]], bytes]] = {
     "model.mat": matlab,
     "packed.mat": lambda matrices: matlab(matrices, packed=True),
     "new.mat": matlab_7_3,
-    "binary.op4": op4,
-    "text.op4": lambda matrices: op4(matrices, text=True),
+    "binary.op4": lambda matrices: op4_binary(matrices, "sparse"),
+    "text.op4": lambda matrices: op4_text(matrices, "big"),
 }
 """Writers of several matrices by the name of a file."""
 

@@ -72,7 +72,8 @@ def checked_modes(given: GivenModes) -> Modes:
         Numbers are not finite, out of range, or do not fit the number of modes. A name is no name of a point. Complex
         shapes are far from real.
     """
-    natural = _numbers("frequency", given.frequencies) * (1.0 if given.is_angular else 2.0 * np.pi)
+    factor = 1.0 if given.is_angular else 2.0 * np.pi
+    natural = _numbers("frequency", [factor * float(each) for each in given.frequencies])
     count = len(natural)
     if not 1 <= count <= MOST_MODES:
         raise UsageError(f"expected 1 to {MOST_MODES} modes, got {count}.")
@@ -147,11 +148,12 @@ def _shapes(given: GivenModes, count: int) -> tuple[Floats, tuple[str, ...]]:
     if shapes.shape != (len(points), count):
         sizes = " x ".join(str(size) for size in shapes.shape)
         raise UsageError(f"shapes: expected {len(points)} points x {count} modes, got {sizes}.")
+    if given.modal_masses is not None:
+        with np.errstate(all="ignore"):  # what overflows is refused below
+            shapes = shapes / np.sqrt(_masses(given.modal_masses, count))
     if not np.isfinite(shapes).all():
         point, mode = np.argwhere(~np.isfinite(shapes))[0]
         raise UsageError(f"{points[point]}: expected finite numbers, got another in mode {mode + 1}.")
-    if given.modal_masses is not None:
-        shapes = shapes / np.sqrt(_masses(given.modal_masses, count))
     return real_shapes(shapes)
 
 

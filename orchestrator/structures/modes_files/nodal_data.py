@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import hypot, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,18 +161,19 @@ def _from_eigenvalue(
     """Return natural angular frequency, damping ratio and complex modal mass of a complex mode.
 
     Modal A is phi' (2 lambda M + C) phi, and modal B is -lambda A. Where the damping is proportional, modal A is
-    2 j omega_d times the modal mass.
+    2 j omega_d times the modal mass (docs/equations.md 8.11).
     """
     eigenvalue, modal_a, modal_b = (
         complex(real, imaginary),
         complex(a_real, a_imaginary),
         complex(b_real, b_imaginary),
     )
-    if not np.isfinite([eigenvalue, modal_a, modal_b]).all() or imaginary == 0.0:
+    if imaginary == 0.0:
         raise ValueError(f"expected the eigenvalue of an oscillation, got {eigenvalue:g}")
     if modal_a == 0.0:
         modal_a = -modal_b / eigenvalue
-    return abs(eigenvalue), -real / abs(eigenvalue), modal_a / (2.0j * imaginary)
+    natural = hypot(real, imaginary)
+    return natural, -real / natural, modal_a / (2.0j * imaginary)
 
 
 def _values(lines: list[str], start: int, each: int) -> tuple[NDArray[np.int64], Floats]:
@@ -212,9 +214,10 @@ def reals_of(line: str, width: int, count: int) -> list[float]:
     [1.5, 2.5]
     """
     line = line.rstrip()
-    if len(line) == width * count:
-        return [real_of(line[at : at + width]) for at in range(0, width * count, width)]
-    parts = line.split()
-    if len(parts) != count:
-        raise ValueError(f"expected {count} numbers, got {line[:60]!r}")
-    return [real_of(each) for each in parts]
+    parts = [line[at : at + width] for at in range(0, width * count, width)]
+    if len(line) != width * count:
+        parts = line.split()
+    found = [real_of(each) for each in parts]
+    if len(found) != count or not all(map(isfinite, found)):
+        raise ValueError(f"expected {count} finite numbers, got {line[:60]!r}")
+    return found

@@ -1,7 +1,7 @@
 """Complex shapes made real: the phase of each mode is turned to its best line, and the rest is left out.
 
 The values of a normal mode lie on one line of the complex plane, and those of a measured one near it. The best line has
-half the angle of the sum of phi^2. The part of the shape phi across it has the least square.
+half the angle of the sum of phi^2. The part of the shape phi across it has the least square (docs/equations.md 8.11).
 """
 
 from __future__ import annotations
@@ -40,7 +40,9 @@ def real_shapes(shapes: Shapes) -> tuple[Floats, tuple[str, ...]]:
     """
     if not np.iscomplexobj(shapes):
         return shapes.astype(np.float64), ()
-    turned = shapes * np.exp(-0.5j * np.angle(np.sum(shapes**2, axis=0)))
+    scales = np.maximum(np.abs(shapes.real), np.abs(shapes.imag)).max(axis=0)
+    scaled = shapes / np.where(scales > 0.0, scales, 1.0)
+    turned = scaled * np.exp(-0.5j * np.angle(np.sum(scaled**2, axis=0)))
     norms = np.linalg.norm(turned, axis=0)
     parts = np.linalg.norm(turned.imag, axis=0) / np.where(norms > 0.0, norms, 1.0)
     worst = int(np.argmax(parts))
@@ -49,7 +51,7 @@ def real_shapes(shapes: Shapes) -> tuple[Floats, tuple[str, ...]]:
         raise UsageError(
             f"mode {worst + 1}: expected a shape within {100.0 * FAR_FROM_REAL:g} % of a real one, got {got}."
         )
-    found = turned.real
+    found = turned.real * scales
     largest = np.argmax(np.abs(found), axis=0)
     found = found * np.where(found[largest, np.arange(found.shape[1])] < 0.0, -1.0, 1.0)
     if parts[worst] <= _ROUNDING:

@@ -164,10 +164,12 @@ def read(content: bytes) -> GivenModes:
 def _units(dataset: Dataset) -> tuple[float, float]:
     """Return the units of length and force in the file per unit of SI."""
     try:
+        if len(dataset.lines) < 2:
+            raise ValueError("expected two lines, got fewer")
         found = reals_of(dataset.lines[1], _FACTOR_WIDTH, 3)
-        if not all(0.0 < each < np.inf for each in found):
+        if min(found) <= 0.0:
             raise ValueError(f"expected factors > 0, got {found}")
-    except (ValueError, IndexError) as problem:
+    except ValueError as problem:
         raise UsageError(f"line {dataset.first + 1}: dataset 164: {problem}.") from None
     return found[0], found[1]
 
@@ -178,7 +180,8 @@ def _in_si(mode: NodalMode, units: tuple[float, float]) -> NodalMode:
     if units == _SI:
         return mode
     rotations = np.where(np.arange(mode.values.shape[1]) < 3, 1.0, length)
-    return mode.scaled(mode.modal_mass * length / force, rotations)
+    with np.errstate(all="ignore"):  # what overflows is refused with its point
+        return mode.scaled(mode.modal_mass * length / force, rotations)
 
 
 def _without_conjugates(modes: list[NodalMode], remarks: list[str]) -> list[NodalMode]:

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.reader_process import Answer, Order, read_apart
+from vibroimpact.orchestrator.structures.readers.refusal import LONGEST_REFUSAL, one_line
 
 SECONDS, RATE = 10.0, 1e6
 """Limit of the processor time: a constant, s, plus the size of the file over a rate, bytes/s.
@@ -25,7 +26,6 @@ MEMORY, PER_BYTE = 2 << 30, 64
 """Limit of the memory, bytes: a constant for the expansion of small files, plus this many per byte of the file."""
 MOST_BYTES = 4 << 30
 """Largest size of a file, also when unpacked, and of the answer, bytes."""
-LONGEST_REASON = 300
 Taken = TypeVar("Taken")
 
 
@@ -99,7 +99,7 @@ def _size_of(path: Path) -> int:
 def _reason(answer: Answer, seconds: float) -> str:
     """Return the text of the reader's refusal, or of its end."""
     if answer.error == UsageError.__name__:
-        return str(answer.text)
+        return one_line(str(answer.text), LONGEST_REFUSAL)
     if answer.error == "MemoryError":
         return "expected a file that fits into the memory, got a larger one."
-    return f"expected a whole file, got {answer.why(seconds)[:LONGEST_REASON]}."
+    return f"expected a whole file, got {one_line(answer.why(seconds))}."

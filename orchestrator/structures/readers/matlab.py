@@ -13,6 +13,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.readers.found import MOST_ENTRIES, Found, in_columns
+from vibroimpact.orchestrator.structures.readers.refusal import one_refusal
 from vibroimpact.orchestrator.structures.readers.wanted import Wanted
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -32,14 +33,9 @@ def read(content: bytes, wanted: Wanted) -> Found:
     UsageError
         The file is damaged; a matrix is missing, complex or not square; h5py is not installed.
     """
-    try:
+    with one_refusal("a whole MATLAB file"):
         matrices = _of_hdf5 if content.startswith((_VERSION_7_3, _HDF5)) else _of_scipy
         return Found({role: in_columns(one) for role, one in matrices(content, wanted).items()})
-    except (UsageError, MemoryError):
-        raise
-    except Exception as problem:  # the libraries raise errors of many kinds on damaged bytes
-        got = f"{type(problem).__name__}: {problem}"[:200]
-        raise UsageError(f"expected a whole MATLAB file, got one that cannot be read ({got}).") from problem
 
 
 def _of_scipy(content: bytes, wanted: Wanted) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-import zlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,6 +16,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.matrices import Sparse
 from vibroimpact.orchestrator.structures.readers.apart import MOST_BYTES
 from vibroimpact.orchestrator.structures.readers.found import Found, in_columns
+from vibroimpact.orchestrator.structures.readers.refusal import one_refusal
 from vibroimpact.orchestrator.structures.readers.wanted import Wanted, listed
 
 _SUFFIX = ".npy"
@@ -40,23 +40,12 @@ def read(content: bytes, wanted: Wanted) -> Found:
     UsageError
         The archive is damaged or holds pickles; a matrix is missing, complex or not square.
     """
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = _members(archive)
-            if {"format", "data", "shape"} <= members.keys():
-                return Found({wanted.only(): in_columns(_sparse(archive, members))})
-            chosen = wanted.among(members)
-            arrays = {role: _array(archive, members[name]) for role, name in chosen.items()}
-        return Found({role: in_columns(array) for role, array in arrays.items()})
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        NotImplementedError,
-        RuntimeError,
-        ValueError,
-    ) as problem:
-        raise UsageError(f"expected a whole .npz file, got one that is damaged ({problem}).") from problem
+    with one_refusal("a whole .npz file"), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = _members(archive)
+        if {"format", "data", "shape"} <= members.keys():
+            return Found({wanted.only(): in_columns(_sparse(archive, members))})
+        chosen = wanted.among(members)
+        return Found({role: in_columns(_array(archive, members[name])) for role, name in chosen.items()})
 
 
 def _members(archive: zipfile.ZipFile) -> Mapping[str, zipfile.ZipInfo]:

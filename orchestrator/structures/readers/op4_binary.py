@@ -182,13 +182,14 @@ class BinaryFile:
                 found = [np.concatenate(each) for each in zip(*parts, strict=True)]
                 return found[0], found[1], found[2], found[3]
             lengths, rows, starts = self._string_heads(head, at, ends)
-            at = starts + lengths * self._word
-            wrong = (lengths < 1) | (lengths % self._words_of(head) != 0) | (at > ends)
+            most = (ends - starts) // self._word
+            wrong = (lengths < 1) | (lengths % self._words_of(head) != 0) | (lengths > most)
             if wrong.any():
                 which = int(np.argmax(wrong))
                 expected = f"column {columns[which]}: expected a string within the column"
                 raise UsageError(f"{expected}, got one of {lengths[which]} words.")
             parts.append((columns, rows, starts, lengths))
+            at = starts + lengths * self._word
         raise UsageError(f"expected at most {head.rows} strings in a column, got more.")
 
     def _string_heads(self, head: Head, at: Integers, ends: Integers) -> tuple[Integers, Integers, Integers]:

@@ -117,14 +117,14 @@ def in_full(head: Head, strings: Strings, values: Floats) -> Sparse:
     """
     from scipy.sparse import csc_array
 
-    within = strings.within()
-    rows, columns = (np.repeat(each, strings.counts) - 1 for each in (strings.rows, strings.columns))
-    rows += within
     ends = strings.rows + strings.counts - 1
-    _refuse(strings, (strings.rows < 1) | (ends > head.rows), f"rows 1 to {head.rows}")
+    outside = (strings.rows < 1) | (strings.rows > head.rows) | (ends > head.rows)
+    _refuse(strings, outside, f"rows 1 to {head.rows}")
     again = np.zeros(len(ends), dtype=bool)
     again[1:] = (np.diff(strings.columns) == 0) & (strings.rows[1:] <= ends[:-1])
     _refuse(strings, again, "ascending rows, each once")
+    rows, columns = (np.repeat(each, strings.counts) - 1 for each in (strings.rows, strings.columns))
+    rows += strings.within()
     there = values != 0.0
     starts = np.searchsorted(columns[there], np.arange(head.columns + 1))
     found = csc_array((values[there], rows[there], starts), shape=(head.rows, head.columns))
@@ -136,5 +136,5 @@ def _refuse(strings: Strings, wrong: NDArray[np.bool_], expected: str) -> None:
     """Raise UsageError at the first wrong string."""
     if wrong.any():
         at = int(np.argmax(wrong))
-        column, row, count = strings.columns[at], strings.rows[at], strings.counts[at]
+        column, row, count = (int(each[at]) for each in (strings.columns, strings.rows, strings.counts))
         raise UsageError(f"column {column}: expected {expected}, got rows {row} to {row + count - 1}.")

@@ -104,13 +104,15 @@ def test_netcdf_is_read_to_the_bit(tmp_path: Path, kind: Kind, turned: bool) -> 
     check(read(tmp_path, "modes.nc", content), masses=MASSES, damping=True)
 
 
-def test_complex_shapes_of_netcdf_are_made_real(tmp_path: Path) -> None:
+@pytest.mark.parametrize("turned", [False, True])
+def test_complex_shapes_of_netcdf_are_made_real(tmp_path: Path, turned: bool) -> None:
     turn = np.exp(0.7j) * np.array([[3.0], [-4.0]])
+    dimensions = ("mode", "point") if turned else ("point", "mode")
     variables: dict[str, Any] = {
         "angular_frequency": (("mode",), [5.0]),
         "point": (("point",), ["a", "b"]),
-        "shape": (("point", "mode"), turn.real),
-        "shape_imaginary": (("point", "mode"), turn.imag),
+        "shape": (dimensions, turn.real.T if turned else turn.real),
+        "shape_imaginary": (dimensions, turn.imag.T if turned else turn.imag),
     }
     found = read(tmp_path, "modes.nc", netcdf(variables))
     np.testing.assert_allclose([found.shapes["a"], found.shapes["b"]], [[-3.0], [4.0]], rtol=1e-14)

@@ -140,6 +140,24 @@ def test_a_complex_mode_of_any_phase_is_its_normal_mode(
     )
 
 
+def test_complex_modes_of_six_directions_and_pairs_of_conjugates_are_read() -> None:
+    turn = np.exp(2.0j)
+    rows_of = {4: np.arange(1.0, 7.0) * turn, 9: -np.arange(7.0, 13.0) * turn}
+    modal_a = 100.0j * 4.0 * turn**2
+    text = ""
+    for number, way in ((1, complex), (2, np.conj)):
+        parts = [part for each in (-1.0 + 50.0j, modal_a, 0j) for part in (way(each).real, way(each).imag)]
+        values = {node: way(row) if way is np.conj else row for node, row in rows_of.items()}
+        text += nodal_data(number, parts, values, analysis=3)
+    found = read(text)
+    assert tuple(found.shapes) == tuple(
+        f"{node}.{way}" for node in (4, 9) for way in ("x", "y", "z", "rx", "ry", "rz")
+    )
+    np.testing.assert_allclose(np.abs(rows(found)[:, 0]), np.arange(1.0, 13.0) / 2.0, rtol=1e-4)
+    assert found.shapes["9.rz"][0] == max(found.shapes.values())[0]
+    assert found.remarks[0] == "Modes of negative frequency are left out (1)."
+
+
 def test_a_normal_mode_with_complex_values_is_made_real_and_its_error_is_told() -> None:
     values = SHAPES[0] + 0.05j * SHAPES[1]
     found = read(normal(1, values, mass=4.0))
@@ -152,6 +170,14 @@ def test_a_normal_mode_with_complex_values_is_made_real_and_its_error_is_told() 
     )
     turns = [np.linalg.norm((flat * np.exp(1j * angle)).imag) for angle in np.linspace(0.0, np.pi, 500)]
     assert part * np.linalg.norm(flat) <= min(turns)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1e160, 1e300])
+def test_complex_shapes_of_any_size_are_made_real(scale: float) -> None:
+    found = read(normal(1, SHAPES[0] * np.exp(1j) * scale))
+    np.testing.assert_allclose(np.abs(rows(found)[:, 0]) / scale, np.abs(SHAPES[0].ravel()), rtol=1e-4)
+    with pytest.raises(UsageError, match="3.x: expected finite numbers, got another in mode 1"):
+        read(normal(1, SHAPES[0] * 1e300, mass=1e-30))
 
 
 def test_a_mode_far_from_real_is_refused_by_its_number() -> None:
@@ -245,6 +271,10 @@ def test_values_that_are_zero_in_all_modes_are_no_points() -> None:
         (f"{MARK}    55\nNONE\n", "expected the end of dataset 55 .-1., got the end of the file"),
         (f"{MARK}  none\n{MARK}", "line 2: expected the number of a dataset, got '  none'"),
         ("none\n", "line 1: expected the mark of a dataset"),
+        (
+            f"{MARK}   164\n         1\n{MARK}" + normal(1, SHAPES[0]),
+            "dataset 164: expected two lines, got fewer",
+        ),
         (units(0.0) + normal(1, SHAPES[0]), "line 4: dataset 164: expected factors > 0"),
     ],
 )

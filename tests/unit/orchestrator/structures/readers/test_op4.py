@@ -187,6 +187,18 @@ def test_a_string_that_leaves_its_column_is_refused() -> None:
             read(bytes(content), Wanted({"stiffness": "K"}))
 
 
+@pytest.mark.parametrize("at", [84, 92])  # the length and the row of the first string
+@pytest.mark.parametrize("value", [2**61 + 3, 2**63 - 1, -(2**63), 0, 3])
+def test_long_words_that_overflow_are_refused(at: int, value: int) -> None:
+    content = bytearray(op4_binary({"K": np.eye(2)}, "big", word=8))
+    assert struct.unpack_from("<qq", content, 84) == (2, 1)
+    struct.pack_into("<q", content, at, value)
+    with pytest.raises(
+        UsageError, match=r"K: column 1: expected (a string within the column|rows 1 to 2), got"
+    ):
+        read(bytes(content), Wanted({"stiffness": "K"}))
+
+
 def test_a_text_line_with_wider_numbers_is_refused_with_its_line() -> None:
     content = op4_text({"K": np.eye(2)}).replace(b" 1.0000000000000000E+00", b" 1.00000000000000000E+01", 1)
     with pytest.raises(

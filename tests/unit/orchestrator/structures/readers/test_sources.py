@@ -38,7 +38,8 @@ def refusal(sources: Sources) -> str:
 
 def test_each_matrix_has_its_file(folder: Path) -> None:
     got = read_matrices(Sources("k.mtx", "m.mtx", "c.mtx", freedoms="freedoms.csv", folder=folder))
-    for one, matrix in ((got.stiffness, K), (got.mass, M), (got.damping, C)):
+    matrices: tuple[Any, ...] = (got.stiffness, got.mass, got.damping)
+    for one, matrix in zip(matrices, (K, M, C), strict=True):
         np.testing.assert_array_equal(one.toarray(), matrix)
     assert got.freedoms == ("1.z", "2.z", "3.z", "4.z")
     assert got.coordinates is not None
@@ -49,6 +50,7 @@ def test_each_matrix_has_its_file(folder: Path) -> None:
 
 def test_one_file_has_all_matrices_and_freedoms_are_numbered(folder: Path) -> None:
     got = read_matrices(Sources(file="all.npz", folder=folder))
+    assert got.damping is not None
     np.testing.assert_array_equal(got.damping.toarray(), C)
     assert (got.freedoms, got.coordinates) == (("1", "2", "3", "4"), None)
     assert read_matrices(Sources("k.mtx", "m.mtx", folder=folder)).damping is None
