@@ -178,8 +178,8 @@ class _Reduction:
             vectors = found  # points that depend on each other leave room for natural modes
         if max(rigid, 1) + found > count or rigid > count:
             raise UsageError(
-                f"expected at least {max(rigid, 1) + found} modes ({rigid} of a rigid body, {found} residual vectors, 1 "
-                f"natural one), got {count}."
+                f"expected at least {max(rigid, 1) + found} modes ({rigid} of a rigid body, {found} residual vectors, "
+                f"1 natural one), got {count}."
             )
         return self._kept(squares, shapes, rest, away, band, count)
 
