@@ -34,8 +34,10 @@ SEVERAL: Mapping[str, Callable[[Mapping[str, Any]], bytes]] = {
         for layout in nastran_files.LAYOUTS
     },
 }
-WRITERS = {**matrix_files.ONE_MATRIX, **SEVERAL}
-DIGITS = {".sti": 1e-13, "text.op4": 1e-15}
+NASTRAN = "model.pch"
+"""A file of DMIG cards, which names its degrees of freedom; its table may have them in another order."""
+KINDS = sorted({*matrix_files.ONE_MATRIX, *SEVERAL, NASTRAN})
+DIGITS = {".sti": 1e-13, ".pch": 1e-9, "text.op4": 1e-15}
 """Relative rounding of texts with fewer digits than the numbers, by the end of the name."""
 INSERTED = (
     b" ", b"\n", b"\r", b"\t", b"\0", b"%", b"#", b",", b"-", b"9" * 30, b"1e999", b"nan", b"0x1p3", b"\x1b[31m",
@@ -79,7 +81,9 @@ def _names(draw: random.Random, size: int) -> tuple[list[str], str]:
 
 def _named(name: str, written: dict[str, Any]) -> dict[str, Any]:
     """Return the matrices by the names of a file; Nastran's have eight characters at most."""
-    return {"KAA": written["stiffness"], "MAA": written["mass"]} if name.endswith(".op4") else written
+    return (
+        {"KAA": written["stiffness"], "MAA": written["mass"]} if name.endswith((".op4", NASTRAN)) else written
+    )
 
 
 def _odd_table(draw: random.Random) -> str:
@@ -131,20 +135,30 @@ def _unsound(found: Matrices) -> str | None:
     return None
 
 
+def _contents(name: str, written: dict[str, Any], names: list[str]) -> tuple[dict[str, bytes], Sources]:
+    """Return the files of matrices by name, and their description."""
+    if name == NASTRAN:
+        cards = [nastran_files.dmig(each, one, names) for each, one in _named(name, written).items()]
+        return {name: b"".join(cards)}, Sources(file=name, freedoms="freedoms.csv")
+    if name in SEVERAL:
+        return {name: SEVERAL[name](_named(name, written))}, Sources(file=name, freedoms="freedoms.csv")
+    contents = {f"{role}_{name}": matrix_files.ONE_MATRIX[name](one) for role, one in written.items()}
+    stiffness, mass = contents
+    return contents, Sources(stiffness, mass, freedoms="freedoms.csv")
+
+
 def check(seed: int) -> str | None:
     """Read the matrices of one structure."""
     draw = random.Random(seed)
     chance = np.random.default_rng(seed)
-    name, size = draw.choice(sorted(WRITERS)), draw.randint(1, 12)
+    name, size = draw.choice(KINDS), draw.randint(1, 12)
     written = {role: matrix_files.drawn_matrix(chance, size) for role in ("stiffness", "mass")}
     names, table = _names(draw, size)
-    if name in SEVERAL:
-        contents = {name: SEVERAL[name](_named(name, written))}
-        sources = Sources(file=name, freedoms="freedoms.csv")
-    else:
-        contents = {f"{role}_{name}": matrix_files.ONE_MATRIX[name](one) for role, one in written.items()}
-        stiffness, mass = contents
-        sources = Sources(stiffness, mass, freedoms="freedoms.csv")
+    if name == NASTRAN:
+        names.sort(key=lambda one: int(one.partition(".")[0]))
+        for matrix in written.values():
+            matrix[np.diag_indices(size)] += 1.0  # a degree of freedom without a card is not there
+    contents, sources = _contents(name, written, names)
     contents["freedoms.csv"] = table.encode()
     kind = draw.random()
     if kind > 0.4:

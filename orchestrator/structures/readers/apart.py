@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.structures.readers.refusal import LONGEST_REFUSAL,
 SECONDS, RATE = 10.0, 1e6
 """Limit of the processor time: a constant, s, plus the size of the file over a rate, bytes/s.
 
-The slowest files, texts with an error at their end, are read at some 2e7 bytes/s.
+The slowest files, texts of one line and models of nodes alone, are read at some 4e6 bytes/s.
 """
 MEMORY, PER_BYTE = 2 << 30, 64
 """Limit of the memory, bytes: a constant for the expansion of small files, plus this many per byte of the file."""

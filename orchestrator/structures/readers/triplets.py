@@ -59,7 +59,7 @@ def _read(content: bytes, start: int, kind: np.dtype[Any], expected: str) -> Ent
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "loadtxt: input contained no data")
             warnings.filterwarnings("error", category=DeprecationWarning)  # a fraction as a row
-            text = io.TextIOWrapper(stream, encoding="latin-1", newline=None)
+            text = io.TextIOWrapper(stream, encoding="ascii", newline="\n")
             found = np.loadtxt(text, dtype=kind, comments=None, ndmin=1)
     except (ValueError, DeprecationWarning) as problem:
         for line, fields in _lines(content, start):

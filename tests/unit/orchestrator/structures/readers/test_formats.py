@@ -137,6 +137,8 @@ WRONG: Mapping[str, tuple[str, bytes, str]] = {
     "beyond numbers": ("a.mtx", HEAD + b"2 2 2\n1 1 1e999\n2 2 1\n", "line 3: expected a finite number"),
     "twice": ("a.mtx", HEAD + b"2 2 3\n1 1 1\n2 1 1\n1 2 1\n", "line 5: expected each entry once, got '1 2 1'"),
     "a cut end": ("a.mtx", HEAD + b"2 2 2\n1 1 1\n2 2 1.2", "expected a line break at the end, got none"),
+    "old line ends": ("a.mtx", HEAD + b"2 2 2\n1 1 1\r2 2 nan\n", "line 3: expected a row, a column and a number, got"),
+    "another space": ("a.mtx", HEAD + b"2 2 2\n1 1 1\n2 2\xa01\n", "line 4: expected a row, a column"),
     "a skew diagonal": ("a.mtx", HEAD.replace(b"sym", b"skew-sym") + b"1 1 1\n1 1 1\n", "line 3: expected 0 on"),
     "names in one": ("a.mtx", HEAD + b"1 1 1\n1 1 1\n", ""),
     "an archive of text": ("a.npz", npz({"K": np.array([["a"]])}), "expected real numbers, got <U1"),
