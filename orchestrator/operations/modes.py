@@ -26,7 +26,7 @@ class ShowModes(Operation):
         Path,
         Positional(
             help="Matrices (.mtx, .npz, .mat, .sti, .op4, .pch), modes (.toml, .csv, .nc, .uff), or a scene (.toml).",
-            python="file: PathLike | Scene",
+            python="file: SceneLike",
         ),
     ]
     stiffness: Annotated[
