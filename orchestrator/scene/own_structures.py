@@ -194,7 +194,7 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: Mapp
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
     )
-    return replace(found, **tolerance) if table.modes == "auto" else found
+    return replace(found, tolerance=tolerance["tolerance"]) if table.modes == "auto" and tolerance else found
 
 
 def _of_modes(
