@@ -18,11 +18,11 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models.modes import MOST_POINTS, POINT_NAME, ModesBody
+from vibroimpact.orchestrator.scene.body_models.structure import StructureBody
 from vibroimpact.orchestrator.scene.changes import changed_document
 from vibroimpact.orchestrator.scene.file import parse_scene_toml, read_scene_text
 from vibroimpact.orchestrator.scene.own_structures import apart_from_modes, request_of
-from vibroimpact.orchestrator.scene.body_models.modes import MOST_POINTS, POINT_NAME, ModesBody
-from vibroimpact.orchestrator.scene.body_models.structure import StructureBody
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.structures.find import find_modes
 from vibroimpact.orchestrator.structures.modes import Modes
