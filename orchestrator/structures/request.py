@@ -13,7 +13,7 @@ Weights = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a body by matrices says.
+    """The keys of a body by matrices.
 
     Attributes
     ----------
