@@ -17,9 +17,11 @@ NOTHING_NEW = 1e-14
 """Length of a new vector over the largest flexibility, below which the vector is rounding."""
 LEAST = 1e-12
 """Flexibility of a mode over the largest, below which rounding hides the mode."""
+AGREE = 1e-3
+"""Difference of both squares of a frequency, above which the strain energy is not that of the mode."""
 DEPENDENT = 1e-13
 """Eigenvalue of the correlations of a block, below which its vectors are dependent."""
-SURPLUS = 160
+SURPLUS = 320
 """Vectors beyond four for each mode, after which the process has failed."""
 _LOOKS = 3
 """Blocks after a fresh random one, before the modes count as complete."""
@@ -55,12 +57,14 @@ class Lanczos:
         most = 4 * count + SURPLUS
         self._converge(count, most)
         found = self._ritz()[0][:count]
-        while self._append(self._fresh()):
+        while True:
+            grown = self._append(self._fresh())
             for _ in range(_LOOKS):
                 self._step(most)
             self._converge(count, most)
             before, found = found, self._ritz()[0][:count]
-            if len(found) == len(before) and np.allclose(found, before, rtol=1e-9, atol=0.0):
+            is_same = len(found) == len(before) and np.allclose(found, before, rtol=1e-9, atol=0.0)
+            if is_same and (grown == 0 or self._done < self._basis.shape[1]):
                 break
         values, ways = self._ritz()
         shapes = self._basis[:, : self._done] @ ways[:, :count]
@@ -72,6 +76,9 @@ class Lanczos:
         """Return w^2 from the flexibility of slow modes, and from the strain energy of fast ones: where it is exact."""
         energies, terms = self._flexibility.energies(shapes)
         is_fast = terms / np.maximum(energies, 1e-300) < self._largest / values
+        is_fast &= (
+            np.abs(energies * values - 1.0) < AGREE
+        )  # motions without mass may add energy to a fast mode
         return np.asarray(np.where(is_fast, energies, 1.0 / values))
 
     def _converge(self, count: int, most: int) -> None:

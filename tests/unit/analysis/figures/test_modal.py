@@ -53,8 +53,8 @@ def gaps(figure: Figure, panel: int, line: int) -> int:
 def test_a_portrait_of_a_chain_has_its_masses_and_its_modes_with_a_gap_at_each_impact() -> None:
     figure = figures.draw(moving(), "portrait")
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == [
-        "displacement 1",
-        "displacement 2",
+        "displacement of mass 1",
+        "displacement of mass 2",
     ]
     assert [text.get_text() for text in figure.axes[1].get_legend().get_texts()] == ["mode 1", "mode 2"]
     assert gaps(figure, 0, 0) == gaps(figure, 1, 0) == 2

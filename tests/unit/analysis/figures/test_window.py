@@ -156,7 +156,7 @@ def test_panels_are_in_the_order_of_the_scene_and_name_quantity_index_and_unit()
     figure = figures.draw(chain())
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "displacement (m)",
-        "velocity 3 (m/s)",
+        "velocity of mass 3 (m/s)",
         "contact force (N)",
     ]
 
@@ -165,7 +165,7 @@ def test_quantities_without_units_have_panels_of_their_own() -> None:
     figure = figures.draw(chain(units="nondimensional"))
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "displacement (-)",
-        "velocity 3 (-)",
+        "velocity of mass 3 (-)",
         "contact force (-)",
     ]
 

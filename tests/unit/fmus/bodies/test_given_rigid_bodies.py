@@ -69,18 +69,14 @@ def test_random_given_modes_with_links_meet_their_equation(seed: int) -> None:
     parts = []
     for _ in range(random.integers(1, 4)):
         count = int(random.integers(1, 6))
-        natural = np.where(random.random(count) < 0.5, 0.0, 10.0 ** random.uniform(-1, 2, count))
-        none = np.zeros(count)
-        parts.append(
-            ModesPart(
-                natural, none, np.zeros((count, count)), random.normal(size=(3, count)), none, none, none
-            )
-        )
+        natural = np.where(random.random(count) < 0.5, 0.0, 10.0 ** random.uniform(-1, 2, count)).tolist()
+        none, shapes = [0.0] * count, random.normal(size=(3, count))
+        parts.append(ModesPart(natural, none, np.zeros((count, count)), shapes, none, none, none))
     ends = [None, *((part, place) for part in range(len(parts)) for place in (1, 2, 3))]
-    joints = [
-        Joint(*(ends[each] for each in random.integers(0, len(ends), 2)), 10.0 ** random.uniform(-2, 3), 0.0)
-        for _ in range(random.integers(0, 6))
-    ]
+    joints = []
+    for _ in range(random.integers(0, 6)):
+        one, other = random.integers(0, len(ends), 2)
+        joints.append(Joint(ends[one], ends[other], 10.0 ** random.uniform(-2, 3), 0.0))
     found = Assembly(parts, joints)
     stiffness = sum(
         (each.stiffness * np.outer(each.shape, each.shape) for each in found.elements),

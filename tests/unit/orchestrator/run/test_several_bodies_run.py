@@ -338,7 +338,7 @@ def test_messages_of_the_engine_have_the_names_of_the_scene() -> None:
         {"at": "a", "side": "lower", "position": -1.0, "restitution": 0.5},
     ]
     said = str(run(stop=stops, forcing=TABLES["forcing"] | {"amplitude": 0.1}).message.item())
-    assert "stop[1] and stop[3]: expected room between their stops, of which one moves" in said
+    assert "stop[1], stop[3]: expected room between their stops, of which one moves" in said
     scene = Scene.from_dict(TABLES | {"stop": stops})
     assert in_keys_of(scene, "contact[4].position: expected room between it and contact[3]") == (
         "contact[1].clearance: expected room between it and stop[3]"

@@ -48,10 +48,11 @@ def test_frequencies_of_a_hermite_cantilever_converge_to_those_of_the_beam_with_
 
 
 def test_a_chain_as_matrices_has_the_impacts_of_the_chain() -> None:
+    record = {"transient_periods": 0, "recorded_periods": 30}
     settings = {
         "forcing": {"amplitude": [0.0, 0.0, 1.0], "angular_frequency": 1.3},
         "stop": [{"mass": 3, "position": 0.3, "restitution": 0.7}],
-        "record": {"transient_periods": 0, "recorded_periods": 30},
+        "record": record,
     }
     body = {"kind": "chain", "masses": MASSES, "stiffnesses": SPRINGS[:3], "dampings": DASHPOTS[:3]}
     one = vi.run(Scene.from_dict({"body": body, **settings}))
@@ -63,7 +64,7 @@ def test_a_chain_as_matrices_has_the_impacts_of_the_chain() -> None:
                 "body": modes.table(),
                 "forcing": {"at": end, "amplitude": 1.0, "angular_frequency": 1.3},
                 "stop": [{"at": end, "position": 0.3, "restitution": 0.7}],
-                "record": {**settings["record"], "observed": [end]},
+                "record": {**record, "observed": [end]},
             }
         )
     )
@@ -188,7 +189,8 @@ def changed(name: str, place: tuple[int, int], value: float) -> Matrices:
     base = chain_matrices(MASSES, SPRINGS, DASHPOTS)
     found = {each: getattr(base, each).toarray() for each in parts}
     found[name][place] = value
-    return Matrices(*(sparse.csc_array(found[each]) for each in parts), base.freedoms)
+    stiffness, mass, damping = (sparse.csc_array(found[each]) for each in parts)
+    return Matrices(stiffness, mass, damping, base.freedoms)
 
 
 @pytest.mark.parametrize(
