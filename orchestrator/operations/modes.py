@@ -59,7 +59,7 @@ class ShowModes(Operation):
         str | None,
         Option(
             help="Number of modes, 1 to 64, residual vectors among them; or auto. By default 20.",
-            python='modes: int | Literal["auto"] | None = None',
+            python="modes: int | Literal['auto'] | None = None",
         ),
     ] = None
     tolerance: Annotated[

@@ -13,7 +13,7 @@ Weights = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """The request of a body by matrices.
+    """The keys of a body by matrices.
 
     Attributes
     ----------

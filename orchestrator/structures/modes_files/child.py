@@ -11,19 +11,24 @@ import numpy as np
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.structures.modes import Modes
-from vibroimpact.orchestrator.structures.modes_files import csv_table, netcdf, toml_table, universal
+from vibroimpact.orchestrator.structures.modes_files.csv_table import read as read_csv
 from vibroimpact.orchestrator.structures.modes_files.given import GivenModes, checked_modes
+from vibroimpact.orchestrator.structures.modes_files.netcdf import FIRST_BYTES
+from vibroimpact.orchestrator.structures.modes_files.netcdf import read as read_netcdf
+from vibroimpact.orchestrator.structures.modes_files.toml_table import read as read_toml
+from vibroimpact.orchestrator.structures.modes_files.universal import SIGNATURE
+from vibroimpact.orchestrator.structures.modes_files.universal import read as read_universal
 from vibroimpact.orchestrator.structures.readers.child import unpacked_content
 
 Reader = Callable[[bytes], GivenModes]
 SUFFIXES: Mapping[str, Reader] = {
-    ".toml": toml_table.read,
-    ".csv": csv_table.read,
-    ".tsv": csv_table.read,
-    ".txt": csv_table.read,
-    ".nc": netcdf.read,
-    ".uff": universal.read,
-    ".unv": universal.read,
+    ".toml": read_toml,
+    ".csv": read_csv,
+    ".tsv": read_csv,
+    ".txt": read_csv,
+    ".nc": read_netcdf,
+    ".uff": read_universal,
+    ".unv": read_universal,
 }
 """Readers by the end of a file's name, where its first bytes do not tell."""
 
@@ -36,10 +41,10 @@ def read(path: str, options: Mapping[str, Any]) -> tuple[dict[str, Any], list[An
 
 
 def _reader_of(name: str, content: bytes) -> Reader:
-    if universal.SIGNATURE.match(content):
-        return universal.read
-    if content.startswith(netcdf.FIRST_BYTES):
-        return netcdf.read
+    if SIGNATURE.match(content):
+        return read_universal
+    if content.startswith(FIRST_BYTES):
+        return read_netcdf
     found = SUFFIXES.get(Path(name).suffix)
     if found is None:
         raise UsageError(f"expected a file of modes ({', '.join(SUFFIXES)}), got another kind.")

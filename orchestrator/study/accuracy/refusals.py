@@ -9,7 +9,7 @@ from numbers import Real
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models import ModesBody, StructureBody
 from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
@@ -75,8 +75,8 @@ def refuse_several_bodies(scene: Scene) -> None:
         )
     if scene.is_one_body and isinstance(scene.body, StructureBody):
         raise UsageError(
-            f"{scene.source}: body: expected one body, which has other ways to be simulated, got several. "
-            "They run fused, and are exact between impacts."
+            f"{scene.source}: body: expected one body, which has other ways to be simulated, got {_kind(scene.body)}. "
+            f"They run fused, and are exact between impacts.{_of_reductions(scene.body)}"
         )
 
 
@@ -106,4 +106,21 @@ def _refuse_tolerance(tolerance: float, least: float, why: str) -> None:
             Argument("tolerance"),
             f": expected a relative error of {least:.1e} or more, {why}, got {tolerance:g}.",
         )
+    )
+
+
+def _kind(body: StructureBody) -> str:
+    return "given modes" if all(isinstance(part, ModesBody) for part in body.parts) else "several"
+
+
+def _of_reductions(body: StructureBody) -> str:
+    """Return a sentence on the errors of bodies by matrices; empty without them."""
+    origins = {name: getattr(part, "origin", None) for name, part in zip(body.names, body.parts, strict=True)}
+    errors = [
+        f"{each.error:.2g} of {name}" for name, each in origins.items() if each and each.error is not None
+    ]
+    return (
+        f" Reduced matrices: relative error {', '.join(errors)} of the flexibility at the points."
+        if errors
+        else ""
     )
