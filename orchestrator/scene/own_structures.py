@@ -125,8 +125,9 @@ def _tolerance(document: Mapping[str, Any]) -> dict[str, float]:
     """Return the tolerance of a scene for `modes = "auto"`; none that the checks of the scene refuse."""
     execution = document.get("execution")
     given = execution.get("tolerance") if isinstance(execution, dict) else None
-    is_valid = isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE
-    return {"tolerance": float(given)} if is_valid else {}
+    if isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE:
+        return {"tolerance": float(given)}
+    return {}
 
 
 def _of_matrices(
