@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.replay import fit_replay, opened_replays
 from vibroimpact.orchestrator.replay.fit import fit_keys
 from vibroimpact.orchestrator.scene import Scene
 
-TIME = 2e-5 * np.arange(1500)
+TIME: Floats = np.asarray(2e-5 * np.arange(1500), dtype=np.float64)
 MODE = beam_modes("clamped_clamped", 1)
 GIVEN = f"""
 [[body]]

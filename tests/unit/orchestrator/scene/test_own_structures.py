@@ -14,6 +14,7 @@ import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.structures import find
 from vibroimpact.orchestrator.structures.find import find_modes
 from vibroimpact.orchestrator.structures.modes import Modes
@@ -60,6 +61,7 @@ def write(folder: Path, **tables: Any) -> Path:
 
 
 def modes_of(scene: Scene) -> Any:
+    assert isinstance(scene.body, StructureBody)
     return scene.body.tables()["body[1]"]
 
 
