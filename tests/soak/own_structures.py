@@ -101,7 +101,10 @@ def _scene(random: np.random.Generator, drawn: DrawnMatrices, keys: Tables) -> t
     tables: Tables = {"scene": {"units": "SI"}, "body": [own]}
     if random.random() < 0.6:
         ball = {"name": "ball", "mass": mass * number(random, 0.1, 3.0)}
-        ball |= {"stiffness": pick(random, 0.0, stiffness), "velocity_start": speed * number(random, -1.0, 1.0)}
+        ball |= {
+            "stiffness": pick(random, 0.0, stiffness),
+            "velocity_start": speed * number(random, -1.0, 1.0),
+        }
         tables["body"].append(ball)
         between = pick(random, [pick(random, *places), "ball"], ["ball", pick(random, *places)])
         contact = {"between": between, "clearance": length * number(random, 0.0, 0.3)}
@@ -111,11 +114,11 @@ def _scene(random: np.random.Generator, drawn: DrawnMatrices, keys: Tables) -> t
     if random.random() < 0.3:
         link = {"between": [pick(random, *places), "ground"]} | _link(random, drawn)
         tables.setdefault("link", []).append(link)
-    limited = {(pick(random, *places), pick(random, "upper", "lower")) for _ in range(random.integers(0, 3))}
+    sides = pick(random, (), ("upper",), ("lower",), ("lower", "upper"))
     stops = [
-        {"at": at, "side": side, "position": length * number(random, 0.02, 0.5) * (1 if side == "upper" else -1)}
+        {"at": pick(random, *places), "side": side, "position": length * number(random, 0.02, 0.5) * sign}
         | _law(random, drawn)
-        for at, side in sorted(limited)
+        for side, sign in zip(sides, (1.0 if sides == ("upper",) else -1.0, 1.0), strict=False)
     ]
     tables |= {"stop": stops} if stops else {}
     force = {"signal": "constant", "amplitude": length * stiffness * number(random, -2.0, 2.0)}
@@ -133,9 +136,7 @@ def _law(random: np.random.Generator, drawn: DrawnMatrices) -> Tables:
     """Return the keys of a law, as hard beside the structure as a law of nondimensional bodies is."""
     found, (stiffness, mass) = law_of(random), drawn.unit
     for key, unit in (("stiffness", stiffness), ("damping", np.sqrt(stiffness * mass))):
-        if key in found and found.get("law") == "kelvin_voigt":
-            found[key] = float(found[key] * unit)
-        elif key == "stiffness" and key in found:
+        if (key in found and found.get("law") == "kelvin_voigt") or (key == "stiffness" and key in found):
             found[key] = float(found[key] * unit)
     return found
 
@@ -195,10 +196,14 @@ def _modes_problem(random: np.random.Generator, drawn: DrawnMatrices) -> str | N
     if count > 64:
         return None
     given = Matrices(
-        *(matrix_files.sparse.csc_array(matrix) for matrix in (drawn.stiffness, drawn.mass)), None, drawn.names
+        *(matrix_files.sparse.csc_array(matrix) for matrix in (drawn.stiffness, drawn.mass)),
+        None,
+        drawn.names,
     )
     try:
-        found = reduce(given, {drawn.names[place]: {drawn.names[place]: 1.0} for place in places}, modes=count)
+        found = reduce(
+            given, {drawn.names[place]: {drawn.names[place]: 1.0} for place in places}, modes=count
+        )
     except UsageError as refusal:
         return f"refused with {count} modes: {refusal}"
     rigid = int((found.natural == 0.0).sum())
@@ -223,10 +228,14 @@ def _dense_problem(drawn: DrawnMatrices, found: Modes, places: list[int]) -> str
     worst = float((np.abs(own - inverse[:kept]) / own).max(initial=0.0) / own[0] * own.min(initial=np.inf))
     if worst > SQUARES:
         return f"squares of frequencies off by {worst:.3g}"
-    return _flexibility_problem(found, held, scale, [int(np.searchsorted(drawn.used, one)) for one in places], shift)
+    return _flexibility_problem(
+        found, held, scale, [int(np.searchsorted(drawn.used, one)) for one in places], shift
+    )
 
 
-def _flexibility_problem(found: Modes, held: Floats, scale: Floats, rows: list[int], shift: float) -> str | None:
+def _flexibility_problem(
+    found: Modes, held: Floats, scale: Floats, rows: list[int], shift: float
+) -> str | None:
     """Compare the flexibility of the points with a spring s M beside the structure, if no mode is left out."""
     if found.error is None or found.error > 0.0:
         return None

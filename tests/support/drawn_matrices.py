@@ -131,7 +131,9 @@ def _masses(random: np.random.Generator, elongations: Floats) -> Floats:
     return found
 
 
-def _damping(random: np.random.Generator, elongations: Floats, mass: Floats, unit: tuple[float, float]) -> Floats:
+def _damping(
+    random: np.random.Generator, elongations: Floats, mass: Floats, unit: tuple[float, float]
+) -> Floats:
     """Return a full damping matrix, or dashpots beside some springs, over unknowns that are used."""
     count = elongations.shape[1]
     size = pick(random, 1e-3, 0.02, 0.3) * np.sqrt(unit[0] * unit[1])
@@ -163,7 +165,9 @@ def keys_of_body(random: np.random.Generator, drawn: DrawnMatrices) -> dict[str,
     keys |= pick(random, {}, {"damping_ratio": 0.02})
     if random.random() < 0.3:
         factors = {"mass": 0.02 * drawn.natural, "stiffness": 0.01 / drawn.natural}
-        keys["rayleigh"] = pick(random, factors, {"mass": factors["mass"]}, {"stiffness": factors["stiffness"]})
+        keys["rayleigh"] = pick(
+            random, factors, {"mass": factors["mass"]}, {"stiffness": factors["stiffness"]}
+        )
     directions = sorted({drawn.names[place].rpartition(".")[2] for place in drawn.used.tolist()})
     keys |= pick(random, {}, {"base": pick(random, *directions)})
     points = drawn_points(random, drawn)
