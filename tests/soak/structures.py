@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from support.balances import energy_problem, limits_of, room_problem
 from support.cut_recordings import problem_of_cuts
 from support.drawn_forces import forced_structure, stop_motion
-from support.drawn_structures import ENERGIES, drawn_structure
+from support.drawn_structures import drawn_structure
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.naming import file_name_of
@@ -24,13 +25,8 @@ from vibroimpact.orchestrator.scene.body_models.structure import label_of
 CASES = 20_000
 SAMPLE = 6
 SECONDS = 20.0
-#: Largest error of the energy over the energy turned over; the second for power laws, each solved to 1e-10.
-TURNOVER, TURNOVER_POWER = 1e-9, 1e-7
-#: Largest way beyond a rigid stop, over the displacements and the clearance.
-BEYOND = 1e-11
 #: Rounding of a displacement, m.
 ROUNDING = 1e-11
-POWER = ("hertz", "hunt_crossley")
 #: Impacts that two forms share before their rounding parts them, and the largest difference of their times.
 SHARED, APART = 6, 1e-8
 #: Another rate of samples, 1/s, and impacts in all below which rounding is not multiplied to `FINAL` of the state.
@@ -54,8 +50,8 @@ def check(seed: int) -> str | None:
     found = vi.run(scene)
     return (
         _outcome_problem(tables, found)
-        or _energy_problem(tables, found)
-        or _room_problem(tables, scene, found)
+        or energy_problem(tables, found)
+        or room_problem(tables, scene, found)
         or _extremes_problem(scene, found)
         or _rounding_problem(tables, found)
         or (_repeats_problem(seed, tables, scene, found) if is_forced else _components_problem(tables, found))
@@ -68,35 +64,6 @@ def _outcome_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
     if outcome < ERROR or outcome == UNBOUNDED or (outcome == ERROR and moves and CRUSHED in message):
         return None
     return f"outcome {outcome}: {message}"
-
-
-def _limits(tables: dict[str, Any]) -> list[dict[str, Any]]:
-    return [*tables.get("stop", []), *tables.get("contact", [])]
-
-
-def _energy_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
-    kinetic, potential, work, loss, contact = (found[f"energy_{name}"].values for name in ENERGIES)
-    if not len(kinetic):
-        return None
-    energy = kinetic + potential
-    balance = energy - energy[0] - (work - work[0]) + (loss - loss[0]) + (contact - contact[0])
-    ways = (np.abs(np.diff(each)).sum() for each in (energy, work, loss, contact))
-    power = any(each.get("law") in POWER for each in _limits(tables))
-    size = float((kinetic + np.abs(potential)).max())
-    allowed = (TURNOVER_POWER if power else TURNOVER) * (size + sum(ways)) + 1e-14
-    worst = float(np.abs(balance).max())
-    return None if worst <= allowed else f"energy off by {worst:.3g}, of {allowed:.3g} allowed"
-
-
-def _room_problem(tables: dict[str, Any], scene: Scene, found: xr.Dataset) -> str | None:
-    for k, (stop, table) in enumerate(zip(scene.stops, _limits(tables), strict=True), start=1):
-        way = found[f"contact_displacement_{k}"].values
-        sign = 1.0 if stop.side == "upper" else -1.0
-        place = stop.position + stop_motion(table, found.time.values)
-        beyond = float((sign * (way - place)).max(initial=0.0))
-        if stop.law == "restitution" and beyond > BEYOND * (1.0 + np.abs(way).max(initial=0.0)):
-            return f"{beyond:.3g} beyond {scene.stop_keys[k - 1]}"
-    return None
 
 
 def _extremes_problem(scene: Scene, found: xr.Dataset) -> str | None:
@@ -120,7 +87,7 @@ def _extremes_problem(scene: Scene, found: xr.Dataset) -> str | None:
 
 def _rounding_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
     """Return the speed of impacts that rounding alone drives, of contacts that are not elastic."""
-    elastic = [k for k, each in enumerate(_limits(tables), start=1) if each.get("restitution") == 1.0]
+    elastic = [k for k, each in enumerate(limits_of(tables), start=1) if each.get("restitution") == 1.0]
     loses = ~np.isin(found.impact_contact.values, elastic)
     times = found.impact_time.values[loses & (found.impact_velocity.values < FAINTEST)]
     if not (times[MOST_FAINTEST:] - times[:-MOST_FAINTEST] < ONE_END).any():
@@ -130,7 +97,7 @@ def _rounding_problem(tables: dict[str, Any], found: xr.Dataset) -> str | None:
 
 def _bounces_for_ever(tables: dict[str, Any], found: xr.Dataset) -> bool:
     """Whether a run ended in impacts of elastic contacts, as low as the rounding of many impacts before left them."""
-    elastic = [k for k, each in enumerate(_limits(tables), start=1) if each.get("restitution") == 1.0]
+    elastic = [k for k, each in enumerate(limits_of(tables), start=1) if each.get("restitution") == 1.0]
     contacts, speeds = found.impact_contact.values[-LAST:], found.impact_velocity.values[-LAST:]
     return len(contacts) == LAST and bool(np.isin(contacts, elastic).all() and (speeds < FAINT).all())
 
