@@ -67,7 +67,8 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
 def apart_from_modes(document: Mapping[str, Any], changes: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the changes to make before bodies by files have their modes, and those of the modes themselves.
 
-    >>> apart_from_modes({"body": {"kind": "matrices"}}, ["body.modes=8", "body.frequencies[1]=20"])
+    >>> body = {"kind": "matrices", "mass": "m.mtx", "stiffness": "k.mtx"}
+    >>> apart_from_modes({"body": body}, ["body.modes=8", "body.frequencies[1]=20"])
     (['body.modes=8'], ['body.frequencies[1]=20'])
     """
     owners = {tuple(path) for path, body in _bodies(document) if any(_keys_of_files(body))}
