@@ -81,7 +81,8 @@ def request_of(document: Mapping[str, Any], name: str, folder: Path) -> Request 
 def apart_from_modes(document: Mapping[str, Any], changes: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the changes to make before bodies by files have their modes, and those of the modes themselves.
 
-    >>> apart_from_modes({"body": {"kind": "matrices"}}, ["body.modes=8", "body.frequencies[1]=20"])
+    >>> body = {"kind": "matrices", "mass": "m.mtx", "stiffness": "k.mtx"}
+    >>> apart_from_modes({"body": body}, ["body.modes=8", "body.frequencies[1]=20"])
     (['body.modes=8'], ['body.frequencies[1]=20'])
     """
     owners = {tuple(path) for path, body in _bodies(document) if any(_keys_of_files(body))}
