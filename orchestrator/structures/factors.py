@@ -17,7 +17,9 @@ from vibroimpact.orchestrator.structures.ordering import elimination_order
 BYTES_PER_ENTRY = 10
 """Memory of an entry of SuperLU's factors, bytes: 8 and its share of indices, measured for solids and beams."""
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
-"""Sum over the moduli of its terms, below which it is rounding; a motion of such a strain energy is rigid."""
+"""Sum over the moduli of its terms, below which it is rounding."""
+DIGITS = 5e-14
+"""Strain energy over the moduli of its terms, below which a motion is rigid: rounding of the 14 digits of CalculiX."""
 CLEARLY_HELD = 1e-11
 """Eigenvalue of a stiffness with a diagonal of 1, above which no motion is rigid."""
 SHIFTS = (1e-14, 1e-11, 1e-8)
@@ -97,10 +99,10 @@ class Flexibility:
         for shift in SHIFTS:
             motions, energies = self._soft_motions(shift)
             lowest = float(energies.min(initial=0.0))
-            if -4.0 * lowest > max(shift, ROUNDING):
+            if -4.0 * lowest > max(shift, DIGITS):
                 continue
-            rounding = max(ROUNDING, -8.0 * lowest)
-            if rounding > ROUNDING:
+            rounding = max(DIGITS, -8.0 * lowest)
+            if rounding > DIGITS:
                 self.remarks += (
                     f"The stiffness has few digits: rigid-body modes have {rounding:.0e} of the energy of its terms.",
                 )
@@ -126,7 +128,7 @@ class Flexibility:
             _, ways = np.linalg.eigh(moves.T @ (self._matrix @ moves))
             moves = moves @ ways
             energies = self._energies(moves)
-            found = int((energies <= ROUNDING).sum())
+            found = int((energies <= DIGITS).sum())
             full = found == moves.shape[1] < count
             if full and found > MOST_RIGID:
                 raise UsageError(f"expected at most {MOST_RIGID} rigid-body modes, got more.")

@@ -23,6 +23,8 @@ BAND = 10.0
 """Band of `modes = "auto"` without a band: this many times the lowest elastic natural frequency."""
 SHARE_OF_HIGHEST = 0.5
 """Band of a given number of modes: this share of the highest natural frequency that is kept."""
+SAID = 1e-6
+"""Share of the flexibility of a point, above which a remark says that it is left out."""
 
 
 def reduce(
@@ -164,6 +166,8 @@ class _Reduction:
         self._deflections = self._flexibility(loads)
         self._static = np.maximum((loads * self._deflections).sum(axis=0), 0.0)
         self._rigid = self._flexibility.rigid
+        inertia = (self._deflections * (self._mass @ self._deflections)).sum(axis=0)
+        self._slowest = float((inertia / np.where(self._static > 0.0, self._static, np.inf)).max(initial=0.0))
 
     def of(self, count: int, band: float | None) -> _Found:
         """Return a number of modes, residual vectors among them."""
@@ -222,7 +226,7 @@ class _Reduction:
         heavy = self._mass @ one, self._mass @ two
         moments = self._loads.T @ one, one.T @ heavy[0], one.T @ heavy[1], two.T @ heavy[1]
         first, second, third, fourth = (0.5 * (each + each.T) for each in moments)
-        return Rest((first, second, third, fourth), self._static), one
+        return Rest((first, second, third, fourth), self._static, self._slowest), one
 
     def _kept(
         self,
@@ -245,6 +249,12 @@ class _Reduction:
             kept.append(away @ weights)
         error = rest.error(highest, self._residual)
         remarks: tuple[str, ...] = ()
+        massless = rest.without_mass()
+        if massless > SAID:
+            error = max(error, massless)
+            remarks += (
+                f"{100.0 * massless:.2g} % of the flexibility of a point has no mass, and is left out.",
+            )
         if count is not None and len(natural) < count:
-            remarks = (f"{len(natural)} of {count} modes are kept: the structure has no more.",)
+            remarks += (f"{len(natural)} of {count} modes are kept: the structure has no more.",)
         return _Found(natural, np.hstack(kept), vectors, error, remarks)

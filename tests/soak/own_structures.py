@@ -6,6 +6,7 @@ Energy balances, and nothing is beyond a rigid stop. Every other structure has t
 from __future__ import annotations
 
 import re
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from unittest.mock import patch
 import numpy as np
 import tomli_w
 from scipy import linalg
+from scipy.sparse import SparseEfficiencyWarning
 from support import matrix_files, nastran_files
 from support.balances import energy_problem, room_problem
 from support.drawn_matrices import EXACT_DECADES, DrawnMatrices, Floats, drawn_matrices, keys_of_body
@@ -40,9 +42,11 @@ REFUSALS = {
     "tolerance": r"expected a tolerance that 64 modes meet",
     "many": r"expected at most 64 rigid-body modes",
     "loose": r"expected mass or stiffness for each motion",
-    "still": r"still",
+    "whole": r"expected at most 64 modes in all",
 }
 """Refusals of structures that are none of a fault of the program, or of its input."""
+STILL = "expected the shape of a contact that can move"
+"""End of a run with a stop at a point that no kept mode moves."""
 PERIODS_LOW, PERIODS_HIGH, SAMPLES = 8.0, 150.0, 60.0
 """Periods of the lowest and of the highest mode in a run at most, and samples of a run."""
 SQUARES, FLEXIBILITY = 1e-8, 1e-7
@@ -53,7 +57,9 @@ def check(seed: int) -> str | None:
     """Return the fault of a structure of a seed."""
     random = np.random.default_rng(seed)
     drawn, folder = drawn_matrices(random), Path.cwd()
-    keys = keys_of_body(random, drawn) | _written(random, drawn)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SparseEfficiencyWarning)  # of many diagonals
+        keys = keys_of_body(random, drawn) | _written(random, drawn)
     tables, length = _scene(random, drawn, keys)
     (folder / "scene.toml").write_text(tomli_w.dumps(tables))
     with patch.dict("os.environ", {CACHE_VARIABLE: str(folder / "cache")}):
@@ -183,6 +189,8 @@ def _run_problem(tables: Tables, scene: Scene, drawn: DrawnMatrices, length: flo
     scene = scene.with_values(timed)
     found = vi.run(scene)
     outcome = int(found.outcome)
+    if outcome == ERROR and STILL in str(found.message.item()):
+        return None
     if outcome >= ERROR and outcome != UNBOUNDED:
         return f"outcome {outcome}: {found.message.item()}"
     least = 1e-14 * drawn.unit[0] * length**2

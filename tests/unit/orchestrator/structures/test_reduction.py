@@ -261,3 +261,31 @@ def test_random_structures_of_springs_have_the_modes_of_dense_matrices(seed: int
     )
     assert found.natural**2 == pytest.approx(exact, rel=1e-9, abs=1e-11 * exact.max())
     assert (found.natural == 0.0).sum() == (exact < 1e-10 * exact.max()).sum()
+
+
+def test_flexibility_without_mass_at_a_point_is_no_mode_and_is_told() -> None:
+    stiffness = sparse.csc_array([[3.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 1.5]])
+    given = Matrices(stiffness, sparse.csc_array(np.diag([1.0, 2.0, 0.0])), None, ("1.x", "2.x", "3.x"))
+    found = reduce(given, {"tip": {"3.x": 1.0}}, modes=3)
+    condensed = np.array([[3.0, -1.0], [-1.0, 3.0 - 1.0 / 1.5]])
+    squares = scipy.linalg.eigh(condensed, np.diag([1.0, 2.0]), eigvals_only=True)
+    np.testing.assert_allclose(found.natural**2, squares, rtol=1e-13)
+    whole = np.linalg.inv(stiffness.toarray())[2, 2]
+    assert found.error == pytest.approx(1.0 / 1.5 / whole, rel=1e-12)
+    assert modal_flexibility(found, 0.0)[0, 0] == pytest.approx(whole - 1.0 / 1.5, rel=1e-12)
+    assert any("no mass, and is left out" in remark for remark in found.remarks)
+
+
+def test_a_free_body_in_texts_of_fourteen_digits_has_a_rigid_body_mode() -> None:
+    count = 46
+    springs = np.random.default_rng(1).random(count - 1) * 1e5
+    elongations = np.eye(count - 1, count) - np.eye(count - 1, count, 1)
+    exact = elongations.T @ (springs[:, None] * elongations)
+    for up in (0.0, 1.0):  # rounding that lowers the energy of a translation, or raises it
+        rounded = np.array([[float(f"{each:.13e}") for each in row] for row in exact])
+        rounded[np.diag_indices(count)] *= 1.0 + (2.0 * up - 1.0) * 1e-14
+        names = tuple(f"{place}.x" for place in range(1, count + 1))
+        given = Matrices(sparse.csc_array(rounded), sparse.csc_array(np.eye(count)), None, names)
+        found = reduce(given, {"tip": {"1.x": 1.0}}, modes=6)
+        assert found.natural[0] == 0.0
+        assert found.natural[1] > 1.0
