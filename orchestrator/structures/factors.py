@@ -65,7 +65,7 @@ class Flexibility:
             self._factors, motions = None, self._rigid_motions()
             holding, self._free = _held(motions)
             # each motion moves one of them: bodies of unlike mass apart from each other
-            motions = np.linalg.solve(motions[holding].T, motions.T).T
+            motions = np.asarray(np.linalg.solve(motions[holding].T, motions.T).T)
             self._factors = _factors(self._matrix[self._free][:, self._free].tocsc())
             if self._factors is None:
                 raise UsageError(

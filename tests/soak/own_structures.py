@@ -15,7 +15,7 @@ from unittest.mock import patch
 import numpy as np
 import tomli_w
 from scipy import linalg
-from scipy.sparse import SparseEfficiencyWarning
+from scipy.sparse import SparseEfficiencyWarning, csc_array
 from support import matrix_files, nastran_files
 from support.balances import energy_problem, room_problem
 from support.drawn_matrices import EXACT_DECADES, DrawnMatrices, Floats, drawn_matrices, keys_of_body
@@ -25,6 +25,7 @@ import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.private_folder import CACHE_VARIABLE
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.structures.matrices import Matrices
 from vibroimpact.orchestrator.structures.modes import Modes
 from vibroimpact.orchestrator.structures.reduction import reduce
@@ -181,7 +182,9 @@ def _refusal_problem(said: str, drawn: DrawnMatrices, keys: Tables, points: int)
 
 def _run_problem(tables: Tables, scene: Scene, drawn: DrawnMatrices, length: float) -> str | None:
     """Return the law that a run breaks; the run lasts some periods."""
-    natural = np.array(scene.body.assembly.frequencies)
+    body = scene.body
+    assert isinstance(body, StructureBody)
+    natural = np.array(body.assembly.frequencies)
     elastic = natural[natural > 0.0]
     lowest, highest = (elastic.min(), elastic.max()) if len(elastic) else (drawn.natural, drawn.natural)
     time = 2.0 * np.pi * min(PERIODS_LOW / lowest, PERIODS_HIGH / highest)
@@ -203,11 +206,7 @@ def _modes_problem(random: np.random.Generator, drawn: DrawnMatrices) -> str | N
     count = drawn.rigid + len(places) + pick(random, 1, 4, 10)
     if count > 64:
         return None
-    given = Matrices(
-        *(matrix_files.sparse.csc_array(matrix) for matrix in (drawn.stiffness, drawn.mass)),
-        None,
-        drawn.names,
-    )
+    given = Matrices(csc_array(drawn.stiffness), csc_array(drawn.mass), None, drawn.names)
     try:
         found = reduce(
             given, {drawn.names[place]: {drawn.names[place]: 1.0} for place in places}, modes=count
