@@ -63,7 +63,9 @@ class Flexibility:
         motions = np.zeros((len(order), 0))
         if self._factors is None or self._is_doubtful():
             self._factors, motions = None, self._rigid_motions()
-            self._free = _held(motions)
+            holding, self._free = _held(motions)
+            # each motion moves one of them: bodies of unlike mass apart from each other
+            motions = np.asarray(np.linalg.solve(motions[holding].T, motions.T).T)
             self._factors = _factors(self._matrix[self._free][:, self._free].tocsc())
             if self._factors is None:
                 raise UsageError(
@@ -169,15 +171,15 @@ class Flexibility:
         return np.asarray(moves @ (ways / size[:, None] / np.sqrt(values)))
 
 
-def _held(motions: Floats) -> NDArray[np.int64]:
-    """Return the degrees of freedom without those that hold the rigid motions best, one for each motion."""
+def _held(motions: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the degrees of freedom that hold the rigid motions best, one for each motion, and all others."""
     from scipy.linalg import qr
 
     count, rigid = motions.shape
     if rigid == 0:
-        return np.arange(count)
+        return np.arange(0), np.arange(count)
     _, _, order = qr(motions.T, mode="economic", pivoting=True)
-    return np.sort(order[rigid:])
+    return order[:rigid], np.sort(order[rigid:])
 
 
 def _factors(matrix: Sparse) -> Any:

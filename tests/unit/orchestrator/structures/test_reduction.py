@@ -289,3 +289,15 @@ def test_a_free_body_in_texts_of_fourteen_digits_has_a_rigid_body_mode() -> None
         found = reduce(given, {"tip": {"1.x": 1.0}}, modes=6)
         assert found.natural[0] == 0.0
         assert found.natural[1] > 1.0
+
+
+def test_free_bodies_of_masses_over_twelve_decades_have_each_a_rigid_body_mode() -> None:
+    masses = 10.0 ** np.linspace(-6.0, 6.0, 30)
+    blocks = [1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]])] * 15
+    names = tuple(f"{place}.x" for place in range(1, 31))
+    given = Matrices(sparse.block_diag(blocks, format="csc"), sparse.csc_array(np.diag(masses)), None, names)
+    found = reduce(given, {"one": {"1.x": 1.0}, "last": {"30.x": 1.0}}, modes=30)
+    assert (found.natural[:15] == 0.0).all()
+    for point, body in (("one", masses[:2]), ("last", masses[-2:])):
+        own = 1.0 / (found.shapes[point][:15] ** 2).sum()
+        assert own == pytest.approx(body.sum(), rel=1e-9)
