@@ -163,10 +163,14 @@ class ModesBody(BodyTable):
 
     def place_named(self, rest: str, name: str) -> float | NoPoint:
         """Return the number of a point, from 1; of the only one without a name: see `BodyTable`."""
+        rest = self.points[0] if rest == "" and len(self.shapes) == 1 else rest
         if rest in self.shapes:
-            return 1 + self.points.index(rest)
-        if rest == "" and len(self.shapes) == 1:
-            return 1
+            moves = any(self.shapes[rest])
+            return (
+                1 + self.points.index(rest)
+                if moves
+                else NoPoint("a point that a mode moves", "Its shape is 0.")
+            )
         some = ", ".join(f'"{name}.{point}"' for point in self.points[:4])
         return NoPoint(f"a point with shapes: {some}{', ...' if len(self.shapes) > 4 else ''}")
 

@@ -109,6 +109,11 @@ def test_the_modes_of_a_beam_are_this_beam() -> None:
             "a point with shapes",
         ),
         (
+            {"body": {"shapes": {"tip": [0.0, 0.0], "middle": [0.7, 1.4]}}},
+            "stop[1].at",
+            "a point that a mode moves",
+        ),
+        (
             {"forcing": {"kind": "base_acceleration", "amplitude": 1.0, "frequency": 11.0}},
             "body[1].participation",
             "it beside base_acceleration",
