@@ -100,9 +100,15 @@ class DraftTables:
         return [(table, (name, place)) for place, table in enumerate(raw)]
 
     def variant(
-        self, models: Mapping[str, type[Table]], tag: str, default: str, raw: object, path: KeyPath
+        self,
+        models: Mapping[str, type[Table]],
+        tag: str,
+        default: str,
+        raw: object,
+        path: KeyPath,
+        further: tuple[str, ...] = (),
     ) -> Table | None:
-        """Read a table whose kind decides its keys; an unknown kind is a single problem."""
+        """Read a table whose kind decides its keys; an unknown kind is a single problem, which names further kinds."""
         kind = raw.get(tag, default) if isinstance(raw, dict) else default
         if isinstance(kind, str) and kind in models:
             there = len(self.problems)
@@ -115,7 +121,7 @@ class DraftTables:
                 ]
             return table
         model = models[default]
-        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
+        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, (*models, *further)))
         return None
 
 
@@ -167,7 +173,7 @@ class Draft(DraftTables):
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
         models = PART_MODELS if self._is_part else BODY_MODELS
-        return self.variant(models, "kind", "oscillator", self.document["body"], ("body",))
+        return self.variant(models, "kind", "oscillator", self.document["body"], ("body",), ("matrices",))
 
     def _forces(self) -> tuple[Force | None, ...]:
         raw = self.document.get("forcing")

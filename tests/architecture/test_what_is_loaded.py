@@ -112,6 +112,7 @@ OTHERS: Rows = {
     "lyapunov swept.nc": (RECOGNIZED, 0),
     "energies swept.nc": (RECOGNIZED, 0),
     "resonances swept.nc": (RECOGNIZED, 2),
+    "modes absent.csv": (RECOGNIZED, 2),
     "basins scene.toml --points 5": (RECOGNIZED, 0),
     "transients scene.toml --starts 1": (RECOGNIZED, 0),
     # xarray looks for a scheduler of Dask when it writes

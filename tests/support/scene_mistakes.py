@@ -60,7 +60,7 @@ OF_AN_OSCILLATOR = [
     (
         "mass = 1.0",
         'kind = "chan"\nmasses = [1.0]',
-        'body.kind: expected "oscillator", "chain" or "beam", got "chan". Did you mean "chain"?',
+        'body.kind: expected "oscillator", "chain", "beam", "modes" or "matrices", got "chan". Did you mean "chain"?',
     ),
     (
         "damping = 0.1",

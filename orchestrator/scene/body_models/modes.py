@@ -215,11 +215,7 @@ class ModesBody(BodyTable):
         return {}
 
 
-LISTED_KINDS = frozenset({"modes"})
-"""Kinds of bodies that run as a structure, so that their stops and forces name their points."""
-
-
 def is_listed(body: object) -> bool:
-    """Return whether a table of a body has one of these kinds."""
+    """Return whether a table of a body has a kind that runs as a structure: its stops and forces name its points."""
     written: Mapping[str, object] = body if isinstance(body, dict) else {}
-    return written.get("kind") in LISTED_KINDS
+    return written.get("kind") == "modes"

@@ -208,7 +208,7 @@ def _label(line: str) -> int:
 def reals_of(line: str, width: int, count: int) -> list[float]:
     """Return the numbers of a line, each of some characters, or parted by blanks; ValueError: it has others.
 
-    >>> reals_of(" 1.00000e+00-2.00000e+00", 13, 2)
+    >>> reals_of(" 1.000000e+00-2.000000e+00", 13, 2)
     [1.0, -2.0]
     >>> reals_of("1.5 2.5", 13, 2)
     [1.5, 2.5]
