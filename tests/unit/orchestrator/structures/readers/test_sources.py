@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.matrix_files import ONE_MATRIX, SEVERAL, drawn_matrix, market, npz
+from support.places import TESTS
 
 from vibroimpact.fmus import reader_process
 from vibroimpact.fmus.errors import UsageError
@@ -124,8 +125,11 @@ def test_files_that_do_not_fit_are_refused_with_their_names(
     ],
 )
 def test_a_reader_that_goes_wrong_ends_in_one_line(
-    folder: Path, options: Mapping[str, Any], said: str
+    folder: Path, options: Mapping[str, Any], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # the server, which is asked where a fork has crashed, starts anew and finds this reader
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    reader_process._server.close()
     path = folder / "k.mtx"
     with pytest.raises(UsageError) as refused:
         apart.read_file_apart(path, "support.harmful_reader:read", options, found.unpacked)
