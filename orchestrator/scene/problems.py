@@ -271,9 +271,11 @@ def _owner(model: type[BaseModel], location: Sequence[str | int]) -> tuple[type[
     if len(location) == 1 or isinstance(location[1], int):
         return model, name
     annotation = field_of(model, name).annotation
-    if get_origin(annotation) is dict:  # tables by name
-        return _owner(get_args(annotation)[1], location[2:]) if len(location) > 2 else (model, name)
-    return _owner(forms_of(annotation)[0], location[1:])
+    inner, rest = forms_of(annotation)[0], location[1:]
+    if get_origin(inner) is dict:  # tables by name
+        inner, rest = get_args(inner)[1], location[2:]
+    is_table = isinstance(inner, type) and issubclass(inner, BaseModel)
+    return _owner(inner, rest) if is_table and rest else (model, name)  # else numbers by name
 
 
 def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) -> Problem:

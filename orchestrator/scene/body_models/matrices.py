@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.scene.body_models.base import BODY_KINDS
 from vibroimpact.orchestrator.scene.body_models.beam import Rayleigh
 from vibroimpact.orchestrator.scene.body_models.modes import MOST_POINTS
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import DAMPING, Finite, ModeCount, NotNegativeNumbers, SceneTable
+from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, WORD_TAG
 
 Name = Annotated[str, Field(min_length=1, max_length=500)]
-Combination = Name | dict[str, Finite]
+
+
+def _form(value: object) -> str:
+    return ARRAY_TAG if isinstance(value, dict) else WORD_TAG
+
+
+Combination = Annotated[
+    Annotated[Name, Tag(WORD_TAG)] | Annotated[dict[str, Finite], Tag(ARRAY_TAG)], Discriminator(_form)
+]
 _FILE = "the name of a file"
 _FREEDOM = 'a degree of freedom such as "12.z", or weights such as { "12.z" = 1, "17.z" = -1 }'
 

@@ -217,3 +217,23 @@ def test_mistakes_of_matrices_are_one_line_with_exit_code_2_and_nothing_is_writt
     assert len(printed.splitlines()) == 1
     assert said.replace("rod/", f"{folder}/") in printed
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("base", 3),
+        ("base", [0.0, 0.0]),
+        ("base", {"42.z": "a"}),
+        ("points", 3),
+        ("points", {"tip": 3}),
+        ("points", {"tip": {"42.z": "a"}}),
+        ("points", {"tip": {"42.z": [1.0]}}),
+    ],
+)
+def test_weights_that_are_none_are_one_line(key: str, value: object) -> None:
+    # once a place within a table of weights ended in an AttributeError
+    body = {"name": "p", "kind": "matrices", "stiffness": "k.mtx", "mass": "m.mtx", key: value}
+    with pytest.raises(SceneError, match=rf"body\[1\]\.{key}.*: expected .*got ") as refused:
+        Scene.from_dict({"body": [body], "record": {"recorded_time": 1.0}})
+    assert len(refused.value.problems) == 1
