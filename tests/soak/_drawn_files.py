@@ -314,6 +314,17 @@ def damaged(draw: random.Random, content: bytes) -> bytes:
     return bytes(changed)
 
 
+def spoiled(draw: random.Random, content: bytes, inserted: Sequence[bytes]) -> bytes:
+    """Return a file that is cut off, or damaged and with some of these bytes put in between."""
+    if draw.random() < 0.3:
+        return content[: draw.randrange(1, len(content))]
+    changed = bytearray(damaged(draw, content))
+    for _ in range(draw.choice((0, 0, 1, 3))):
+        place = draw.randrange(len(changed) + 1)
+        changed[place:place] = draw.choice(inserted)
+    return bytes(changed) or b"\n"
+
+
 def flipped(draw: random.Random, content: bytes) -> bytes:
     """Return a file with some bits flipped, none of them at its start, which identifies the format."""
     changed = bytearray(content)

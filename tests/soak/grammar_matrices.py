@@ -92,17 +92,6 @@ def _odd_table(draw: random.Random) -> str:
     return "\n".join(mark.join(draw.choice(one) for _ in range(draw.randint(1, 4))) for one in rows)
 
 
-def _damaged(draw: random.Random, content: bytes) -> bytes:
-    """Return a file with bytes changed, cut off, or put in between."""
-    if draw.random() < 0.3:
-        return content[: draw.randrange(1, len(content))]
-    changed = bytearray(files.damaged(draw, content))
-    for _ in range(draw.choice((0, 0, 1, 3))):
-        place = draw.randrange(len(changed) + 1)
-        changed[place:place] = draw.choice(INSERTED)
-    return bytes(changed) or b"\n"
-
-
 def _read(sources: Sources) -> Matrices | str:
     """Return the matrices, or the refusal; any other error propagates."""
     try:
@@ -163,7 +152,7 @@ def check(seed: int) -> str | None:
     kind = draw.random()
     if kind > 0.4:
         wrong = draw.choice(sorted(contents))
-        contents[wrong] = _damaged(draw, contents[wrong])
+        contents[wrong] = files.spoiled(draw, contents[wrong], INSERTED)
     if kind > 0.9:
         contents["freedoms.csv"] = _odd_table(draw).encode() or b"\n"
     for file, content in contents.items():

@@ -24,8 +24,8 @@ INSERTED = (
     b" ", b"\n", b"\r", b"\t", b"\0", b"#", b",", b"-", b"9" * 30, b"1e999", b"nan", b"\x1b[31m", b"\xe2\x80\xae",
     b"    -1\n", b"    55\n", b"frequency,1\n", b"[body]\n", b"a.b.c = 1\n", b"[[[[[[[[",
 )  # fmt: skip
-ROUNDING = {".uff": 5e-6, ".csv": 0.0, ".toml": 0.0, ".nc": 0.0}
-"""Relative rounding of the numbers of a file."""
+ROUNDING = {".uff": 5e-6, ".csv": 0.0, ".toml": 1e-15, ".nc": 0.0}
+"""Relative rounding of the numbers of a file; a table in TOML has its frequencies in Hz."""
 
 
 def _drawn(draw: random.Random) -> Modes:
@@ -78,13 +78,7 @@ WRITERS: Mapping[str, Callable[[Modes], bytes]] = {
 
 def _damaged(draw: random.Random, content: bytes) -> bytes:
     """Return a file with bytes changed, cut off, put in between, or with a line that comes twice."""
-    if draw.random() < 0.3:
-        return content[: draw.randrange(1, len(content))]
-    changed = bytearray(files.damaged(draw, content))
-    for _ in range(draw.choice((0, 0, 1, 3))):
-        place = draw.randrange(len(changed) + 1)
-        changed[place:place] = draw.choice(INSERTED)
-    lines = bytes(changed).split(b"\n")
+    lines = files.spoiled(draw, content, INSERTED).split(b"\n")
     if draw.random() < 0.3:
         lines.insert(draw.randrange(len(lines)), draw.choice(lines))
     return b"\n".join(lines) or b"\n"

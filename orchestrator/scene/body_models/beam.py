@@ -53,6 +53,13 @@ class Rayleigh(SceneTable):
     stiffness: Annotated[NotNegative, Rule(unit="s", fmu="rayleigh.stiffness")] = 0.0
 
 
+RAYLEIGH = Rule(
+    "a table such as { mass = 0.1, stiffness = 1e-5 }",
+    hint="Both are optional.",
+    doc="`{ mass = .., stiffness = .. }`: adds mass / (2 w) + stiffness w / 2 to each damping ratio",
+)
+
+
 class BeamBody(BodyTable):
     """`[body]`: an Euler-Bernoulli beam with a number of modes."""
 
@@ -124,11 +131,7 @@ class BeamBody(BodyTable):
     damping_reciprocal: Annotated[NotNegativeNumbers, of_amplitude(*DAMPING_RECIPROCAL, each="[i]")] = 0.0
     rayleigh: Annotated[
         Rayleigh | None,
-        Rule(
-            "a table such as { mass = 0.1, stiffness = 1e-5 }",
-            hint="Both are optional.",
-            doc="`{ mass = .., stiffness = .. }`: adds mass / (2 w) + stiffness w / 2 to each damping ratio",
-        ),
+        RAYLEIGH,
     ] = None
     poisson_ratio: Annotated[
         Finite,

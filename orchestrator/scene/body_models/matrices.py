@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.scene.body_models.base import BODY_KINDS
-from vibroimpact.orchestrator.scene.body_models.beam import Rayleigh
+from vibroimpact.orchestrator.scene.body_models.beam import RAYLEIGH, Rayleigh
 from vibroimpact.orchestrator.scene.body_models.modes import MOST_POINTS
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import DAMPING, Finite, ModeCount, NotNegativeNumbers, SceneTable
@@ -99,9 +99,5 @@ class MatricesBody(SceneTable):
     ] = 0.0
     rayleigh: Annotated[
         Rayleigh | None,
-        Rule(
-            "a table such as { mass = 0.1, stiffness = 1e-5 }",
-            hint="Both are optional.",
-            doc="`{ mass = .., stiffness = .. }`: adds mass / (2 w) + stiffness w / 2 to each damping ratio",
-        ),
+        RAYLEIGH,
     ] = None
