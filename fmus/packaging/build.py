@@ -182,8 +182,9 @@ def compile_component(
             sources,
             include,
             definitions=defined,
-            # with one mode, calls are most of the cost of an impact
-            across_files=defined["VI_ONLY_MODES"] == 1,
+            # calls are most of the cost of an impact of one mode, and of what a body can have but has not
+            across_files=defined["VI_ONLY_MODES"] == 1 or defined["VI_SINES"] > 0,
+            level="-O3" if defined["VI_ONLY_MODES"] == 1 else None,
             strict=strict,
             platform=platform,
         )

@@ -24,8 +24,8 @@ ON_PATH = ("cc", "gcc", "clang")
 # no contraction: a * b + c is rounded twice everywhere, so that all machines give the same bits
 LANGUAGE = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion")
-#: Optimization across files, unknown to some linkers, and the level at which it gains most.
-ACROSS_FILES = ("-O3", "-flto=auto")
+#: Optimization across files, unknown to some linkers.
+ACROSS_FILES = "-flto=auto"
 
 
 def find_compiler() -> tuple[str, ...]:
@@ -59,20 +59,22 @@ def compile_library(
     definitions: Mapping[str, int] = MappingProxyType({}),
     export_all: bool = False,
     across_files: bool = False,
+    level: str | None = None,
     strict: bool = True,
     platform: Platform | None = None,
 ) -> None:
     """Compile C files, with the folders of their headers, into one shared library, the target.
 
     Definitions are macros and their values. `export_all` exports every function, not only the marked ones.
-    `across_files` optimizes across files where compiler and linker can; it takes half as long again. `strict` turns
-    warnings into errors; it is off where users build, since a newer compiler may know new warnings. The ziglang package
-    compiles for another platform. Raise ComponentError with the compiler's own words.
+    `across_files` optimizes across files where compiler and linker can, at another `level` if one is given, such as
+    "-O3"; it takes half as long again. `strict` turns warnings into errors; it is off where users build, since a newer
+    compiler may know new warnings. The ziglang package compiles for another platform. Raise ComponentError with the
+    compiler's own words.
     """
     compiler = find_compiler() if platform is None else zig_compiler()
     options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler, platform)]
-    if across_files and _works((*compiler, *_platform_options(compiler, platform), *ACROSS_FILES)):
-        options += ACROSS_FILES
+    if across_files and _works((*compiler, *_platform_options(compiler, platform), ACROSS_FILES)):
+        options += [ACROSS_FILES, *([level] if level else [])]
     options += [] if export_all else ["-fvisibility=hidden"]
     options += [f"-D{name}={value}" for name, value in definitions.items()]
     folders = [f"-I{folder}" for folder in include]

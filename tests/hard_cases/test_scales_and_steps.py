@@ -11,6 +11,8 @@ from support.exact_motion import exact_flow, exact_next_contact
 from support.tolerance import FLOW, LONG_PHASE, ORBIT, PARTITION, SEQUENCE
 
 from vibroimpact.fmus.core import Oscillator, next_contact
+from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.scene import parse_scene
 
 PERIOD = 2.0 * math.pi
 PHASE = 0.3665212101960540571  # of the P(1,1) motion, see tests/reference
@@ -186,3 +188,36 @@ def test_an_importer_that_never_empties_the_record_still_comes_to_the_end() -> N
             steps += 1
             assert steps < 10
         assert o.get("record.count") + o.get("record.dropped") == o.contact("count")[0]
+
+
+UNDER_TWO_SINES = """
+[scene]
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping = 0.2
+[[forcing]]
+amplitude = 0.5
+angular_frequency = 1.0
+[[forcing]]
+amplitude = 1e-12
+angular_frequency = {frequency!r}
+[[stop]]
+position = 1.0
+restitution = 0.7
+[record]
+impacts = true
+transient_periods = 300
+recorded_periods = 5
+"""
+
+
+@pytest.mark.parametrize("frequency", [0.3, 2.0, 7.5, 300.0, 1e5])
+def test_a_weak_sine_of_any_frequency_leaves_an_orbit_where_it_is(frequency: float) -> None:
+    text = UNDER_TWO_SINES.format(frequency=frequency)
+    impacts = PointRunner(parse_scene(text, "two_sines.toml")).run({}).impacts
+    assert impacts is not None
+    assert len(impacts) >= 5
+    phases = np.remainder(impacts[:, 0], PERIOD)
+    assert np.abs(phases - PHASE).max() <= 1e-10

@@ -183,7 +183,7 @@ double vi_structure_mobility_left(const vi_structure *s, int k)
         return s->model->compliance[k][k];
     }
     vi_structure_signed(s, s->model->compliance, g);
-    double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
+    double column[VI_PORTS] = {0.0}, share[VI_PORTS], left = g[k][k];
     int held[VI_PORTS] = {0};
     for (int l = 0; l < s->model->contacts; ++l) {
         held[l] = l != k && s->state->status[l] == VI_CONTACT_HELD;

@@ -2,28 +2,26 @@
 
 #include <math.h>
 
+#include "motion/extent.h"
 #include "motion/majorant.h"
 
 /* Rounding of samples, relative to the sum of sizes of a displacement's terms. Less clearance is unresolved. */
 static const double ROUNDING = 1e-12;
-/* Longest level of steps for a single mode: steps beyond .8 radians clear little. Further sines that are fast may be
- * small: with them steps may be longer. */
-enum { LONGEST_OF_ONE = 4, LONGEST_WITH_SINES = 5 };
+/* Longest level of steps for a single mode: steps beyond .8 radians clear little. Faster sines may be small, and do not
+ * shorten it. */
+enum { LONGEST_OF_ONE = 4 };
 /* Most levels by which the steps grow from one block to the next. */
 enum { STEEPEST_RISE = 3 };
 /* Blocks of samples after which a scan ends where it is. */
 enum { MOST_BLOCKS = 4096 };
 enum { MOST_ITERATIONS = 8 };
+/* Most halves of an interval with a contact, for a guess near enough that one evaluation is left. */
+enum { MOST_HALVES = 3 };
 static const double THIRD = 1.0 / 3.0, SIXTH = 1.0 / 6.0;
 /* Newton step, in intervals between samples, below which a guess is good enough: its error is about the square. */
 static const double CLOSE = 3e-4;
 
 /* ---- the scan ---- */
-
-/* Bounds of the unforced part of one mode. */
-typedef struct {
-    double reach, rate, fourth; /* of the displacement, and of its first and fourth derivatives */
-} extent;
 
 /* Bounds of the unforced parts of all modes, at a contact. */
 typedef struct {
@@ -38,6 +36,7 @@ typedef struct {
 } place;
 
 typedef struct {
+    const vi_scan *scan;
     const vi_flight *flight;
     const vi_point *points;
     const int *looked_for;
@@ -48,35 +47,11 @@ typedef struct {
     extents extent[VI_PORTS];  /* of the contacts */
 } scanner;
 
-/* Bounds of a mode for a whole flight, where nothing grows: an underdamped mode stays within its amplitude. */
-static extent falling_extent(const vi_segment *segment)
-{
-    const vi_mode *mode = segment->mode;
-    const double x = segment->start, v = segment->start_rate;
-    if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
-        const double rate = mode->natural * segment->amplitude;
-        return (extent){segment->amplitude, rate, mode->stiffness * mode->natural * rate};
-    }
-    const double damping = 2.0 * fabs(mode->decay), stiffness = fabs(mode->stiffness);
-    const double rate = sqrt(v * v + stiffness * x * x), second = sqrt(damping * damping + stiffness) * rate;
-    const double third = damping * second + stiffness * rate;
-    const double reach = mode->natural > 0.0 ? rate / mode->natural : HUGE_VAL;
-    return (extent){reach, rate, damping * third + stiffness * second};
-}
-
-/* The same for all motions, up to twice the flight's length where they grow. */
-static extent extent_of(const vi_segment *segment)
-{
-    const extent e = falling_extent(segment);
-    const double swell = segment->swell;
-    return vi_mode_grows(segment->mode) ? (extent){swell * e.reach, swell * e.rate, swell * e.fourth} : e;
-}
-
 static void take_extents(scanner *s, int k)
 {
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         const double shape = fabs(s->points[k].shape[j]);
-        const extent e = shape > 0.0 ? extent_of(&s->flight->segment[j]) : (extent){0.0, 0.0, 0.0};
+        const vi_extent e = shape > 0.0 ? vi_extent_of(&s->flight->segment[j]) : (vi_extent){0.0, 0.0, 0.0};
         s->extent[k].reach[j] = shape * e.reach;
         s->extent[k].rate[j] = shape * e.rate;
         s->extent[k].fourth[j] = shape * e.fourth;
@@ -173,7 +148,7 @@ static bool is_worth(const scanner *s, double step)
 static int level_between(const scanner *s, int shortest, int longest)
 {
     int l = longest;
-    while (l > shortest && !is_worth(s, vi_scan_step(s->flight->model, l))) {
+    while (l > shortest && !is_worth(s, vi_scan_step(s->scan, l))) {
         --l;
     }
     return l;
@@ -238,9 +213,6 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
         clearance[i] = start + (double)(i + 1) * rise + c * level->cosine[i] + n * level->sine[i];
         third[i] = third_of_rise + nw * level->cosine[i] - cw * level->sine[i];
     }
-    if (s->flight->sines > 0 || vi_flight_degree(s->flight) > 1) {
-        sample_further(s, level, k, out);
-    }
     for (int j = 0; j < vi_structure_modes(s->flight->model); ++j) {
         if (ripples(s->extent[k].fourth[j], share, s->extent[k].reach[j])) {
             continue;
@@ -253,6 +225,9 @@ static void sample(const scanner *s, const vi_scan_level *level, int k, samples 
             clearance[i] += x * level->x_of_x[j][i] + v * level->x_of_v[j][i];
             third[i] += xw * level->v_of_x[j][i] + vw * level->v_of_v[j][i];
         }
+    }
+    if (s->flight->sines > 0 || vi_flight_degree(s->flight) > 1) {
+        sample_further(s, level, k, out);
     }
 }
 
@@ -323,13 +298,14 @@ static int cleared(const scanner *s, const vi_scan_level *level, verdict *next, 
 }
 
 /* The longest level of steps. The bounds of growing motions, and of polynomials, hold for twice the flight. */
-static int longest_level(const vi_flight *flight)
+static int longest_level(const vi_scan *scan, const vi_flight *flight)
 {
     const double growing = vi_structure_grows(flight->model) ? 1.0 : 0.0;
     const double samples = vi_flight_degree(flight) > 1 ? (double)VI_SCAN_SAMPLES : growing;
-    const int of_one = flight->sines > 0 ? LONGEST_WITH_SINES : LONGEST_OF_ONE;
-    int l = vi_structure_modes(flight->model) == 1 ? of_one : VI_SCAN_LEVELS - 1;
-    while (samples > 0.0 && l >= 0 && vi_scan_step(flight->model, l) * samples > flight->length) {
+    int l = vi_structure_modes(flight->model) == 1 && LONGEST_OF_ONE + scan->finer < VI_SCAN_LEVELS
+                ? LONGEST_OF_ONE + scan->finer
+                : VI_SCAN_LEVELS - 1;
+    while (samples > 0.0 && l >= 0 && vi_scan_step(scan, l) * samples > flight->length) {
         --l;
     }
     return l;
@@ -427,19 +403,38 @@ static double guess(const vi_approach *a, const vi_approach *b, double step)
     return t * step;
 }
 
-/* Bracket the contact in the interval after `steps`. */
-static void bracket(const scanner *s, const vi_scan_level *level, int steps, int k, vi_scan_found *found)
+/* An instant on either side of a contact. */
+typedef struct {
+    place at;
+    vi_approach approach;
+} side;
+
+/* Bracket the contact in the interval after `steps` of level l. Fast sines, for which the quintic is rough, halve it. */
+static void bracket(const scanner *s, vi_scan *scan, int l, int steps, int k, vi_scan_found *found)
 {
-    place low, high;
-    vi_approach at_low = s->now[k];
-    low.u = s->at.u;
+    const vi_structure_model *model = s->flight->model;
+    const vi_scan_level *level = vi_scan_level_of(scan, model, l);
+    side sides[3], *low = &sides[0], *high = &sides[1], *middle = &sides[2];
     if (steps > 0) {
-        go(&low, &s->at, s->flight->model, level, steps);
-        at_low = approach_at(s, &low, k);
+        go(&low->at, &s->at, model, level, steps);
+        low->approach = approach_at(s, &low->at, k);
+    } else {
+        low->at = s->at;
+        low->approach = s->now[k];
     }
-    go(&high, &s->at, s->flight->model, level, steps + 1);
-    const vi_approach at_high = approach_at(s, &high, k);
-    *found = (vi_scan_found){k, low.u, high.u, low.u + guess(&at_low, &at_high, level->step), found->blocks};
+    go(&high->at, &s->at, model, level, steps + 1);
+    high->approach = approach_at(s, &high->at, k);
+    for (int half = 0; half < scan->finer && half < MOST_HALVES && l > 0; ++half) {
+        level = vi_scan_level_of(scan, model, --l);
+        go(&middle->at, &low->at, model, level, 1);
+        middle->approach = approach_at(s, &middle->at, k);
+        side **const nearer = middle->approach.clearance > 0.0 ? &low : &high;
+        side *const free = *nearer;
+        *nearer = middle;
+        middle = free;
+    }
+    const double u = low->at.u + guess(&low->approach, &high->approach, level->step);
+    *found = (vi_scan_found){k, low->at.u, high->at.u, u, found->blocks};
 }
 
 static void begin(scanner *s, const vi_flight_instant *from, const vi_approach first[])
@@ -469,23 +464,24 @@ vi_scan_end vi_scan_flight(vi_scan *scan, const vi_flight *flight, const vi_poin
                            const vi_flight_instant *from, const vi_approach first[], vi_scan_found *found)
 {
     scanner s;
+    s.scan = scan;
     s.flight = flight;
     s.points = points;
     s.looked_for = looked_for;
     vi_scan_renew(scan, flight->model);
     begin(&s, from, first);
-    const int longest = longest_level(flight);
+    const int longest = longest_level(scan, flight);
     int l = level_between(&s, -1, longest);
     for (found->blocks = 0; found->blocks < MOST_BLOCKS && l >= 0; ++found->blocks) {
         const vi_scan_level *level = vi_scan_level_of(scan, flight->model, l);
         verdict next;
-        int contact;
+        int contact = 0;
         const int steps = cleared(&s, level, &next, &contact);
         if (s.at.u + (double)steps * level->step >= flight->length) {
             return VI_SCAN_CLEAR;
         }
         if (next == HAS_CONTACT) {
-            bracket(&s, level, steps, contact, found);
+            bracket(&s, scan, l, steps, contact, found);
             return VI_SCAN_BRACKET;
         }
         if (steps > 0) {

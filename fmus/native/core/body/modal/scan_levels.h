@@ -24,6 +24,8 @@ struct vi_scan {
     double angular_frequency, stiffness[VI_MODES], decay[VI_MODES]; /* of the modes for which it was made */
     int32_t sines;                                                  /* further sines, and their frequencies */
     double further[VI_SINES_ROOM];
+    double shortest;                                                /* step of the level 0, s */
+    int32_t finer; /* levels by which sines that are faster than the modes shorten the shortest step */
     vi_scan_level level[VI_SCAN_LEVELS];                            /* each with twice the step of the level before */
 };
 
@@ -33,10 +35,10 @@ void vi_scan_renew(vi_scan *scan, const vi_structure_model *model);
 /* The level l, with its propagators. */
 const vi_scan_level *vi_scan_level_of(vi_scan *scan, const vi_structure_model *model, int l);
 
-/* Step of the level l, s. The shortest has 0.05 radians of the fastest rate. */
-static inline double vi_scan_step(const vi_structure_model *model, int l)
+/* Step of the level l, s. The shortest has at most 0.05 radians of the fastest rate. */
+static inline double vi_scan_step(const vi_scan *scan, int l)
 {
-    return 0.05 * model->radian * (double)(1 << l);
+    return scan->shortest * (double)(1 << l);
 }
 
 #endif

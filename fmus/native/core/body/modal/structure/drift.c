@@ -177,7 +177,7 @@ static double energy_now(const vi_structure *s)
 static void bear(const vi_structure *s, double impulse[VI_PORTS])
 {
     double g[VI_PORTS][VI_PORTS], approach[VI_PORTS] = {0.0}, borne[VI_PORTS];
-    int held[VI_PORTS];
+    int held[VI_PORTS] = {0};
     vi_structure_signed(s, s->model->compliance, g);
     for (int k = 0; k < s->model->contacts; ++k) {
         held[k] = s->state->status[k] == VI_CONTACT_HELD;

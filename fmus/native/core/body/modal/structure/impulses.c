@@ -48,8 +48,6 @@ static void own_impulse(const vi_structure *s, int k, double change, double *imp
 void vi_structure_joint_impulses(const vi_structure *s, const int in_play[], const double change[], double impulse[],
                                  double impulse_low[])
 {
-    double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
-    double b[VI_PORTS], p[VI_PORTS], more[VI_PORTS];
     int index[VI_PORTS], count = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         impulse[k] = impulse_low[k] = 0.0;
@@ -62,6 +60,8 @@ void vi_structure_joint_impulses(const vi_structure *s, const int in_play[], con
         own_impulse(s, k, change[k], &impulse[k], &impulse_low[k]);
         return;
     }
+    double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
+    double b[VI_PORTS] = {0.0}, p[VI_PORTS], more[VI_PORTS];
     vi_structure_signed(s, s->model->mobility, whole);
     vi_structure_signed(s, s->model->mobility_low, whole_low);
     for (int i = 0; i < count; ++i) {

@@ -94,10 +94,13 @@ static bool balance(const touching_contacts *touching, double force[VI_PORTS])
 
 bool vi_structure_jams(const vi_structure *s, double least, int jammed[VI_PORTS])
 {
+    if (!vi_structure_stops_move(s->model)) {
+        return false;
+    }
     double force[VI_PORTS] = {0.0}, closing = 0.0, size = 0.0;
     touching_contacts touching;
     bool moves = false;
-    if (!vi_structure_stops_move(s->model) || !touch(s, least, &touching)) {
+    if (!touch(s, least, &touching)) {
         return false;
     }
     find_compliances(s, &touching);
