@@ -12,6 +12,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from support.component_fmu import VERSIONS, stop
 
+import vibroimpact as vi
 from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
 from vibroimpact.fmus.packaging.description import (
     ComponentDescription,
@@ -133,3 +134,50 @@ def test_only_what_depends_on_an_input_may_lack_a_list_of_its_knowns(tmp_path: P
     assert not inputs & set(of_contact)
     assert "contact[3].position" in of_contact
     assert not any(name.startswith(("contact[4]", "stop[4]")) for name in of_contact)
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "growing": {"damping_ratio": [0.02, -0.01, 0.02]},
+    "coupled": {"damping_matrix": [[0.4, 0.1, 0.0], [0.1, 0.3, -0.1], [0.0, -0.1, 0.5]]},
+    "free": {"frequencies": [0.0, 3.1, 9.0]},
+}
+
+
+@pytest.mark.parametrize(("fmi", "full"), [("3.0", False), ("2.0", False), ("3.0", True)])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_scene_of_given_modes_moves_in_fmpy_as_its_run(
+    tmp_path: Path, kind: str, fmi: str, full: bool
+) -> None:
+    rate, steps = 64.0, 96
+    body = {
+        **{"name": "board", "kind": "modes", "frequencies": [1.2, 3.1, 9.0], "damping_ratio": 0.01},
+        "shapes": {"tip": [2.0, -1.5, 1.1], "middle": [0.7, 1.4, 0.2]},
+        "velocity_start": [0.02, -0.05, 0.04],
+        **KINDS[kind],
+    }
+    scene = vi.Scene.from_dict(
+        {
+            "body": [body],
+            "stop": [
+                {"at": "board.tip", "position": 4e-3, "restitution": 0.7},
+                {"at": "board.middle", "position": -2e-3, "side": "lower", "restitution": 0.6},
+            ],
+            "record": {
+                "recorded_time": 2.0,
+                "time_series": {"rate": rate, "variables": ["displacement", "contact_displacement[2]"]},
+            },
+        }
+    )
+    samples = vi.run(scene, progress=False).vibroimpact.samples()
+    path = vi.export_fmu(scene, tmp_path / "board.fmu", fmi=fmi, full=full)
+    found = fmpy.simulate_fmu(
+        str(path), fmi_type="CoSimulation", step_size=1.0 / rate, output_interval=1.0 / rate,
+        stop_time=steps / rate, output=["displacement", "contact[2].displacement", "contact[1].count"],
+    )  # fmt: skip
+    assert found["contact[1].count"][-1] > 1
+    for ours, theirs in (
+        ("displacement", "displacement"),
+        ("contact_displacement_2", "contact[2].displacement"),
+    ):
+        expected = samples[ours].values[: steps + 1]
+        np.testing.assert_allclose(found[theirs], expected, atol=1e-11 * np.abs(expected).max())
