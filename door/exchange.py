@@ -27,6 +27,7 @@ def export_fmu(
     full: bool = False,
     external: bool = False,
     enumerations: bool = False,
+    model_exchange: bool = False,
     platform: str | None = None,
 ) -> Path:
     """Write a scene's body, stops and forcing as one FMU for another tool; `vi.fmus.export` writes one component.
@@ -37,7 +38,7 @@ def export_fmu(
         A scene of one body. A swept key has the value in its own table, not the values of the sweep.
     path : path
         FMU file to write.
-    fmi, full, external, enumerations, platform
+    fmi, full, external, enumerations, model_exchange, platform
         Options of the FMU: see `vibroimpact.fmus.export`.
 
     Returns
@@ -67,6 +68,7 @@ def export_fmu(
         full=full,
         external=external,
         enumerations=enumerations,
+        model_exchange=model_exchange,
         platform=platform,
     )
 

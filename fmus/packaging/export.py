@@ -62,6 +62,7 @@ def export_fmu(
     full: bool = False,
     external: bool = False,
     enumerations: bool = False,
+    model_exchange: bool = False,
     stop_time: float | None = None,
     platform: str | None = None,
     units: Mapping[str, UnitDefinition] | None = None,
@@ -92,6 +93,9 @@ def export_fmu(
         Whether to describe the variables for tools that answer contacts themselves.
     enumerations : bool
         Whether to describe enumerations as such, not as integers.
+    model_exchange : bool
+        Whether to describe the states of a Structure, for tools that integrate it. Other bodies always have their
+        states.
     stop_time : float, optional
         Default end of a run, s; without it, a time that suits the body's frequencies.
     platform : str, optional
@@ -143,7 +147,9 @@ def export_fmu(
         suitable = default_experiment(full_name, _numbers(component), natural=natural)
         if not full:
             edition = edition_of(experiment)
-            component = lean(component, external=external, enumerations=enumerations)
+            component = lean(
+                component, external=external, enumerations=enumerations, model_exchange=model_exchange
+            )
         component = with_units(component, units or {})
         _refuse_starts_beyond(component, own_starts)
         resources = {} if structure is None else {STRUCTURE_MEMBER: structure}

@@ -22,9 +22,10 @@ def export_to_file(options: ExportFmu) -> None:
         "full": options.full,
         "external": options.ports == "external",
         "enumerations": options.enumerations,
+        "model_exchange": options.model_exchange,
     }
     given = [
-        f"--{name}"
+        f"--{name.replace('_', '-')}"
         for name, value in {**counts, **kinds, "platform": platform}.items()
         if value not in (None, False)
     ]

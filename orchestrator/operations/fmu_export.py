@@ -63,6 +63,14 @@ class ExportFmu(Operation):
     enumerations: Annotated[bool, Option("--enumerations", help="Keep enumerations instead of integers.")] = (
         False
     )
+    model_exchange: Annotated[
+        bool,
+        Option(
+            "--model-exchange",
+            help="Structure: describe the states of its modes, too, for tools that integrate them. Other bodies "
+            "always have theirs.",
+        ),
+    ] = False
     platform: Annotated[
         str | None,
         Option(

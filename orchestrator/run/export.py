@@ -23,6 +23,7 @@ def export_scene(
     full: bool = False,
     external: bool = False,
     enumerations: bool = False,
+    model_exchange: bool = False,
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
@@ -36,7 +37,7 @@ def export_scene(
         File to write.
     fmi : str
         `3.0` or `2.0`.
-    full, external, enumerations, platform, note
+    full, external, enumerations, model_exchange, platform, note
         See `vibroimpact.fmus.export`.
 
     Returns
@@ -80,6 +81,7 @@ def export_scene(
         full=full,
         external=external,
         enumerations=enumerations,
+        model_exchange=model_exchange,
         stop_time=_duration(scene),
         platform=platform,
         note=note,

@@ -153,7 +153,7 @@ def _read_bytes(path: Path, source: str) -> bytes:
     if b"\0" in content[:LARGEST_FILE]:
         raise _file_error(source, "a scene file (TOML)", "a file that is no text", "Name a .toml file.")
     if len(content) > LARGEST_FILE:
-        hint = "Write a long list of values as a range, and check that this is a scene."
+        hint = "Write a long list of values as a range, and many shapes into a file of modes."
         raise _file_error(source, "a scene file of at most 1 MiB", "a larger one", hint)
     return content
 

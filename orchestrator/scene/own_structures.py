@@ -125,7 +125,7 @@ def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
             for each in value:
                 yield from texts(each)
 
-    tables = [document.get(each) for each in ("stop", "contact", "link", "forcing")]
+    tables = [document.get(each) for each in ("stop", "contact", "link", "forcing", "replay")]
     rows = [row for table in tables for row in (table if isinstance(table, list) else [table])]
     record = document.get("record")
     for row in (*rows, record):
@@ -154,13 +154,13 @@ def _of_matrices(
     problems: list[Problem],
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
-    from vibroimpact.orchestrator.structures.find import find_modes  # scipy takes time
+    from vibroimpact.orchestrator.structures.find import find_modes, fitting  # scipy takes time
 
     table = _table(body, path, problems)
     if table is None:
         return body
     try:
-        modes = find_modes(_request(table, folder, named, tolerance))
+        modes = fitting(find_modes(_request(table, folder, named, tolerance)), named)
     except UsageError as error:
         problems.append(_problem(path, error))
         return body

@@ -180,6 +180,7 @@ def _exported(
         starts={name: value for name, value in starts.items() if isinstance(value, int | float)},
         full="importer" in ports,
         external="external" in ports,
+        model_exchange=not used.isdisjoint(component.states()),
         stop_time=travel.stop_time,
         platform=travel.platform,
         note=travel.note,

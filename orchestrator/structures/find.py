@@ -17,6 +17,8 @@ from vibroimpact.orchestrator.structures.request import Request
 
 MOST_MODES, MOST_POINTS = 64, 1024
 """Largest numbers of modes and of points of a body."""
+MOST_NUMBERS = 4096
+"""Largest number of numbers in the shapes of a scene's text, some 90 kB; of more, it has the points that it names."""
 
 
 def find_modes(request: Request) -> Modes:
@@ -70,7 +72,7 @@ def modes_of_file(path: Path, named: Collection[str] = ()) -> Modes:
     Returns
     -------
     Modes
-        The lowest 64; of more than 1024 points those that the scene names.
+        The lowest 64; see `fitting` for the points.
 
     Raises
     ------
@@ -78,14 +80,21 @@ def modes_of_file(path: Path, named: Collection[str] = ()) -> Modes:
         The file cannot be read, or holds no modes: `path: expected ..., got ...`.
     """
     found = read_modes(path)
-    if len(found.natural) > MOST_MODES:
-        found = _lowest(found, path)
-    if len(found.shapes) <= MOST_POINTS:
-        return found
-    kept = {name: shape for name, shape in found.shapes.items() if name in named}
-    kept = kept or dict(islice(found.shapes.items(), MOST_POINTS))
-    remark = f"{len(found.shapes) - len(kept)} points that the scene does not name are left out."
-    return replace(found, shapes=kept, remarks=(*found.remarks, remark))
+    return fitting(found if len(found.natural) <= MOST_MODES else _lowest(found, path), named)
+
+
+def fitting(modes: Modes, named: Collection[str]) -> Modes:
+    """Return modes whose shapes fit into the text of a scene: those of its named points where all would be too many.
+
+    The first two points stay, too. The first is observed where a scene names none. The second keeps it from being the
+    only point, which a scene need not name.
+    """
+    if len(modes.shapes) <= min(MOST_POINTS, MOST_NUMBERS // len(modes.natural)):
+        return modes
+    names = {*islice(modes.shapes, 2), *named}
+    kept = {name: shape for name, shape in modes.shapes.items() if name in names}
+    remark = f"{len(modes.shapes) - len(kept)} points that the scene does not name are left out."
+    return replace(modes, shapes=kept, remarks=(*modes.remarks, remark))
 
 
 def _lowest(found: Modes, path: Path) -> Modes:

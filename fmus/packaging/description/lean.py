@@ -38,13 +38,20 @@ class Edition:
 
 
 def lean(
-    component: ComponentDescription, *, external: bool = False, enumerations: bool = False
+    component: ComponentDescription,
+    *,
+    external: bool = False,
+    enumerations: bool = False,
+    model_exchange: bool = False,
 ) -> ComponentDescription:
     """Return a component without the variables that few tools can handle.
 
     `external` keeps the variables of tools that answer contacts themselves: applied forces, contact masses, instants of
     contacts. Without `enumerations`, enumerations become integers, with the names in their descriptions.
+    `model_exchange` keeps the states of given modes: without them such a component is for co-simulation alone.
     """
+    if component.has_given_modes and not model_exchange:
+        component = _without_states(component)
     left_out = {"importer"} if external else {"importer", "external"}
     types = {e.name: _without(e, left_out) for e in component.enumerations}
     kept = [v for v in component.variables if v.ports not in left_out and not v.dimensions]
@@ -70,6 +77,13 @@ def with_units(component: ComponentDescription, units: Mapping[str, UnitDefiniti
     known = {unit.name: unit for unit in (*component.units, *units.values())}
     named = (replace(v, unit=units[v.name].name) if v.name in units else v for v in component.variables)
     return replace(component, units=tuple(known.values()), variables=tuple(named))
+
+
+def _without_states(component: ComponentDescription) -> ComponentDescription:
+    """Return a component for co-simulation alone: without states, their derivatives and event indicators."""
+    states = set(component.states())
+    kept = (v for v in component.variables if not (v.name in states or v.derivative or v.event_indicator))
+    return replace(component, model_exchange=False, variables=tuple(kept))
 
 
 def _without(enumeration: Enumeration, left_out: set[str]) -> Enumeration:

@@ -15,6 +15,10 @@ def plural(block: str) -> str:
     return f"{block}es" if block.endswith("s") else f"{block}s"
 
 
+#: Most names of knowns of an unknown that depends on an input. With more it has none, which means that it may depend on
+#: all: a description then grows with its variables, not with their square.
+MOST_KNOWNS = 128
+
 #: FMI's default of `initial` for each (causality, variability); absent pairs have no default.
 DEFAULT_INITIAL = {
     ("parameter", "fixed"): "exact",
@@ -156,6 +160,11 @@ class ComponentDescription:
     core: tuple[str, ...] = ()
     degree: int = 1
 
+    @property
+    def has_given_modes(self) -> bool:
+        """Whether its modes are arrays of start values, which a lean description leaves to a file in the resources."""
+        return any(v.dimensions and v.causality == "parameter" for v in self.variables)
+
     def uses(self, file: str) -> bool:
         """Return whether a file of the core, by its path there, belongs to the component."""
         return not self.core or file.removesuffix(".c").removesuffix(".h") in self.core
@@ -184,34 +193,46 @@ class ComponentDescription:
         """Return the event indicators, in order."""
         return tuple(v for v in self.variables if v.event_indicator)
 
-    def direct_knowns(self, variable: Variable, version: int) -> tuple[str, ...]:
-        """Return the names of the inputs and states that an output depends on directly."""
+    def direct_knowns(self, variable: Variable, version: int) -> tuple[str, ...] | None:
+        """Return the names of the inputs and states that an output or a derivative depends on directly.
+
+        None: maybe on all. A derivative with more than `MOST_KNOWNS` names has none.
+        """
+        inputs, shown = self.direct_inputs(variable, version), self._states_by_field()
+        if variable.dependencies is None:
+            return None
         if variable.variability != "continuous":
-            return self.direct_inputs(variable, version)
-        shown = self._states_by_field()
-        if variable.field in shown:
-            return (shown[variable.field],)
-        return (*self.direct_inputs(variable, version), *self.states())
+            return inputs
+        knowns = (shown[variable.field],) if variable.field in shown else (*inputs, *self.states())
+        return None if variable.derivative and len(knowns) > MOST_KNOWNS else knowns
 
     def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the inputs in an FMI version that an output depends on directly."""
         inputs = {v.name for v in self.variables_of(version) if v.causality == "input"}
         return tuple(name for name in variable.dependencies or () if name in inputs)
 
-    def knowns_at_start(self, variable: Variable, version: int) -> tuple[str, ...]:
-        """Return the names of the knowns that an unknown of initialization may depend on.
+    def knowns_at_start(self, variable: Variable, version: int) -> tuple[str, ...] | None:
+        """Return the names of the knowns that an unknown of initialization may depend on; None: maybe on all.
 
-        These are its inputs and all start values, except those of other modes, masses or channels.
+        These are its inputs and all start values, except those of other modes, masses or channels. An unknown that
+        depends on no input does not depend on other contacts, and a mode on none. One that does, with more than
+        `MOST_KNOWNS` names, has none.
         """
+        if variable.dependencies is None:
+            return None
+        inputs = self.direct_inputs(variable, version)
+        apart = {"mode", "mass", "channel"} | (set() if inputs else {"contact"})
 
         def may_matter(known: Variable) -> bool:
-            other = variable.repeat in {"mode", "mass", "channel"} and known.repeat == variable.repeat
-            return not (other and known.repeat_index != variable.repeat_index)
+            if variable.repeat in apart and known.repeat == variable.repeat:
+                return known.repeat_index == variable.repeat_index
+            return bool(inputs) or (variable.repeat, known.repeat) != ("mode", "contact")
 
         starts = (
             v for v in self.variables_of(version) if v.causality == "parameter" and v.initial == "exact"
         )
-        return (*self.direct_inputs(variable, version), *(v.name for v in starts if may_matter(v)))
+        knowns = (*inputs, *(v.name for v in starts if may_matter(v)))
+        return None if inputs and len(knowns) > MOST_KNOWNS else knowns
 
     def with_repeats(self, repeats: Mapping[str, int]) -> ComponentDescription:
         """Return the component with fewer repeated blocks; the remaining value references do not change.

@@ -210,12 +210,9 @@ def _add_structure(
             unknown = SubElement(
                 parent, "Unknown" if version == 2 else kind, {key: references[variable.name]}
             )
-            if variable.dependencies is None:
-                continue
-            if kind != "InitialUnknown":
-                knowns = component.direct_knowns(variable, version)
-            elif initial_dependencies:
-                knowns = component.knowns_at_start(variable, version)
+            if kind == "InitialUnknown":
+                knowns = component.knowns_at_start(variable, version) if initial_dependencies else None
             else:
-                continue
-            unknown.set("dependencies", " ".join(references[name] for name in knowns))
+                knowns = component.direct_knowns(variable, version)
+            if knowns is not None:  # an unknown without a list may depend on all knowns
+                unknown.set("dependencies", " ".join(references[name] for name in knowns))

@@ -245,8 +245,9 @@ def test_model_exchange_has_the_same_signals(tmp_path: Path, version: str) -> No
     }
     content = structure_file(arrays)
     path = export_fmu(
-        "Structure", tmp_path / "one.fmu", modes=1, fmi=version, starts=loads, structure=content
-    )
+        "Structure", tmp_path / "one.fmu", modes=1, fmi=version, starts=loads, structure=content,
+        model_exchange=True,
+    )  # fmt: skip
     ends = []
     for kind in ("ModelExchange", "CoSimulation"):
         result = fmpy.simulate_fmu(

@@ -116,6 +116,28 @@ def test_the_scene_of_matrices_keeps_numbers_hashes_and_error_and_needs_no_file(
     assert int(dataset.impact_count) > 5
 
 
+def test_a_replay_names_a_degree_of_freedom(folder: Path) -> None:
+    signals = [{"simulated": "displacement[rod.3]", "measured": "rod"}]
+    replay = {"drive": "force", "from": "force", "at": "rod.2", "compare": signals}
+    tables = {"body": TABLES["body"], "replay": replay, "record": {"observed": ["rod.3"]}}
+    (folder / "replay.toml").write_text(tomli_w.dumps(tables))
+    assert {"2", "3"} < modes_of(load_scene(folder / "replay.toml")).shapes.keys()
+
+
+def test_of_too_many_points_of_matrices_a_scene_keeps_those_that_it_names(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(find, "MOST_NUMBERS", 12)
+    points = {f"gap{number}": {"3": 1.0, "2": -1.0 / number} for number in range(1, 6)}
+    path = write(folder, body={"points": points}, record={"recorded_periods": 40, "observed": ["rod.gap4"]})
+    scene = load_scene(path)
+    assert [*modes_of(scene).shapes] == ["gap1", "gap2", "gap4", "3"]
+    assert modes_of(scene).origin.remarks == ("2 points that the scene does not name are left out.",)
+    monkeypatch.undo()
+    one, other = vi.run(scene, progress=False), vi.run(path, progress=False)
+    np.testing.assert_array_equal(one.displacement_max, other.displacement_max)
+
+
 def test_changes_reach_the_reduction_and_the_modes_that_it_finds(folder: Path) -> None:
     path = folder / "rod.toml"
     plain = modes_of(load_scene(path))

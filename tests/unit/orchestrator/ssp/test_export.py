@@ -71,6 +71,25 @@ def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) ->
     assert all(name == "SystemStructure.ssd" or name.startswith("resources/") for name in names)
 
 
+@pytest.mark.parametrize("variable", ["modal_displacement[1]", "displacement"])
+def test_a_structure_has_the_states_that_a_connection_takes(tmp_path: Path, variable: str) -> None:
+    ends = {"from": f"a.{variable}", "to": "b.force", "gain": 0.25}
+    if variable == "displacement":
+        ends["gain_unit"] = "N/m"
+    tables = {
+        "component": {"a": {"fmu": "Structure"}, "b": {"fmu": "Oscillator"}},
+        "connection": [ends],
+        "record": {"recorded_time": 1.0, "variables": ["b.displacement"], "rate": 8},
+        "execution": {"macro_step": 0.125},
+    }
+    path = export_system(vi.Scene.from_dict(tables), tmp_path / "system.ssp")
+    with zipfile.ZipFile(path) as archive:
+        archive.extract("resources/a.fmu", tmp_path)
+    names = {v.name for v in read_description(tmp_path / "resources" / "a.fmu").modelVariables}
+    assert variable in names
+    assert ("modal_displacement[1]" in names) == (variable != "displacement")
+
+
 def test_an_archive_fits_the_schema_and_leads_nowhere_else(system: Path, tmp_path: Path) -> None:
     assert problems(system, "1.0") == []
     text = zipfile.ZipFile(system).read("SystemStructure.ssd").decode()
