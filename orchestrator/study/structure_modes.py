@@ -219,24 +219,7 @@ def _of_scene(scene: Scene, body: str | None) -> tuple[str, Modes]:
     if body is not None and body not in there:
         raise UsageError(message(Argument("body"), f": expected one of {', '.join(there)}, got {body!r}."))
     name = body or next(iter(there))
-    return name, _of_body(there[name])
-
-
-def _of_body(body: ModesBody) -> Modes:
-    """Return the modes in the table of a body."""
-    count, origin = body.size, body.origin
-    ratios = np.broadcast_to(np.array(body.damping_ratio, dtype=np.float64), (count,))
-    return Modes(
-        natural=np.array(body.natural),
-        damping_ratios=ratios,
-        damping=np.array(body.damping_matrix) if body.damping_matrix else None,
-        shapes={name: np.array(shape) for name, shape in body.shapes.items()},
-        participation=np.array(body.participation) if body.participation else None,
-        residual_vectors=origin.residual_vectors if origin else 0,
-        error=origin.error if origin else None,
-        files=origin.files if origin else {},
-        remarks=origin.remarks if origin else (),
-    )
+    return name, there[name].given_modes()
 
 
 def refuse_ending(path: Path) -> None:
