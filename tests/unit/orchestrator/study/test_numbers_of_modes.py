@@ -6,13 +6,17 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from support.places import EXAMPLES
+from support.replay_scenes import channel, pulse, written
 from support.studied_scenes import ladder, studied_once
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy import advice, dataset_of
+from vibroimpact.orchestrator.study.errors import errors_of
+from vibroimpact.orchestrator.study.references import observed, scales_of
 from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
 from vibroimpact.orchestrator.study.ways.numbers_of_modes import finest_modes
 
@@ -99,6 +103,30 @@ def test_matrices_give_more_modes_than_their_scene_has(tmp_path: Path) -> None:
     assert max(way.setting for way in own) == 8
     path.write_text(text.replace('"tube/', f'"{EXAMPLES}/tube/').replace("modes = 10", "modes = 12"))
     assert finest_modes(Scene.from_file(path).with_values({"body[1].frequencies[1]": 9.0})) == {}
+
+
+def test_a_replay_of_given_modes_has_fewer_samples_and_fewer_modes(tmp_path: Path) -> None:
+    time = np.asarray(2e-5 * np.arange(1000), dtype=np.float64)
+    path = written(
+        tmp_path / "base.nc",
+        channel("base", time, pulse(time), "m s-2", trigger="one"),
+        channel("board", time, pulse(time), trigger="one"),
+    )
+    replay = {
+        **{"recordings": [str(path)], "drive": "base_acceleration", "from": "base", "drive_offset": 0.0},
+        "compare": [{"simulated": "sensor.acceleration", "measured": "board"}],
+    }
+    body = BOARD | {"participation": [1.0, 0.5, 0.3, 0.2, 0.1], "shapes": {"tip": BOARD["shapes"]["tip"]}}
+    scene = Scene.from_dict({"body": [body], "sensor": {"gain": 1.0}, "replay": replay})
+    ways = ways_of(scene)
+    assert {way.name for way in ways if not way.model} == {"fused", "fewer samples"}
+    whole, (one, _, four) = observed(scene), [way for way in ways if way.name == "modes"]
+    few, more = (
+        errors_of(observed(way.scene), whole, scales_of(scene)).of["samples"]
+        for way in (one, four)
+        if way.scene is not None
+    )
+    assert more < few < 1.0
 
 
 def test_forces_and_moving_stops_name_the_ways_that_they_do_not_have() -> None:
