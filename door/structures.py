@@ -33,6 +33,7 @@ def modes(
     residual: bool = True,
     base: str | None = None,
     damping_ratio: float | None = None,
+    rayleigh: Mapping[str, float] | None = None,
     body: str | None = None,
 ) -> xr.Dataset:
     """Return the modes of a structure: of its matrices, of a file of modes, or of a body of a scene.
@@ -64,6 +65,8 @@ def modes(
         Direction of a base that moves, such as `"z"`: gives the participation of each mode.
     damping_ratio : float, optional
         Damping ratio of all modes (0).
+    rayleigh : mapping of str to float, optional
+        `{"mass": a, "stiffness": b}` adds the damping a M + b K: a in 1/s, b in s.
     body : str, optional
         Name of the body of a scene that has several.
 
@@ -72,8 +75,9 @@ def modes(
     xarray.Dataset
         Along `mode`: `frequency` (Hz), `damping_ratio`, `is_residual`, and for a base `participation` and
         `effective_mass`. Along `point`: `shape`, `point_mass` (1 / shape^2), `flexibility` with residual vectors and
-        `flexibility_without`, and the places `x`, `y`, `z` where they are known. `attrs["error"]` is the relative error
-        of the flexibility by the reduction, and `attrs["remarks"]` says what was changed on the way.
+        `flexibility_without`, and the places `x`, `y`, `z` where they are known. Along `axis`: `total_mass` and
+        `centre_of_mass`. `attrs["error"]` is the relative error of the flexibility by the reduction, and
+        `attrs["remarks"]` says what was changed on the way.
 
     Raises
     ------
@@ -99,6 +103,7 @@ def modes(
         residual=None if residual else False,
         base=base,
         damping_ratio=damping_ratio,
+        rayleigh=rayleigh,
     )
     studied = given_path(file) if isinstance(file, str | os.PathLike) else given_scene(file)
     target = None

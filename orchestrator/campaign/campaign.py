@@ -40,6 +40,7 @@ from vibroimpact.orchestrator.campaign.formats import (
 )
 from vibroimpact.orchestrator.campaign.home import held_home, make_folder_in_home, refuse_blind_workers
 from vibroimpact.orchestrator.campaign.manifest import (
+    NAME,
     add_build,
     carried_manifest,
     differences,
@@ -184,7 +185,7 @@ class _Campaign:
         self._home = home
         self._progress = progress
         self._parts_folder = home / "parts"
-        self._manifest_path = home / "campaign.json"
+        self._manifest_path = home / NAME
         self._manifest = manifest_of_folder(home, scene, progress.note)
         # A worker may run in another folder; files named by the scene lie next to the scene.
         source = str(Path(scene.source).absolute())

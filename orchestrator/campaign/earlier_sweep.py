@@ -33,6 +33,7 @@ from vibroimpact.orchestrator.campaign.extension import (
     without_held,
 )
 from vibroimpact.orchestrator.campaign.manifest import (
+    NAME,
     Manifest,
     carried_manifest,
     new_manifest,
@@ -116,7 +117,7 @@ class EarlierSweep:
                 join_files(files, kept_path(self._folder, hashed), lambda form: form.assign_attrs(carried))
             self.note(f"{kept.size} of {runs} points are kept from the earlier sweep.")
         outdated = own_files(self._folder)
-        write_content(self.home / "campaign.json", manifest)
+        write_content(self.home / NAME, manifest)
         for path in outdated:
             if path != kept_path(self._folder, hashed):
                 path.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, NoReturn
 
 from vibroimpact.analysis.dataset.provenance import git_commit, versions
@@ -26,6 +27,7 @@ from vibroimpact.orchestrator.run.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import SpacedValues
 
+NAME = "campaign.json"
 FORMAT, STORE_FORMAT = 2, 3
 _FORMATS = (1, FORMAT, STORE_FORMAT)
 """Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`. Format 3 has a store."""
@@ -221,6 +223,30 @@ def read_manifest(path: AnyPath) -> Manifest | None:
             f"{path}: expected the manifest of a campaign, got a damaged file ({reason}). "
             "Put a copy of it back, or use another folder."
         ) from error
+
+
+def keeps_scene(folder: Path) -> bool:
+    """Return whether a folder is that of a campaign, which keeps its scene."""
+    return (folder / NAME).is_file()
+
+
+def kept_scene(folder: Path, changes: Sequence[str] = ()) -> Scene:
+    """Return the scene that the folder of a campaign keeps.
+
+    Bodies by matrices or by files have their modes as numbers. Other files are relative to the folder.
+
+    Raises
+    ------
+    UsageError
+        The folder is none of a campaign, or its manifest is damaged.
+    SceneError
+        A change is wrong.
+    """
+    path = folder / NAME
+    manifest = read_manifest(path)
+    if manifest is None:
+        raise UsageError(f"{folder}: expected a scene file or the folder of a campaign, got another folder.")
+    return parse_scene(manifest.scene_text, str(path), changes)
 
 
 def read_content(path: AnyPath) -> Content:

@@ -7,10 +7,12 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder
+from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.messages import counted, typed
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.formats import DatasetFormat
+from vibroimpact.orchestrator.campaign.manifest import keeps_scene, kept_scene
 from vibroimpact.orchestrator.campaign.workers.processors import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.commands.failures import outcome_lines
 from vibroimpact.orchestrator.operations.campaign import Campaign
@@ -19,14 +21,32 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
 from vibroimpact.orchestrator.study.preparing import prepared
 
+NO_FILE = "expected a file that can be read"
+"""Text of the problem of a body whose file is not there."""
+
 
 def run_to_folder(options: Campaign) -> None:
     """Run a scene's sweep into the folder of a campaign and print a summary."""
     refuse_two_kinds_of_workers(options.workers, options.scheduler)
     refuse_system_elsewhere(options.scene, options.scheduler)
-    loaded = opened_scene(options.scene, options.changes or (), strict=options.strict)
+    loaded = _scene_of(options)
     refuse_folder(options.output)
     compute(prepared(loaded), options.output, options.workers, options.scheduler, options.format)
+
+
+def _scene_of(options: Campaign) -> Scene:
+    """Return the scene of a file, or the one that the folder of a campaign keeps, whose bodies need no files."""
+    changes = options.changes or ()
+    if options.scene.is_dir():
+        return kept_scene(options.scene, changes)
+    try:
+        return opened_scene(options.scene, changes, strict=options.strict)
+    except SceneError as error:
+        if not any(NO_FILE in str(problem) for problem in error.problems) or not keeps_scene(options.output):
+            raise
+        again = f"vibroimpact campaign {options.output} -o {options.output}"
+        hint = f"`{again}` goes on without it, with the modes that the campaign keeps."
+        raise SceneError([f"{problem} {hint}" for problem in error.problems]) from None
 
 
 def compute(

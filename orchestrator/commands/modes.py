@@ -32,6 +32,11 @@ from vibroimpact.orchestrator.study.structure_modes import (
 
 _MOST_LISTED = 8
 """Largest number of points in the printed tables."""
+_TABLES = {
+    "point": 'weights such as {"12.z"=1, "17.z"=-1}',
+    "rayleigh": "a table such as {mass=0.1, stiffness=1e-5}",
+}
+"""Tables of numbers that options take, by the name of the option."""
 
 
 def show_modes(options: ShowModes) -> None:
@@ -50,6 +55,7 @@ def show_modes(options: ShowModes) -> None:
         residual=None if options.residual else False,
         base=options.base,
         damping_ratio=options.damping_ratio,
+        rayleigh=None if options.rayleigh is None else _table("rayleigh", options.rayleigh),
     )
     _refuse_places(options, choices)
     with Terminal(stderr=True).status(f"Modes of {options.file}"):
@@ -105,18 +111,19 @@ def _points(texts: list[str]) -> dict[str, str | Weights]:
         if not at or name in found:
             got = f"{name!r} again" if name in found else repr(text[:60])
             raise UsageError(f"--point: expected NAME=FREEDOM such as tip=12.z, each name once, got {got}.")
-        found[name] = _weights(at) if at.startswith("{") else at
+        found[name] = _table("point", at) if at.startswith("{") else at
     return found
 
 
-def _weights(text: str) -> Weights:
+def _table(option: str, text: str) -> Weights:
+    """Return a table of numbers in the text of an option; another text raises UsageError."""
     try:
         found = parse_toml(f"at = {text}")["at"]
-    except ValueError:
+    except (ValueError, KeyError):
         found = None
     if not isinstance(found, dict) or not all(type(each) in (int, float) for each in found.values()):
-        raise UsageError(f'--point: expected weights such as {{"12.z"=1, "17.z"=-1}}, got {text[:60]!r}.')
-    return {name: float(weight) for name, weight in found.items()}
+        raise UsageError(f"--{option}: expected {_TABLES[option]}, got {text[:60]!r}.")
+    return {name: float(number) for name, number in found.items()}
 
 
 def _print(modes: Modes, title: str) -> None:
@@ -129,12 +136,27 @@ def _print(modes: Modes, title: str) -> None:
     rows = list(_flexibilities(modes, listed))
     heads = ">m/N", ">without residual vectors", ">these add"
     terminal.print(table("Static flexibility of the elastic modes", "<point", *heads, rows=rows))
+    if modes.masses:
+        say(_total_mass(modes))
     if len(modes.shapes) > len(listed):
         say(f"The first {len(listed)} of {counted(len(modes.shapes), 'point')} are listed.")
     if modes.error is not None:
         say(f"The flexibility at the points has a relative error of {modes.error:.1e} by the reduction.")
     for remark in modes.remarks:
         say(remark)
+
+
+def _total_mass(modes: Modes) -> str:
+    """Return the mass that moves along each axis, the centre of mass, and the share of the effective masses."""
+    kinds: dict[str, list[str]] = {}
+    for axis, mass in modes.masses.items():
+        kinds.setdefault(f"{mass:.5g} kg", []).append(axis)
+    said = "; ".join(f"{mass} along {', '.join(axes)}" for mass, axes in kinds.items())
+    if modes.centre:
+        said += f", with its centre at ({', '.join(f'{each:.4g}' for each in modes.centre)}) m"
+    if modes.participation is not None:
+        said += f". The modes move {float((modes.participation**2).sum()):.5g} kg with the base"
+    return f"Mass that the matrices move: {said}."
 
 
 def _mass(value: float, largest: float) -> str:

@@ -14,8 +14,8 @@ class Accuracy(Operation):
     """Show accuracy against computing time: simulate a scene in all possible ways, against the best reference.
 
     The ways are: stops inside the body's FMU; stops as FMUs of their own (FMI 3.0, 2.0); plain steps of equal size;
-    model exchange. Each way runs at its own settings. Times are medians of runs in turn. A sweep is ignored. Exit code
-    2: no way reaches the tolerance.
+    model exchange. Structures have numbers of modes. Each way runs at its own settings. Times are medians of runs in
+    turn. A sweep is ignored. Exit code 2: no way reaches the tolerance.
 
     Example: vibroimpact accuracy examples/single_run.toml -o accuracy.nc --figure accuracy.png --tolerance 1e-6
     """

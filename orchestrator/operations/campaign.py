@@ -18,7 +18,10 @@ class Campaign(Operation):
 
     scene: Annotated[
         Path,
-        Positional(python="scene: SceneLike", help="Scene file (TOML), or a system (SSP), with a sweep."),
+        Positional(
+            python="scene: SceneLike",
+            help="Scene file (TOML) or a system (SSP) with a sweep, or the folder of a campaign that goes on.",
+        ),
     ]
     output: Annotated[
         Path,

@@ -13,9 +13,9 @@ from vibroimpact.orchestrator.operations.arguments import Changes
 class ShowModes(Operation):
     """Print the modes of a structure: of its matrices, of a file of modes, or of a body of a scene.
 
-    Printed are frequencies, damping ratios and effective masses, and for each point the flexibility that residual
-    vectors add. Without points, all degrees of freedom have shapes, 1024 at most, and none has a residual vector.
-    -o modes.toml writes them as a body of a scene, which needs the matrices no more.
+    Printed are frequencies, damping ratios, effective masses, and the total mass with its centre. Each point has the
+    flexibility that residual vectors add. Without points, all degrees of freedom have shapes, 1024 at most, and none
+    has a residual vector. -o modes.toml writes them as a body of a scene, which needs the matrices no more.
 
     Example: vibroimpact modes examples/bracket/bracket.sti.gz --point tip=42.z --base z -o modes.toml
 
@@ -73,6 +73,14 @@ class ShowModes(Operation):
     ] = True
     base: Annotated[str | None, Option(help="Direction of a base that moves, such as z.")] = None
     damping_ratio: Annotated[float | None, Option(help="Damping ratio of all modes.")] = None
+    rayleigh: Annotated[
+        str | None,
+        Option(
+            metavar="{mass=A, stiffness=B}",
+            help="Damping A M + B K: A in 1/s, B in s; one of them may be left out.",
+            python="rayleigh: Mapping[str, float] | None = None",
+        ),
+    ] = None
     body: Annotated[str | None, Option(help="Name of the body of a scene with several.")] = None
     output: Annotated[
         Path | None,

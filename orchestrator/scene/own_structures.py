@@ -57,7 +57,7 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
     found: list[Any] = []
     tolerance = _tolerance(document)
     for path, body in _bodies(document):
-        names = set(_named_points(document, str(body.get("name", path[0]))))
+        names = set(points_named(document, str(body.get("name", path[0]))))
         if body.get("kind") == "matrices":
             found.append(_of_matrices(body, path, folder, names, tolerance, problems))
         elif body.get("kind") == "modes" and "file" in body:
@@ -73,7 +73,7 @@ def request_of(document: Mapping[str, Any], name: str, folder: Path) -> Request 
     for path, body in _bodies(document):
         if body.get("name", path[0]) == name and body.get("kind") == "matrices":
             table = _table(body, path, [])
-            named = set(_named_points(document, name))
+            named = set(points_named(document, name))
             return None if table is None else _request(table, folder, named, _tolerance(document))
     return None
 
@@ -115,7 +115,7 @@ def _bodies(document: Mapping[str, Any]) -> Iterator[tuple[KeyPath, dict[str, An
         yield ("body", place), body if isinstance(body, dict) else {}
 
 
-def _named_points(document: Mapping[str, Any], name: str) -> Iterator[str]:
+def points_named(document: Mapping[str, Any], name: str) -> Iterator[str]:
     """Yield what follows the name of a body in all points of a document."""
 
     def texts(value: object) -> Iterator[str]:

@@ -22,10 +22,20 @@ DIGITS = 5e-14
 """Strain energy over the moduli of its terms, below which a motion is rigid: rounding of the 14 digits of CalculiX."""
 CLEARLY_HELD = 1e-11
 """Eigenvalue of a stiffness with a diagonal of 1, above which no motion is rigid."""
+FEW_DIGITS = range(8, 13)
+"""Decimal digits of all entries of a stiffness that count as the rounding of a program: Nastran writes 10.
+
+With fewer digits numbers may be written by hand, and exact; with more, `DIGITS` holds.
+"""
+GAP = 100.0
+"""Strain energy of the first elastic mode over the rounding of few digits, above which the motions below are rigid."""
+MOST_LOOKED_AT = 2048
+"""Most entries whose digits are counted."""
 SHIFTS = (1e-14, 1e-11, 1e-8)
 """Stiffness that holds rigid-body modes while they are sought, over the diagonal; larger ones for fewer digits."""
 MOST_RIGID = 64
 _PASSES = 20
+_DIGITS_OF_DOUBLES = 17
 
 
 class Flexibility:
@@ -59,6 +69,8 @@ class Flexibility:
         self._order, self._names = order, [matrices.freedoms[place] for place in order]
         self._matrix, self._scale = scaled(matrices.stiffness[order][:, order].tocsc())
         self._free = np.arange(len(order))
+        self._digits = decimal_digits(matrices.stiffness.data)
+        self._few = 0.5 * 10.0 ** (1 - self._digits) if self._digits in FEW_DIGITS else 0.0
         self._factors = _factors(self._matrix)
         motions = np.zeros((len(order), 0))
         if self._factors is None or self._is_doubtful():
@@ -94,17 +106,25 @@ class Flexibility:
             moves, _ = np.linalg.qr(self._factors.solve(moves))
             if not np.isfinite(moves).all():
                 return True
-        return bool(np.linalg.eigvalsh(moves.T @ (self._matrix @ moves))[0] < CLEARLY_HELD)
+        return bool(
+            np.linalg.eigvalsh(moves.T @ (self._matrix @ moves))[0] < max(CLEARLY_HELD, GAP * self._few)
+        )
 
     def _rigid_motions(self) -> Floats:
         """Return orthonormal motions without strain energy, in scaled coordinates, shape (freedom, motion)."""
-        for shift in SHIFTS:
+        for shift in (*SHIFTS, GAP * self._few):
             motions, energies = self._soft_motions(shift)
             lowest = float(energies.min(initial=0.0))
             if -4.0 * lowest > max(shift, DIGITS):
                 continue
-            rounding = max(DIGITS, -8.0 * lowest)
-            if rounding > DIGITS:
+            rounding = max(DIGITS, -8.0 * lowest, self._few)
+            above = float(energies[energies > rounding].min(initial=np.inf))
+            if self._few and above < GAP * rounding and (energies <= rounding).any():
+                rounding = max(DIGITS, -8.0 * lowest)
+                self.remarks += (
+                    f"The {self._digits} digits of the stiffness do not tell slow modes from rigid-body modes.",
+                )
+            elif rounding > DIGITS and (energies <= rounding).any():
                 self.remarks += (
                     f"The stiffness has few digits: rigid-body modes have {rounding:.0e} of the energy of its terms.",
                 )
@@ -130,7 +150,7 @@ class Flexibility:
             _, ways = np.linalg.eigh(moves.T @ (self._matrix @ moves))
             moves = moves @ ways
             energies = self._energies(moves)
-            found = int((energies <= DIGITS).sum())
+            found = int((energies <= max(DIGITS, self._few)).sum())
             full = found == moves.shape[1] < count
             if full and found > MOST_RIGID:
                 raise UsageError(f"expected at most {MOST_RIGID} rigid-body modes, got more.")
@@ -169,6 +189,20 @@ class Flexibility:
                 f"expected mass or stiffness for each motion, got neither for one, mostly of {self._names[place]}."
             )
         return np.asarray(moves @ (ways / size[:, None] / np.sqrt(values)))
+
+
+def decimal_digits(values: Floats) -> int:
+    """Return the fewest significant decimal digits that hold all of some numbers: up to 17 for doubles.
+
+    >>> decimal_digits(np.array([1.5, -2.25, 1.234567891e5]))
+    10
+    """
+    looked_at = values[:: max(1, len(values) // MOST_LOOKED_AT)].tolist()
+    digits = 1
+    for value in looked_at:
+        while digits < _DIGITS_OF_DOUBLES and float(f"{value:.{digits - 1}e}") != value:
+            digits += 1
+    return digits
 
 
 def _held(motions: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -16,7 +16,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
 from vibroimpact.orchestrator.structures.modes import Modes
 
-VERSION = 1
+VERSION = 2
 """Version of the reduction; results of an older version are made anew."""
 MOST_KEPT = 256
 """Largest number of results that are kept; the oldest go first."""
@@ -74,7 +74,7 @@ def _read(path: Path) -> Modes | None:
     }
     shapes = {name: np.array(shape) for name, shape in found["shapes"].items()}
     places = {name: tuple(place) for name, place in found["coordinates"].items()}
-    tuples = {"remarks": tuple(found["remarks"]), "coordinates": places}
+    tuples = {"remarks": tuple(found["remarks"]), "coordinates": places, "centre": tuple(found["centre"])}
     return Modes(**{**found, **arrays, **tuples, "shapes": shapes})
 
 

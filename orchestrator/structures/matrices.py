@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
 
+AXES = ("x", "y", "z")
+"""Directions of displacements, in which the names of degrees of freedom end."""
 GOLDEN = 0.6180339887498949
 """Golden ratio less one."""
 Sparse = Any
@@ -75,6 +77,26 @@ class Matrices:
         """
         moves = np.array([name.rpartition(".")[2] == direction for name in self.freedoms])
         return np.where(moves & self._at_nodes, 1.0, 0.0)
+
+    def masses(self) -> dict[str, float]:
+        """Return the mass that moves with 1 m of the base along each of x, y and z that has degrees of freedom, kg."""
+        moves = {direction: self.rigid(direction) for direction in AXES}
+        return {name: float(along @ (self.mass @ along)) for name, along in moves.items() if along.any()}
+
+    def centre(self) -> tuple[float, ...]:
+        """Return the centre of mass x, y, z, m, of the direction that moves most mass; empty where a place is unknown.
+
+        Row sums of the mass matrix stand for the masses of nodes, which is exact for solid elements.
+        """
+        moved = self.masses()
+        if self.coordinates is None or not moved:
+            return ()
+        along = self.rigid(max(moved, key=lambda name: moved[name]))
+        at_nodes = along > 0.0
+        masses, places = (self.mass @ along)[at_nodes], self.coordinates[at_nodes]
+        if np.isnan(places).any() or not masses.sum() > 0.0:
+            return ()
+        return tuple((masses @ places / masses.sum()).tolist())
 
     def places_of(self, points: Mapping[str, Mapping[str, float]]) -> dict[str, tuple[float, float, float]]:
         """Return the known places of points that are one degree of freedom."""

@@ -36,6 +36,10 @@ class Modes:
         What was changed or left out on the way, one sentence each.
     coordinates : mapping of str to tuple of float
         Place x, y, z of the node of each point that is a degree of freedom, m, where it is known.
+    masses : mapping of str to float
+        Mass that moves along each direction, kg, where degrees of freedom have names that end in x, y or z.
+    centre : tuple of float
+        Centre of mass x, y, z, m; empty where a place is not known.
     """
 
     natural: Floats
@@ -48,6 +52,8 @@ class Modes:
     files: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     coordinates: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    masses: Mapping[str, float] = field(default_factory=dict)
+    centre: tuple[float, ...] = ()
 
     def table(self) -> dict[str, Any]:
         """Return the table `[body]` of these modes, with where they come from."""

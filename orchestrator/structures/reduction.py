@@ -102,9 +102,11 @@ def reduce(
         shapes=dict(zip(points, loads.T @ shapes, strict=True)) | seen,
         participation=participation,
         residual_vectors=found.vectors,
-        error=found.error,
+        error=found.error if points else None,
         remarks=(*remarks, *reduction.remarks, *found.remarks),
         coordinates=matrices.places_of({**points, **{name: {name: 1.0} for name in seen}}),
+        masses=matrices.masses(),
+        centre=matrices.centre(),
     )
 
 

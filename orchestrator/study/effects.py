@@ -19,6 +19,7 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.run.summary import effects as called_effects
 from vibroimpact.orchestrator.run.summary import laws
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BodyAlone, StructureBody
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import DAMPING, MOTION_KEYS, StopTable
 from vibroimpact.orchestrator.study.errors import errors_of
@@ -115,8 +116,16 @@ class Share:
 
 def effects_of(scene: Scene) -> list[Effect]:
     """Return the effects that a scene without a sweep could leave out, each with the scene without the effect."""
-    found = list(_found(scene))
+    found = list(_found(_observing(scene)))
     return [effect for effect in found if effect is not None]
+
+
+def _observing(scene: Scene) -> Scene:
+    """Return a scene that names its observed point, which is otherwise that of its first stop or contact."""
+    body = scene.bodies[0]
+    if not isinstance(body, StructureBody) or isinstance(body, BodyAlone) or scene.record.observed:
+        return scene
+    return scene.with_values({"record.observed": [body.first_observed(scene.stops)]})
 
 
 def _found(scene: Scene) -> Iterator[Effect | None]:

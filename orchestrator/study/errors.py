@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.study.observation import Floats, Observation
 
 QUANTITIES = (
     *("impact_time", "impact_velocity", "displacement_range", "final_state", "samples"),
-    *("interface_energy", "energy_balance"),
+    *("interface_energy", "energy_balance", "mean_energy"),
 )
 """Quantities that have an error."""
 FIRST_IMPACTS = 10
@@ -45,6 +45,8 @@ class Errors:
     """Failure of the way, or its missing and extra impacts, in words; empty where all impacts match."""
     growth: Floats
     """Relative error of the velocity of each compared impact, in their order, shape (impact,)."""
+    remark: str = ""
+    """Numbers of impacts, in words, where motions are compared as a whole; else empty."""
 
     def worst(self, quantity: str = "all") -> float:
         """Return the error of a quantity, or the largest of all known errors; NaN where none is known."""
@@ -82,6 +84,19 @@ def errors_of(
     errors["interface_energy"] = _error_of_energy(found, reference, scales)
     errors["energy_balance"] = found.energy_balance
     return Errors(errors, failure, growth)
+
+
+def errors_as_a_whole(found: Observation, reference: Observation) -> Errors:
+    """Return the errors of range and mean energy alone, for motions whose impacts do not correspond."""
+    if found.failure:
+        return no_errors(found.failure)
+    errors = dict.fromkeys(QUANTITIES, math.nan)
+    for name in ("displacement_range", "mean_energy"):
+        size = getattr(reference, name)
+        if size > 0.0:
+            errors[name] = abs(getattr(found, name) - size) / size
+    counts = f"{len(found.impacts)} impacts, {len(reference.impacts)} of the reference"
+    return Errors(errors, "", np.empty(0), counts)
 
 
 def _errors_of_motion(found: Observation, reference: Observation, scales: Scales) -> dict[str, float]:

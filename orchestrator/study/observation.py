@@ -39,6 +39,8 @@ class Observation:
     """Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged."""
     energy_balance: float = math.nan
     """Largest relative error of the energy balance of a body; NaN where its energies were not followed."""
+    mean_energy: float = math.nan
+    """Mean of kinetic and potential energy over the recording, J; NaN where it was not followed."""
     samples: Floats | None = None
     """Sampled variables of a general scene, or readings of a replay, without the time, shape (sample, variable)."""
     sample_times: Floats | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from vibroimpact.orchestrator.scene.file import parse_scene_toml, read_scene_tex
 from vibroimpact.orchestrator.scene.own_structures import apart_from_modes, request_of
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.structures.find import find_modes
+from vibroimpact.orchestrator.structures.matrices import AXES
 from vibroimpact.orchestrator.structures.modes import Modes
 from vibroimpact.orchestrator.structures.modes_files import read_modes
 from vibroimpact.orchestrator.structures.modes_files import write_modes as write_text
@@ -48,12 +50,16 @@ TABLE = ResultTable(
     ("x", "point", "m", "place of the point along x"),
     ("y", "point", "m", "place of the point along y"),
     ("z", "point", "m", "place of the point along z"),
+    ("total_mass", "axis", "kg", "mass that moves along the axis"),
+    ("centre_of_mass", "axis", "m", "place of the centre of mass along the axis"),
     ("mode", "mode", "1", "number of the mode"),
+    ("axis", "axis", "1", "x, y or z", "text"),
     ("point", "point", "1", "name of the point", "text"),
 )
 AT_NODE = 1e-10
 """Share of the largest shape below which a point counts as a node of a mode: shapes are rounded to some 1e-14."""
 _DATASET = ".nc"
+_ONE_MATRIX = ".mtx"
 _SCENE_TABLES = frozenset(
     {"scene", "stop", "contact", "link", "forcing", "record", "execution", "sweep", "sensor"}
 )
@@ -73,6 +79,8 @@ class Choices:
         Degree of freedom at each named point, or weights of several.
     modes : int, "auto" or None
     tolerance, damping_ratio : float or None
+    rayleigh : mapping of str to float, or None
+        `mass`, 1/s, and `stiffness`, s: factors of both matrices in the damping.
     residual : False or None
     base : str or None
     """
@@ -87,6 +95,7 @@ class Choices:
     residual: bool | None = None
     base: str | None = None
     damping_ratio: float | None = None
+    rayleigh: Mapping[str, float] | None = None
 
     def refuse(self, words: str) -> None:
         """Raise UsageError if something is chosen beside another file than one of matrices."""
@@ -131,12 +140,17 @@ def modes_of(
     if isinstance(file, Scene) or is_scene(file):
         choices.refuse("a scene")
         name, found = _of_scene(opened_scene(file, changes) if isinstance(file, Path) else file, body)
-        return _with_nodes(found, file, name, changes) if figure and isinstance(file, Path) else found
+        return _with_matrices(found, file, name, changes, figure=figure) if isinstance(file, Path) else found
     for name, given in (("body", body), ("set", changes)):
         if given:
             raise UsageError(message(Argument(name), ": expected a scene with it, got another file."))
     if _suffix(file) in OF_MATRICES:
-        return find_modes(_request(file, choices, figure))
+        request = _request(file, choices, figure)
+        try:
+            return find_modes(request)
+        except UsageError as error:
+            said = str(error)
+            raise UsageError(f"{file}: {said}" if said.startswith("expected") else said) from None
     choices.refuse("a file of modes")
     return read_modes(file)
 
@@ -184,13 +198,31 @@ def _request(file: Path, choices: Choices, figure: bool) -> Request:
                 ": expected none beside a file of the mass matrix, got one. Leave it out.",
             )
         )
+    if not apart and _suffix(file) == _ONE_MATRIX:
+        got = "none" if choices.mass is None else f"{choices.mass}, which is no file"
+        raise UsageError(message(Argument("mass"), f": expected the file of the mass matrix, got {got}."))
+    given |= {"rayleigh": _rayleigh(choices.rayleigh)} if choices.rayleigh is not None else {}
+    if choices.damping_ratio is not None and not 0.0 <= choices.damping_ratio < math.inf:
+        got = f": expected a damping ratio >= 0, got {choices.damping_ratio:g}."
+        raise UsageError(message(Argument("damping_ratio"), got))
     matrices = {"stiffness": str(file), "mass": ""} if apart else {"file": file, "stiffness": "", "mass": ""}
     shown = MOST_POINTS - len(points) if figure or not points else 0
     return Request(**{**matrices, **given, "points": points, "folder": Path(), "shown": shown})
 
 
-def _with_nodes(modes: Modes, file: Path, name: str, changes: tuple[str, ...]) -> Modes:
-    """Return modes of a body of a scene with shapes at further nodes and with places, if its matrices give them."""
+def _rayleigh(given: Mapping[str, float]) -> tuple[float, float]:
+    """Return the factors of the mass and of the stiffness in the damping; others raise UsageError."""
+    is_known = isinstance(given, Mapping) and given and given.keys() <= {"mass", "stiffness"}
+    if not is_known or not all(
+        isinstance(each, int | float) and 0.0 <= each < math.inf for each in given.values()
+    ):
+        expected = ": expected {mass = .., stiffness = ..} of numbers >= 0, got others."
+        raise UsageError(message(Argument("rayleigh"), expected))
+    return float(given.get("mass", 0.0)), float(given.get("stiffness", 0.0))
+
+
+def _with_matrices(modes: Modes, file: Path, name: str, changes: tuple[str, ...], *, figure: bool) -> Modes:
+    """Return modes of a body of a scene with what its matrices know: masses, and shapes at nodes for a figure."""
     if file.suffix != ".toml":
         return modes
     written = parse_scene_toml(read_scene_text(file, str(file)), str(file))
@@ -199,8 +231,11 @@ def _with_nodes(modes: Modes, file: Path, name: str, changes: tuple[str, ...]) -
     request = request_of(document, name, file.parent)
     if request is None:
         return modes
-    found = find_modes(replace(request, shown=MOST_POINTS - len(modes.shapes)))
-    return replace(modes, shapes={**found.shapes, **modes.shapes}, coordinates=found.coordinates)
+    found = find_modes(replace(request, shown=MOST_POINTS - len(modes.shapes)) if figure else request)
+    shapes = {**modes.shapes, **{key: each for key, each in found.shapes.items() if key not in modes.shapes}}
+    return replace(
+        modes, shapes=shapes, coordinates=found.coordinates, masses=found.masses, centre=found.centre
+    )
 
 
 def _of_scene(scene: Scene, body: str | None) -> tuple[str, Modes]:
@@ -219,24 +254,7 @@ def _of_scene(scene: Scene, body: str | None) -> tuple[str, Modes]:
     if body is not None and body not in there:
         raise UsageError(message(Argument("body"), f": expected one of {', '.join(there)}, got {body!r}."))
     name = body or next(iter(there))
-    return name, _of_body(there[name])
-
-
-def _of_body(body: ModesBody) -> Modes:
-    """Return the modes in the table of a body."""
-    count, origin = body.size, body.origin
-    ratios = np.broadcast_to(np.array(body.damping_ratio, dtype=np.float64), (count,))
-    return Modes(
-        natural=np.array(body.natural),
-        damping_ratios=ratios,
-        damping=np.array(body.damping_matrix) if body.damping_matrix else None,
-        shapes={name: np.array(shape) for name, shape in body.shapes.items()},
-        participation=np.array(body.participation) if body.participation else None,
-        residual_vectors=origin.residual_vectors if origin else 0,
-        error=origin.error if origin else None,
-        files=origin.files if origin else {},
-        remarks=origin.remarks if origin else (),
-    )
+    return name, there[name].given_modes()
 
 
 def refuse_ending(path: Path) -> None:
@@ -255,7 +273,11 @@ def write_modes(path: Path, modes: Modes, named: Collection[str] | None) -> None
         write_results(dataset_of(modes), path)
         return
     kept = {name: shape for name, shape in modes.shapes.items() if not named or name in named}
-    write_text(path, replace(modes, shapes=kept))
+    try:
+        write_text(path, replace(modes, shapes=kept))
+    except UsageError as error:
+        said = str(error)
+        raise UsageError(f"{path}: {said}" if said.startswith("expected") else said) from None
 
 
 def dataset_of(modes: Modes, title: str = "") -> xr.Dataset:
@@ -283,6 +305,8 @@ def dataset_of(modes: Modes, title: str = "") -> xr.Dataset:
         "flexibility": with_all,
         "flexibility_without": without,
         **(dict(zip("xyz", places.T, strict=True)) if modes.coordinates else {}),
+        "total_mass": [modes.masses.get(axis, np.nan) for axis in AXES] if modes.masses else None,
+        "centre_of_mass": modes.centre or None,
         "mode": np.arange(1, len(modes.natural) + 1),
         "point": list(modes.shapes),
     }
@@ -293,6 +317,8 @@ def dataset_of(modes: Modes, title: str = "") -> xr.Dataset:
     }
     attributes |= {} if modes.error is None else {"error": modes.error}
     attributes |= {"remarks": "\n".join(modes.remarks)} if modes.remarks else {}
+    if modes.masses:
+        values["axis"] = list(AXES)
     given = {name: value for name, value in values.items() if value is not None}
     return TABLE.dataset(given, attributes | program_attributes())
 

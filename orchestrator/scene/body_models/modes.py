@@ -27,6 +27,7 @@ from vibroimpact.orchestrator.scene.sampled_names import each_of
 
 if TYPE_CHECKING:
     from vibroimpact.fmus.bodies.assembly import Part
+    from vibroimpact.orchestrator.structures.modes import Modes
 
 _Frequencies = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=1, max_length=MOST_MODES)]
 _ONE_FOR_EACH = "One for each mode."
@@ -179,6 +180,23 @@ class ModesBody(BodyTable):
         """The motion and the energy of each mode."""
         names = "modal_displacement", "modal_velocity", "modal_energy"
         return tuple(one for name in names for one in each_of(name, self.size))
+
+    def given_modes(self) -> Modes:
+        """Return the modes in this table."""
+        from vibroimpact.orchestrator.structures.modes import Modes
+
+        origin = self.origin or Origin()
+        return Modes(
+            natural=np.array(self.natural),
+            damping_ratios=np.full(self.size, self.damping_ratio, dtype=np.float64),
+            damping=np.array(self.damping_matrix) if self.damping_matrix else None,
+            shapes={name: np.array(shape) for name, shape in self.shapes.items()},
+            participation=np.array(self.participation) if self.participation else None,
+            residual_vectors=origin.residual_vectors,
+            error=origin.error,
+            files=origin.files,
+            remarks=origin.remarks,
+        )
 
     def as_part(self) -> Part:
         """Return this body as a part of an assembly."""

@@ -97,6 +97,7 @@ def advice(study: Comparison) -> str:
         ratio = other.cost / chosen.cost
         words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.error_in_words(quantity, known)}"
     words += _for_the_score(study)
+    words += _of_own_modes(study)
     if study.reference.chaotic:
         begin, end = study.reference.scales.window
         part = (
@@ -106,6 +107,16 @@ def advice(study: Comparison) -> str:
         )
         words += f". The motion is chaotic: after its {part} only statistics compare"
     return f"{words}."
+
+
+def _of_own_modes(study: Comparison) -> str:
+    """Return the difference of the scene's own number of modes from the most modes; empty where it is not known."""
+    own = next((one for one in study.measured if one.way.is_own_model), None)
+    if own is None or math.isnan(own.error(study.quantity)):
+        return ""
+    off = f"{own.error(study.quantity):.1e}"
+    chance = f" (by chance alone up to {study.chance:.1e})" if study.chance == study.chance else ""
+    return f". With {study.modes_reference} the motion differs from that of the scene by {off}{chance}"
 
 
 def _for_the_score(study: Comparison) -> str:

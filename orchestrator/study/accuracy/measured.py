@@ -142,6 +142,8 @@ class Comparison:
         Reference of the other numbers of modes, in words; empty where there are none.
     effort : Effort
         Time that the study took on the machine.
+    chance : float
+        Relative difference of range and mean energy of chaotic motion by chance alone; NaN where they do not count.
     """
 
     scene: Scene
@@ -154,6 +156,7 @@ class Comparison:
     remarks: tuple[str, ...]
     modes_reference: str = ""
     effort: Effort = field(default_factory=Effort)
+    chance: float = math.nan
 
     @property
     def periods(self) -> float:

@@ -91,7 +91,7 @@ def table_of(
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
             *(each if wide else ()),
             *((f"{one.variance:.2f} %",) if scored else ()),
-            f"{one.errors.failure}{_part_in_words(one.part)}".removeprefix(", "),
+            f"{one.errors.failure or one.errors.remark}{_part_in_words(one.part)}".removeprefix(", "),
         )
     return rows
 

@@ -12,6 +12,7 @@ from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.run.parameters import free_state
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.study.accuracy.budget import Budget
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, errors_of
 from vibroimpact.orchestrator.study.observation import LATE, Observation
@@ -91,12 +92,10 @@ def transient_passed(scene: Scene, budget: Budget) -> Passed:
             return Passed(kept, scene, found)
     finally:
         trial.close()
-    return Passed(
-        scene,
-        scene,
-        remark="one transient for all ways: the motion from the state at its end is not the one after it, so each way "
-        "passes it",
-    )
+    why = "the motion from the state at its end is not the one after it"
+    if isinstance(scene.body, StructureBody):
+        why = "the state at its end is one of modes, which the tables of its bodies do not have"
+    return Passed(scene, scene, remark=f"one transient for all ways: {why}, so each way passes it")
 
 
 def observed_within(scene: Scene, seconds: float) -> Observation:
@@ -136,8 +135,8 @@ def _no_transient(scene: Scene) -> Mapping[str, Any]:
 
 def _started_with(scene: Scene, state: tuple[float, ...]) -> Scene | None:
     """Return a scene that starts with a state at forcing phase 0; None where such a scene is invalid."""
-    if scene.lists_forces:
-        return None  # its state is of modes, which the table of the body does not have
+    if isinstance(scene.body, StructureBody):
+        return None  # its state is of modes, which the tables of its bodies do not have
     changes: dict[str, Any] = dict(_no_transient(scene))
     free = free_state(scene, state)
     half = len(free) // 2

@@ -9,8 +9,7 @@ from numbers import Real
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import ModesBody, StructureBody
-from vibroimpact.orchestrator.scene.forcing_models import forces_in_words
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.study.accuracy.budget import LEAST_BUDGET
 from vibroimpact.orchestrator.study.accuracy.choice import error_of_reference
 from vibroimpact.orchestrator.study.errors import QUANTITIES
@@ -61,31 +60,14 @@ def refuse_misuse(tolerance: float | None, quantity: str, budget: float) -> None
         _refuse_tolerance(tolerance, LEAST_TOLERANCE, "as double precision has it")
 
 
-def refuse_several_bodies(scene: Scene) -> None:
-    """Raise UsageError for several bodies or forces, which no other way simulates."""
-    if scene.has_several_forces:
-        raise UsageError(
-            f"{scene.source}: forcing: expected one sine, under which a body has other ways to be simulated, got "
-            f"{forces_in_words(scene.forces)}. They run fused, and are exact between impacts."
-        )
-    if scene.moving_stop:
-        raise UsageError(
-            f"{scene.source}: {scene.moving_stop}: expected stops that stand still, beside which a body has other ways "
-            "to be simulated, got a stop that moves. It runs fused, and is exact between impacts."
-        )
-    if scene.is_one_body and isinstance(scene.body, StructureBody):
-        raise UsageError(
-            f"{scene.source}: body: expected one body, which has other ways to be simulated, got {_kind(scene.body)}. "
-            f"They run fused, and are exact between impacts.{_of_reductions(scene.body)}"
-        )
-
-
 def refuse_one_way(ways: Sequence[Way], scene: Scene) -> None:
-    """Raise UsageError unless a scene has at least two ways, not counting other models."""
-    if len([way for way in ways if not way.model]) < 2:
+    """Raise UsageError unless a scene has at least two ways; of other models a structure's numbers of modes count."""
+    is_structure = isinstance(scene.bodies[0], StructureBody)
+    if len([way for way in ways if not way.model or is_structure]) < 2:
+        why = ": several bodies, several forces and stops that move run fused" if is_structure else ""
         raise UsageError(
-            f"{scene.source}: expected a scene with something to vary (stops, or components that exchange values), "
-            "got one that is simulated in one way. It is exact."
+            f"{scene.source}: expected a scene with something to vary (stops, modes, or components that exchange "
+            f"values), got one that is simulated in one way. It is exact{why}."
         )
 
 
@@ -106,21 +88,4 @@ def _refuse_tolerance(tolerance: float, least: float, why: str) -> None:
             Argument("tolerance"),
             f": expected a relative error of {least:.1e} or more, {why}, got {tolerance:g}.",
         )
-    )
-
-
-def _kind(body: StructureBody) -> str:
-    return "given modes" if all(isinstance(part, ModesBody) for part in body.parts) else "several"
-
-
-def _of_reductions(body: StructureBody) -> str:
-    """Return a sentence on the errors of bodies by matrices; empty without them."""
-    origins = {name: getattr(part, "origin", None) for name, part in zip(body.names, body.parts, strict=True)}
-    errors = [
-        f"{each.error:.2g} of {name}" for name, each in origins.items() if each and each.error is not None
-    ]
-    return (
-        f" Reduced matrices: relative error {', '.join(errors)} of the flexibility at the points."
-        if errors
-        else ""
     )

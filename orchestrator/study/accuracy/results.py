@@ -81,6 +81,7 @@ def dataset_of(study: Comparison) -> xr.Dataset:
         "verdict": advice(study),
         "remarks": "; ".join(study.remarks),
         "modes_reference": study.modes_reference,
+        "sampling": study.chance,
         "budget": study.effort.budget,
         "processor_time": study.effort.processor,
         "wall_time": study.effort.wall,

@@ -21,6 +21,7 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.operations.accuracy import Accuracy
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.structures.modes import Modes
 from vibroimpact.orchestrator.study.accuracy.budget import Budget
 from vibroimpact.orchestrator.study.accuracy.choice import cheapest, refuse_unreached
 from vibroimpact.orchestrator.study.accuracy.measured import Comparison, Measured
@@ -37,11 +38,11 @@ from vibroimpact.orchestrator.study.accuracy.reach import (
 from vibroimpact.orchestrator.study.accuracy.refusals import (
     refuse_misuse,
     refuse_one_way,
-    refuse_several_bodies,
     refuse_vague_reference,
 )
 from vibroimpact.orchestrator.study.accuracy.results import dataset_of
 from vibroimpact.orchestrator.study.accuracy.trying import References, tried
+from vibroimpact.orchestrator.study.balance import mean_energy_of
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN
@@ -60,6 +61,7 @@ from vibroimpact.orchestrator.study.references import (
 from vibroimpact.orchestrator.study.statistics import statistics_of
 from vibroimpact.orchestrator.study.ways.all_ways import remarks_on, ways_of
 from vibroimpact.orchestrator.study.ways.models import modes_reference
+from vibroimpact.orchestrator.study.ways.numbers_of_modes import finest_modes, opened_with_extremes
 from vibroimpact.orchestrator.study.ways.way import Trial, Way
 
 BUDGET = 40.0
@@ -102,6 +104,7 @@ class AccuracyOfScene(Study[Measured]):
 
     def __post_init__(self) -> None:
         self._show: Callable[[Measured], None] = lambda one: None
+        self._chance = math.nan
 
     @classmethod
     def prepare(cls, options: Accuracy, stack: ExitStack) -> Self:
@@ -133,9 +136,9 @@ class AccuracyOfScene(Study[Measured]):
         """
         refuse_misuse(self.tolerance, self.quantity, self.budget)
         self._spends = Budget(self.budget)
-        refuse_several_bodies(self.scene)
         self._alone = studied_scene(self.scene)
-        refuse_one_way(ways_of(self._alone), self.scene)
+        finest = finest_modes(self.scene)
+        refuse_one_way(ways_of(self._alone, finest=finest), self.scene)
         self._within = within_reach(self._alone, self._spends)
         passed = transient_passed(self._within, self._spends)
         reference = reference_of(passed.scene)
@@ -151,13 +154,18 @@ class AccuracyOfScene(Study[Measured]):
             "speed": _typical_speed(reference),
             "rate": _rate_of(self.scene),
             "whole": passed.whole,
+            "finest": finest,
+            "recorded": self._within,
         }
-        limited, limited_whole = (
-            limited_elsewhere(one, GUARDED_SHARE * self.budget) for one in (passed.scene, passed.whole)
+        limited, whole, recorded = (
+            limited_elsewhere(one, GUARDED_SHARE * self.budget)
+            for one in (passed.scene, passed.whole, self._within)
         )
-        self._ways = ways_of(limited, **given | {"whole": limited_whole})
+        self._ways = ways_of(limited, **given | {"whole": whole, "recorded": recorded})
         references = References(reference, passed)
         yield from _measured(self._ways, references, passed, given, self._spends, statistical)
+        if reference.chaotic and any(way.as_whole for way in self._ways):
+            self._chance = chance_of(recorded)
 
     def shown(self) -> AbstractContextManager[None]:
         """Show each way as soon as it has run once."""
@@ -188,6 +196,7 @@ class AccuracyOfScene(Study[Measured]):
             remarks,
             modes_reference(self._ways),
             self._spends.effort(),
+            self._chance,
         )
 
     def made(self) -> xr.Dataset:
@@ -229,7 +238,7 @@ def _measured(
             found.append(one)
             yield one
         if statistical is not None:
-            _add_statistics(statistical, found, references.reference, spends)
+            _add_statistics(statistical, given["finest"], found, references.reference, spends)
         _time_in_turn(able, spends)
     _add_memory(passed.scene, given, ways, [one for one, _ in able], spends)
 
@@ -250,6 +259,22 @@ def studied_scene(scene: Scene) -> Scene:
         del document["record"]["time_series"]
         alone = Scene.from_dict(document, scene.source)
     return alone.with_values({"record.impacts": True, "record.extrema": True})
+
+
+def chance_of(scene: Scene) -> float:
+    """Return the largest relative difference of range and mean energy among runs from slightly different numbers."""
+
+    def whole(one: Scene) -> tuple[float, float]:
+        trial = opened_with_extremes(one, 1.0)
+        try:
+            return trial.run().displacement_range, mean_energy_of(one)
+        finally:
+            trial.close()
+
+    own = np.array(whole(scene))
+    others = np.array([whole(one) for one in disturbed_scenes(scene, REPLICATES)]).reshape(-1, 2)
+    differences = np.abs(others - own)[:, own > 0.0] / own[own > 0.0]
+    return float(np.nanmax(differences, initial=0.0))
 
 
 def _orbit_of(reference: Reference, whole: Scene, passed: Passed) -> str:
@@ -351,14 +376,20 @@ def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], spends: Budget) ->
                 one.seconds.append(spends.time(trial))
 
 
-def _add_statistics(scene: Scene, found: Sequence[Measured], reference: Reference, spends: Budget) -> None:
+def _add_statistics(
+    scene: Scene,
+    finest: Mapping[int, Modes],
+    found: Sequence[Measured],
+    reference: Reference,
+    spends: Budget,
+) -> None:
     """Compare the statistics of whole runs of chaotic motion, for ways that are cheap enough."""
     replicates = [observed(one) for one in disturbed_scenes(scene, REPLICATES)]
     expected = observed(scene)
     longer = scales_of(scene).window[1] / reference.scales.window[1]
     each = STATISTICS_SHARE * spends.seconds / max(len(found), 1)
     by_label = {one.way.label: one for one in found}
-    for way in ways_of(scene):
+    for way in ways_of(scene, finest=finest):
         one = by_label.get(way.label)
         if one is None or one.errors.failure or one.cost * longer > each:
             continue

@@ -11,10 +11,11 @@ from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.accuracy.measured import SHORT_SHARE, Measured
 from vibroimpact.orchestrator.study.accuracy.reach import Passed
-from vibroimpact.orchestrator.study.balance import balance_of
-from vibroimpact.orchestrator.study.errors import Errors, errors_of, no_errors
+from vibroimpact.orchestrator.study.balance import balance_of, mean_energy_of
+from vibroimpact.orchestrator.study.errors import Errors, errors_as_a_whole, errors_of, no_errors
 from vibroimpact.orchestrator.study.observation import LATE, Observation
 from vibroimpact.orchestrator.study.references import Reference, best_of, scales_of
+from vibroimpact.orchestrator.study.ways.numbers_of_modes import opened_with_extremes
 from vibroimpact.orchestrator.study.ways.trials import far_off
 from vibroimpact.orchestrator.study.ways.way import Trial, Way, opened_part
 
@@ -24,6 +25,8 @@ PART_OF_REACHED = 0.5
 """Largest next part of the time, over the part that the run reached before it was given up."""
 UNKNOWN_REACHED = 0.25
 """Next part of the time over the last part, after a run that does not give the part it reached."""
+SAMPLED = 4.0
+"""Largest cost of a run with samples of its energies, over the limit of a run."""
 LEAST_PART = 2.0**-30
 """Part of the studied time below which a way is given up for good."""
 
@@ -59,13 +62,16 @@ class References:
         A run of another model is given up after `most` seconds of processor time; its observation has the failure.
         """
         scene = self.scene_for(way)
-        found = self._found.get((scene.text, part))
-        if found is not None:
-            return found
-        trial = opened_part(scene, part)
+        known = self._found.get((scene.text, part))
+        if known is not None:
+            return known
+        trial = opened_with_extremes(scene, part) if way.as_whole else opened_part(scene, part)
         try:
             with clock.CLOCK.limited(math.inf if scene is self.reference.best else most):
-                return self._keep(scene, part, trial.run())
+                found = trial.run()
+                if way.as_whole and part == 1.0 and not found.failure:
+                    found = replace(found, mean_energy=_mean_energy(scene, most))
+                return self._keep(scene, part, found)
         finally:
             trial.close()
 
@@ -118,7 +124,7 @@ def _tried_over(
         trial.close()
         return Measured(way, no_errors(_first_line(error)), part), None, math.nan
     with clock.CLOCK.limited(most):
-        one = _measured(way, part, found, reference, references.length_of(way))
+        one = _measured(way, part, found, reference, references.length_of(way), most)
     one.first, one.first_wall = processor, wall
     if one.errors.failure == LATE or found.failure:
         trial.close()
@@ -128,13 +134,19 @@ def _tried_over(
     return one, trial, math.nan
 
 
-def _measured(way: Way, part: float, found: Observation, reference: Reference, length: float) -> Measured:
+def _measured(
+    way: Way, part: float, found: Observation, reference: Reference, length: float, most: float
+) -> Measured:
     """Return the measurements of a way from its observation and its reference."""
-    if way.scene is not None and part == 1.0 and not (found.failure or reference.observation.failure):
-        found = replace(found, energy_balance=balance_of(way.scene))
+    whole = part == 1.0 and not (found.failure or reference.observation.failure)
+    if way.scene is not None and whole:
+        if way.as_whole:
+            found = replace(found, mean_energy=_mean_energy(way.scene, most))
+        else:
+            found = replace(found, energy_balance=balance_of(way.scene))
     return Measured(
         way,
-        _compared(found, reference),
+        _compared(found, reference, as_whole=way.as_whole),
         part,
         length,
         impacts=len(found.impacts),
@@ -143,9 +155,17 @@ def _measured(way: Way, part: float, found: Observation, reference: Reference, l
     )
 
 
-def _compared(found: Observation, reference: Reference) -> Errors:
+def _mean_energy(scene: Scene, most: float) -> float:
+    """Return the mean energy of a scene whose run without samples takes at most `most` seconds of processor time."""
+    with clock.CLOCK.limited(SAMPLED * most):
+        return mean_energy_of(scene)
+
+
+def _compared(found: Observation, reference: Reference, *, as_whole: bool) -> Errors:
     if reference.observation.failure == LATE:
         return no_errors(LATE)
+    if as_whole:
+        return errors_as_a_whole(found, reference.observation)
     errors = errors_of(found, reference.observation, reference.scales)
     fell = not found.failure and far_off(found, reference.observation)
     return no_errors("fell through") if fell else errors

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from vibroimpact.orchestrator.fmi.instance import Wrapper
@@ -12,8 +12,11 @@ from vibroimpact.orchestrator.run.limits import why_not_pushed, why_not_thrown_b
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.window import recorded_window
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.laws import all_rigid, any_rigid, integrates_contacts
+from vibroimpact.orchestrator.structures.modes import Modes
 from vibroimpact.orchestrator.study.ways.models import other_models, other_modes
+from vibroimpact.orchestrator.study.ways.numbers_of_modes import numbers_of_modes
 from vibroimpact.orchestrator.study.ways.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of
 from vibroimpact.orchestrator.study.ways.revision import RevisedTrial
@@ -42,16 +45,27 @@ SAMPLING = (1.0 / 16.0, 0.25, 1.0, 4.0, 16.0)
 
 
 def ways_of(
-    scene: Scene, *, speed: float = math.nan, rate: float = math.nan, whole: Scene | None = None
+    scene: Scene,
+    *,
+    speed: float = math.nan,
+    rate: float = math.nan,
+    whole: Scene | None = None,
+    finest: Mapping[int, Modes] | None = None,
+    recorded: Scene | None = None,
 ) -> list[Way]:
     """Return the ways to simulate a scene without a sweep, with their settings.
 
     `speed` is the typical impact speed, m/s, at which other contact laws get the same restitution. `rate` is the rate
     of the scene's time series, samples per s; NaN without one. `whole` is the scene with its transient, where `scene`
-    begins after the transient: other models pass a transient of their own.
+    begins after the transient: other models pass a transient of their own. `finest` are the most modes of bodies by
+    matrices (`finest_modes`). `recorded` is the scene with all of its recording, where `scene` has the first impacts.
     """
     if not scene.is_one_body:
         return _general_ways(scene)
+    if isinstance(scene.body, StructureBody):
+        replays = [] if scene.replay is None else _fewer_samples(scene)
+        own = whole or scene
+        return [*_fused(scene), *replays, *numbers_of_modes(own, finest or {}, recorded or own)]
     if scene.replay is not None:
         return [*_fused(scene), *_coupled_replay(scene), *_fewer_samples(scene), *other_modes(scene)]
     return [
@@ -68,6 +82,8 @@ def ways_of(
 def remarks_on(scene: Scene) -> list[str]:
     """Return remarks on the ways that the study of a scene leaves out, with the reasons."""
     remarks = []
+    if scene.is_one_body and isinstance(scene.body, StructureBody):
+        return _remarks_on_structures(scene)
     if fixed := _not_repeated(scene):
         remarks.append(
             f"iterated exchange with {', '.join(fixed)}: steps cannot be repeated, since the FMU does not restore its "
@@ -85,6 +101,21 @@ def remarks_on(scene: Scene) -> list[str]:
         remarks.append(
             "number of modes: nothing converges, since the contact mass of a rigid stop on a beam falls with the "
             "number of modes and its restitution has no meaning without it (docs/contact_laws.md); compliant stops do"
+        )
+    return remarks
+
+
+def _remarks_on_structures(scene: Scene) -> list[str]:
+    """Return remarks on the ways that leave out several bodies, forces that are no single sine, and moving stops."""
+    remarks = [
+        "stops as FMUs of their own, plain steps, step revision and model exchange: several bodies, several forces, "
+        "forces that are no sine, given modes and stops that move run fused, which is exact between impacts"
+    ]
+    body: Any = scene.body
+    if any_rigid(scene.stops) and any(not part.HAS_MASSES for part in body.parts):
+        remarks.append(
+            "impacts one by one with other numbers of modes: an impact on a rigid stop excites all modes, and the mass "
+            "that hits it falls with their number (docs/contact_laws.md). Range and mean energy are compared"
         )
     return remarks
 

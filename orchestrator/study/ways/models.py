@@ -9,6 +9,7 @@ from typing import Any
 
 from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.scene.laws import any_rigid
 from vibroimpact.orchestrator.scene.models import Stop
 from vibroimpact.orchestrator.study.ways.equal_restitution import (
@@ -96,6 +97,8 @@ def modes_reference(ways: Sequence[Way]) -> str:
     finest = next((way.against.body for way in ways if way.against is not None), None)
     if finest is None:
         return ""
+    if isinstance(finest, StructureBody):
+        return f"{finest.size} modes of all bodies"
     if finest.HAS_MASSES:
         return f"all {finest.size} modes"
     what = ", residual vectors among them" if finest.has_residual_vectors else ""

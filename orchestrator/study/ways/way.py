@@ -57,6 +57,10 @@ class Way:
     """The finest model of its kind, where errors are measured against it; None for the study's reference."""
     scene: Scene | None = None
     """The simulated scene, where its own runner simulates it."""
+    is_own_model: bool = False
+    """Whether the model is the scene itself: its own number of modes among others."""
+    as_whole: bool = False
+    """Whether range and mean energy alone are compared: impacts do not correspond one by one."""
 
     @property
     def label(self) -> str:

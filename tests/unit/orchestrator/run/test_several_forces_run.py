@@ -293,7 +293,9 @@ def test_effects_list_each_force() -> None:
 
 
 def test_studies_of_one_force_refuse_several_by_name() -> None:
-    with pytest.raises(UsageError, match="forcing: expected one sine"):
+    with pytest.raises(
+        UsageError, match=r"simulated in one way\. It is exact: several bodies, several forces"
+    ):
         vi.accuracy(scene())
     with pytest.raises(DatasetError, match="expected a scene with one sine, got 2 forces"):
         ImpactOscillator.from_scene(scene().text)

@@ -301,3 +301,35 @@ def test_free_bodies_of_masses_over_twelve_decades_have_each_a_rigid_body_mode()
     for point, body in (("one", masses[:2]), ("last", masses[-2:])):
         own = 1.0 / (found.shapes[point][:15] ** 2).sum()
         assert own == pytest.approx(body.sum(), rel=1e-9)
+
+
+def in_digits(matrix: sparse.csc_array, digits: int) -> sparse.csc_array:
+    """Return a matrix as a text of some digits has it."""
+    found = matrix.copy()
+    found.data = np.array([float(f"{each:.{digits - 1}e}") for each in found.data.tolist()])
+    return found
+
+
+@pytest.mark.parametrize("elements", [5, 20, 60])
+def test_a_free_beam_of_ten_digits_has_its_rigid_body_modes_and_a_held_one_has_none(elements: int) -> None:
+    for rigidity in (1.0, 3.7, 12.3):
+        exact = hermite_beam(elements, 1.7, rigidity, 0.9, clamped=False)
+        free = Matrices(
+            in_digits(exact.stiffness, 10), in_digits(exact.mass, 10), None, exact.freedoms, exact.coordinates
+        )
+        found = reduce(free, {"tip": {exact.freedoms[-2]: 1.0}}, modes=6)
+        expected = reduce(exact, {"tip": {exact.freedoms[-2]: 1.0}}, modes=6)
+        assert found.natural[:2].tolist() == [0.0, 0.0]
+        np.testing.assert_allclose(found.natural[2:5], expected.natural[2:5], rtol=1e-2)
+        assert any("few digits" in remark for remark in found.remarks)
+        held = free.stiffness[2:, 2:].tocsc(), free.mass[2:, 2:].tocsc()
+        modes = reduce(Matrices(*held, None, exact.freedoms[2:]), {"tip": {exact.freedoms[-2]: 1.0}}, modes=6)
+        assert modes.natural[0] > 0.0
+
+
+def test_few_digits_do_not_make_the_slow_mode_of_a_fine_mesh_a_rigid_body_mode() -> None:
+    exact = hermite_beam(200, 1.7, 3.7, 0.9)
+    given = Matrices(in_digits(exact.stiffness, 10), in_digits(exact.mass, 10), None, exact.freedoms)
+    found = reduce(given, {"tip": {exact.freedoms[-2]: 1.0}}, modes=4)
+    assert found.natural[0] > 0.0
+    assert found.remarks == ("The 10 digits of the stiffness do not tell slow modes from rigid-body modes.",)

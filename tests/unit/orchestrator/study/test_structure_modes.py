@@ -49,6 +49,54 @@ def test_all_modes_of_a_chain_have_its_mass_and_its_flexibility(folder: Path) ->
     assert found.x.values.tolist() == [0.0, 1.0, 2.0, 3.0]
     assert (found.damping_ratio == 0.02).all()
     assert vi.draw(found).axes[0].get_xlabel() == "x (m)"
+    assert found.total_mass.sel(axis="x") == pytest.approx(MASSES.sum(), rel=1e-12)
+    assert found.centre_of_mass.values == pytest.approx([MASSES @ np.arange(4) / MASSES.sum(), 0.0, 0.0])
+    assert "error" not in found.attrs  # no point has a flexibility that could be wrong
+
+
+def test_rayleigh_damping_adds_to_the_ratio(folder: Path) -> None:
+    found = vi.modes(
+        "chain.npz", freedoms="freedoms.csv", damping_ratio=0.02, rayleigh={"mass": 0.3, "stiffness": 1e-3}
+    )
+    angular = 2.0 * np.pi * found.frequency.values
+    assert found.damping_ratio.values == pytest.approx(0.02 + 0.15 / angular + 5e-4 * angular, rel=1e-12)
+    done = in_this_process("modes", "chain.npz", "--rayleigh", "{stiffness=1e-3}", "--point", "tip=4")
+    assert done.returncode == 0, done.stderr
+    assert "4.5 kg" not in done.stdout  # degrees of freedom without directions have no mass along one
+    done = in_this_process("modes", "chain.npz", "--freedoms", "freedoms.csv", "--base", "x")
+    assert "Mass that the matrices move: 4.5 kg along x, with its centre at (1.333, 0, 0) m" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--point", "tip=9.z"], "chain.npz: expected a degree of freedom such as"),
+        (["--base", "q"], "chain.npz: expected a base direction that"),
+        (["--modes", "65"], "chain.npz: expected 1 to 64 modes, got 65"),
+        (["--damping-ratio", "-0.1"], "--damping-ratio: expected a damping ratio >= 0, got -0.1"),
+        (["--rayleigh", "0.1"], "--rayleigh: expected a table such as {mass=0.1, stiffness=1e-5}, got '0.1'"),
+        (["--rayleigh", "{mass=-1}"], "--rayleigh: expected {mass = .., stiffness = ..} of numbers >= 0"),
+        (["--rayleigh", "{masses=1}"], "--rayleigh: expected {mass = .., stiffness = ..} of numbers >= 0"),
+        (["-o", "m.uff", "--point", "tip=1"], "m.uff: expected points node.direction such as 12.z"),
+    ],
+)
+def test_a_refusal_names_the_file_or_the_option(folder: Path, options: list[str], expected: str) -> None:
+    done = in_this_process("modes", "chain.npz", *options)
+    assert done.returncode == 2
+    assert expected in done.stderr
+
+
+def test_a_matrix_without_a_name_needs_the_file_of_the_mass(folder: Path) -> None:
+    shutil.copy(EXAMPLES / "tube" / "stiffness.mtx", "k.mtx")
+    for options, got in (([], "got none"), (["--mass", "m.mtx"], "got m.mtx, which is no file")):
+        done = in_this_process("modes", "k.mtx", *options)
+        assert done.returncode == 2
+        assert f"--mass: expected the file of the mass matrix, {got}." in done.stderr
+
+
+def test_a_scene_of_matrices_has_their_mass(folder: Path) -> None:
+    done = in_this_process("modes", str(EXAMPLES / "bracket.toml"))
+    assert "0.033493 kg along x, y, z, with its centre at (0.03344, 0.01, 0.002) m" in done.stdout
 
 
 @settings(max_examples=10, deadline=None)
