@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.structures.factors import Flexibility
 from vibroimpact.orchestrator.structures.lanczos import Lanczos
 from vibroimpact.orchestrator.structures.matrices import Matrices
 from vibroimpact.orchestrator.structures.modes import Modes
+from vibroimpact.orchestrator.structures.one_thread import on_one_thread
 from vibroimpact.orchestrator.structures.request import Weights
 from vibroimpact.orchestrator.structures.residual import Rest
 
@@ -27,6 +28,7 @@ SAID = 1e-6
 """Share of the flexibility of a point, above which a remark says that it is left out."""
 
 
+@on_one_thread()
 def reduce(
     matrices: Matrices,
     points: Mapping[str, Weights],
