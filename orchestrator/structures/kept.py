@@ -16,7 +16,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
 from vibroimpact.orchestrator.structures.modes import Modes
 
-VERSION = 1
+VERSION = 2
 """Version of the reduction; results of an older version are made anew."""
 MOST_KEPT = 256
 """Largest number of results that are kept; the oldest go first."""
