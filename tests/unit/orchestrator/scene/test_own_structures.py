@@ -11,6 +11,7 @@ import pytest
 import tomli_w
 
 import vibroimpact as vi
+from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.scene import Scene, load_scene
@@ -165,6 +166,26 @@ def test_keys_of_matrices_and_of_their_stop_and_force_are_swept_in_lanes(folder:
         load_scene(write(folder)).with_values({**values, "forcing.amplitude": 4.0}), progress=False
     )
     assert float(dataset.sel(point).final_velocity) == float(alone.final_velocity)
+
+
+def test_points_over_the_place_of_a_stop_and_the_force_run_in_lanes_at_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def counted(plan: Any, points: Any, memory: Any) -> lanes.LanesEnd:
+        calls.append(points.count)
+        return run_lanes(plan, points, memory)
+
+    run_lanes = lanes.run_lanes
+    monkeypatch.setattr(lanes, "run_lanes", counted)
+    sweep = {
+        "stop[1].position": {"values": [0.0, 0.003, 0.2, 0.3]},
+        "forcing.amplitude": {"start": 1.0, "stop": 2.0, "points": 5},
+    }
+    dataset = vi.run(load_scene(write(folder, sweep=sweep)), progress=False)
+    assert dataset.attrs["execution"] == "lanes"
+    assert set(calls) == {20}
 
 
 def test_orbits_of_matrices_are_found_and_followed_over_a_frequency(folder: Path) -> None:
