@@ -1,7 +1,7 @@
 """Cost of given modes beside that of a beam with the same modes: an impact, and a campaign in lanes.
 
-A clamped-free beam in units of its first mode is driven at its tip and meets a rigid stop there, once in each period
-(damping ratio .3, as in `bench_structure.py`). `kind = "modes"` has the frequencies and the shapes of its tip.
+A clamped-free beam in units of its first mode is driven at its tip, and meets a rigid stop there. It has one impact in
+each period, as in `bench_structure.py` (damping ratio .3). `kind = "modes"` has the frequencies and the shapes of its tip.
 Points of the campaigns have a damping ratio of .05. Some of them chatter, and leave the lanes for the fused engine.
 
 - An impact with its flight, fused, with 8 and 32 modes. Both bodies take turns.
