@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models.matrices import MatricesBody
 from vibroimpact.orchestrator.scene.changes import changed_key
+from vibroimpact.orchestrator.scene.driving import highest_drive
 from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, quoted, read_table
 
@@ -55,11 +56,11 @@ def with_given_modes(document: dict[str, Any], folder: Path) -> tuple[dict[str, 
         return document, []
     problems: list[Problem] = []
     found: list[Any] = []
-    tolerance = _tolerance(document)
+    auto = _for_auto(document)
     for path, body in _bodies(document):
         names = set(points_named(document, str(body.get("name", path[0]))))
         if body.get("kind") == "matrices":
-            found.append(_of_matrices(body, path, folder, names, tolerance, problems))
+            found.append(_of_matrices(body, path, folder, names, auto, problems))
         elif body.get("kind") == "modes" and "file" in body:
             found.append(_of_modes(body, path, folder, names, problems))
         else:
@@ -74,7 +75,7 @@ def request_of(document: Mapping[str, Any], name: str, folder: Path) -> Request 
         if body.get("name", path[0]) == name and body.get("kind") == "matrices":
             table = _table(body, path, [])
             named = set(points_named(document, name))
-            return None if table is None else _request(table, folder, named, _tolerance(document))
+            return None if table is None else _request(table, folder, named, _for_auto(document))
     return None
 
 
@@ -136,13 +137,14 @@ def points_named(document: Mapping[str, Any], name: str) -> Iterator[str]:
                     yield rest
 
 
-def _tolerance(document: Mapping[str, Any]) -> float | None:
-    """Return the tolerance of a scene for `modes = "auto"`; None without one that the checks of the scene take."""
+def _for_auto(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the highest frequency and the tolerance of a scene for `modes = "auto"`, the tolerance if it is sound."""
     execution = document.get("execution")
     given = execution.get("tolerance") if isinstance(execution, dict) else None
-    if not isinstance(given, int | float) or not 0.0 < given <= LARGEST_TOLERANCE:
-        return None
-    return float(given)
+    found = {"driven": highest_drive(document)}
+    if isinstance(given, int | float) and 0.0 < given <= LARGEST_TOLERANCE:
+        found["tolerance"] = float(given)
+    return found
 
 
 def _of_matrices(
@@ -150,7 +152,7 @@ def _of_matrices(
     path: KeyPath,
     folder: Path,
     named: set[str],
-    tolerance: float | None,
+    auto: Mapping[str, Any],
     problems: list[Problem],
 ) -> dict[str, Any]:
     """Return the modes of a body by matrices as its table."""
@@ -160,7 +162,7 @@ def _of_matrices(
     if table is None:
         return body
     try:
-        modes = fitting(find_modes(_request(table, folder, named, tolerance)), named)
+        modes = fitting(find_modes(_request(table, folder, named, auto)), named)
     except UsageError as error:
         problems.append(_problem(path, error))
         return body
@@ -183,7 +185,7 @@ def _table(body: Mapping[str, Any], path: KeyPath, problems: list[Problem]) -> M
     return table
 
 
-def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: float | None) -> Request:
+def _request(table: MatricesBody, folder: Path, named: set[str], auto: Mapping[str, Any]) -> Request:
     from vibroimpact.orchestrator.structures.request import Request
 
     rayleigh = table.rayleigh
@@ -202,7 +204,7 @@ def _request(table: MatricesBody, folder: Path, named: set[str], tolerance: floa
         damping_ratio=table.damping_ratio,
         rayleigh=(0.0, 0.0) if rayleigh is None else (rayleigh.mass, rayleigh.stiffness),
     )
-    return replace(found, tolerance=tolerance) if table.modes == "auto" and tolerance else found
+    return replace(found, **auto) if table.modes == "auto" else found
 
 
 def _of_modes(

@@ -14,8 +14,8 @@ from vibroimpact.orchestrator.structures.checking import scaled
 from vibroimpact.orchestrator.structures.matrices import Matrices, Sparse
 from vibroimpact.orchestrator.structures.ordering import elimination_order
 
-BYTES_PER_ENTRY = 10
-"""Memory of an entry of SuperLU's factors, bytes: 8 and its share of indices, measured for solids and beams."""
+BYTES_PER_ENTRY = 11
+"""Memory of an entry of SuperLU's factors, bytes: 8, its share of indices and of room to work, measured for solids."""
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Sum over the moduli of its terms, below which it is rounding."""
 DIGITS = 5e-14
@@ -231,6 +231,10 @@ def _factors(matrix: Sparse) -> Any:
         )
     except RuntimeError:
         return None
+    except MemoryError as problem:
+        raise UsageError(
+            f"expected factors of the stiffness within the memory, got larger ones for {matrix.shape[0]} unknowns."
+        ) from problem
 
 
 class _Nothing:

@@ -52,6 +52,7 @@ def _reduced(sources: Sources, request: Request) -> Modes:
         points,
         modes=request.modes,
         tolerance=request.tolerance,
+        driven=request.driven,
         residual=request.residual,
         base=request.base,
         damping_ratio=request.damping_ratio,

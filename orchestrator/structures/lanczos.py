@@ -40,11 +40,17 @@ class Lanczos:
         self._flexibility, self._mass = flexibility, mass
         self._random = np.random.default_rng(4)
         count = mass.shape[0]
-        self._basis = np.zeros((count, 0))
+        self._room = np.empty((count, 8 * BLOCK), order="F")
+        self._heavy = np.zeros((count, 0))
         self._projected = np.zeros((0, 0))
         self._done = 0
         self._largest = 0.0
         self._append(self._fresh())
+
+    @property
+    def _basis(self) -> Floats:
+        """Vectors that are orthonormal in the mass, shape (freedom, vector)."""
+        return self._room[:, : len(self._projected)]
 
     def modes(self, count: int) -> tuple[Floats, Floats]:
         """Return w^2, ascending, and mass-normalised shapes, shape (freedom, mode); fewer if no more exist.
@@ -113,30 +119,36 @@ class Lanczos:
             return
         if end > most:
             raise UsageError(f"expected modes that converge within {most} vectors, got others.")
-        moved = self._flexibility(self._mass @ self._basis[:, start:end])
-        own, rest = self._apart(moved)
+        moved = self._flexibility(self._heavy[:, : end - start])
+        near = max(start - 2 * BLOCK, 0)  # nearly all that the basis has of these motions
+        own = np.zeros((self._basis.shape[1], end - start))
+        own[near:], rest = self._apart(moved, near)
         more, rest = self._apart(rest)
         own += more
-        self._done = end
+        self._done, self._heavy = end, self._heavy[:, end - start :]
         self._largest = max(self._largest, float(np.abs(own).max(initial=0.0)))
         self._projected[:, start:end], self._projected[start:end, :] = own, own.T
         grown = self._append(rest)
         if grown:
-            beside = self._basis[:, -grown:].T @ (self._mass @ moved)
+            beside = self._heavy[:, -grown:].T @ moved
             self._projected[-grown:, start:end], self._projected[start:end, -grown:] = beside, beside.T
 
-    def _apart(self, moves: Floats) -> tuple[Floats, Floats]:
-        """Return the coefficients of motions in the basis, and the rest of the motions."""
-        own = self._basis.T @ (self._mass @ moves)
-        return own, moves - self._basis @ own
+    def _apart(self, moves: Floats, first: int = 0) -> tuple[Floats, Floats]:
+        """Return the coefficients of motions in the basis from a vector on, and the rest of the motions."""
+        basis = self._basis[:, first:]
+        own = basis.T @ (self._mass @ moves)
+        return own, moves - basis @ own
 
     def _append(self, moves: Floats) -> int:
         """Append the new directions of a block to the basis, and return their number."""
         moves = self._normalised(moves, NOTHING_NEW * self._largest)
         moves = self._normalised(self._apart(moves)[1], 0.5)
-        grown = int(moves.shape[1])
-        self._basis = np.hstack([self._basis, moves])
+        grown, start = int(moves.shape[1]), len(self._projected)
+        if start + grown > self._room.shape[1]:
+            self._room = np.concatenate([self._room, np.empty_like(self._room)], axis=1)
+        self._room[:, start : start + grown] = moves
         self._projected = np.pad(self._projected, (0, grown))
+        self._heavy = np.hstack([self._heavy, self._mass @ moves])
         return grown
 
     def _normalised(self, moves: Floats, least: float) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,18 +15,20 @@ from vibroimpact.orchestrator.structures.factors import Flexibility
 from vibroimpact.orchestrator.structures.lanczos import Lanczos
 from vibroimpact.orchestrator.structures.matrices import Matrices
 from vibroimpact.orchestrator.structures.modes import Modes
+from vibroimpact.orchestrator.structures.one_thread import on_one_thread
 from vibroimpact.orchestrator.structures.request import Weights
 from vibroimpact.orchestrator.structures.residual import Rest
 
 MOST_MODES = 64
-BAND = 10.0
-"""Band of `modes = "auto"` without a band: this many times the lowest elastic natural frequency."""
+BAND, MARGIN = 10.0, 2.0
+"""Band of `modes = "auto"`: this many times the lowest elastic natural frequency, and the highest one that drives."""
 SHARE_OF_HIGHEST = 0.5
 """Band of a given number of modes: this share of the highest natural frequency that is kept."""
 SAID = 1e-6
 """Share of the flexibility of a point, above which a remark says that it is left out."""
 
 
+@on_one_thread()
 def reduce(
     matrices: Matrices,
     points: Mapping[str, Weights],
@@ -38,6 +40,7 @@ def reduce(
     damping_ratio: float | Sequence[float] = 0.0,
     rayleigh: tuple[float, float] = (0.0, 0.0),
     band: float | None = None,
+    driven: float = 0.0,
     shown: Sequence[str] = (),
 ) -> Modes:
     """Return the lowest modes of a structure with residual vectors at points, and the error of its flexibility there.
@@ -61,7 +64,9 @@ def reduce(
         Damping a M + b K, 1/s and s.
     band : float or None
         Angular frequency up to which the error is taken, rad/s. None: half of the highest natural frequency that is
-        kept; ten times the lowest elastic one for `"auto"`.
+        kept; for `"auto"` as far as `driven` and the lowest elastic ones ask for (equations.md 6.14).
+    driven : float
+        Highest angular frequency of what drives the structure, rad/s, for `"auto"`.
     shown : sequence of str
         Further degrees of freedom with shapes, which get no residual vectors.
 
@@ -86,7 +91,7 @@ def reduce(
     for number, (name, at) in enumerate(points.items()):
         loads[:, number] = _row(sound, matrices, name, at)
     reduction = _Reduction(sound, loads, residual)
-    found = reduction.fewest(tolerance, band) if modes == "auto" else reduction.of(modes, band)
+    found = reduction.fewest(tolerance, band, driven) if modes == "auto" else reduction.of(modes, band)
     shapes = found.shapes
     participation = None if base is None else shapes.T @ (sound.mass @ _base(sound, base))
     ratios, damping = _damping(found.natural, damping_ratio, rayleigh)
@@ -157,6 +162,18 @@ class _Found:
     remarks: tuple[str, ...]
 
 
+def _band(squares: Floats, driven: float) -> tuple[float, str]:
+    """Return the angular frequency up to which `modes = "auto"` takes its error, and why."""
+    lowest = np.sqrt(squares[:2])
+    bands = {
+        "ten times the lowest elastic frequency": BAND * float(lowest[:1].max(initial=0.0)),
+        "the second elastic frequency": float(lowest[1:].max(initial=0.0)),
+        "twice the highest frequency of the forces and stops": MARGIN * driven,
+    }
+    reason = max(bands, key=lambda each: bands[each])
+    return bands[reason], reason
+
+
 class _Reduction:
     """The modes of a structure as its points see them; `loads` has the shape (freedom, point)."""
 
@@ -189,13 +206,14 @@ class _Reduction:
             )
         return self._kept(squares, shapes, rest, away, band, count)
 
-    def fewest(self, tolerance: float, band: float | None) -> _Found:
+    def fewest(self, tolerance: float, band: float | None, driven: float) -> _Found:
         """Return the fewest modes that meet a tolerance."""
         rigid = self._rigid.shape[1]
         most = MOST_MODES - rigid
         squares, shapes = self._lanczos.modes(min(8, most))
         while True:
-            highest = BAND * np.sqrt(squares[0]) if band is None and len(squares) else band or 0.0
+            highest, reason = (band, "as given") if band is not None else _band(squares, driven)
+            end = f"{highest / (2.0 * np.pi):.4g} Hz, {reason}"
             rest, away = self._rest(squares, shapes)
             seen = shapes.T @ self._loads
             for count in range(len(squares) + 1):
@@ -205,17 +223,16 @@ class _Reduction:
                     break
                 if rigid + count + vectors and fewer.error(highest, self._residual) <= tolerance:
                     own = away + shapes[:, count:] @ (seen[count:] / squares[count:, None])
-                    return self._kept(squares[:count], shapes[:, :count], fewer, own, highest, None)
+                    found = self._kept(squares[:count], shapes[:, :count], fewer, own, highest, None)
+                    kept = f"{len(found.natural)} modes meet the tolerance {tolerance:g} up to {end}."
+                    return replace(found, remarks=(*found.remarks, kept))
             if len(squares) >= most:
                 break
             wider = self._lanczos.modes(min(2 * len(squares), most))
             if len(wider[0]) == len(squares):
                 break
             squares, shapes = wider
-        raise UsageError(
-            f"expected a tolerance that {MOST_MODES} modes meet up to {highest / (2.0 * np.pi):.4g} Hz, got "
-            f"{tolerance:g}."
-        )
+        raise UsageError(f"expected a tolerance that {MOST_MODES} modes meet up to {end}, got {tolerance:g}.")
 
     def _rest(self, squares: Floats, shapes: Floats) -> tuple[Rest, Floats]:
         """Return the modes that are left out, and their static deflections under the loads, shape (freedom, point)."""

@@ -33,6 +33,8 @@ class Request:
         How many modes, residual vectors among them.
     tolerance : float
         Largest error of the flexibility at the points for `"auto"`.
+    driven : float
+        Highest angular frequency of what drives the body, rad/s, for `"auto"`.
     residual : bool
         Whether residual vectors of the points are among the modes.
     base : mapping, str or None
@@ -54,6 +56,7 @@ class Request:
     named: tuple[str, ...] = ()
     modes: int | Literal["auto"] = 20
     tolerance: float = 1e-3
+    driven: float = 0.0
     residual: bool = True
     base: Weights | str | None = None
     damping_ratio: float | tuple[float, ...] = 0.0

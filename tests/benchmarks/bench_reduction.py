@@ -3,7 +3,8 @@
 A steel bar of 8 x 8 x 205 elements of eight nodes is held at one end; its matrices have 3.4 million entries each. They
 are read from Matrix Market files (or from .npz files: `--format npz`) in processes of their own. Each run is a process
 with a cache of its own. Processor times and peak memories include the readers.
-Run with `python tests/benchmarks/bench_reduction.py [--format mtx] [--output results/bench_reduction]`.
+Other solids (`--cells 12 12 200` has 101,400 unknowns) have no goals.
+Run with `python tests/benchmarks/bench_reduction.py [--format mtx] [--cells 8 8 205] [--output results]`.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ print(found.natural[0] / 6.283185307179586, found.residual_vectors, found.error)
 """
 
 
-def write_matrices(folder: Path, kind: str) -> int:
-    """Write the matrices of the bar, and return the number of its unknowns."""
-    model = solid(CELLS, 0.00125)
+def write_matrices(folder: Path, kind: str, cells: tuple[int, int, int] = CELLS) -> int:
+    """Write the matrices of a bar, and return the number of its unknowns."""
+    model = solid(cells, 0.00125)
     for name in ("stiffness", "mass"):
         matrix = getattr(model, name)
         if kind == "npz":
@@ -68,11 +69,12 @@ def main() -> int:
     """Measure, print and write a CSV; return 1 if a goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--format", choices=("mtx", "npz"), default="mtx")
+    parser.add_argument("--cells", type=int, nargs=3, default=CELLS)
     parser.add_argument("--output", type=Path, default=Path("results/bench_reduction"))
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        unknowns = write_matrices(folder, options.format)
+        unknowns = write_matrices(folder, options.format, tuple(options.cells))
         first, memory, text = measured(folder, options.format)
         again, _, kept = measured(folder, options.format)
     if text != kept:
@@ -83,6 +85,8 @@ def main() -> int:
         csv.writer(file).writerows([("case", "s"), *rows, ("memory, GB", memory)])
     print(f"{unknowns} unknowns; first frequency, Hz, residual vectors and error: {text}")
     print(f"read and reduced: {first:.1f} s, {memory:.2f} GB; kept: {again:.2f} s")
+    if tuple(options.cells) != CELLS:
+        return 0
     missed = first > MOST_SECONDS or memory > MOST_MEMORY or again > MOST_KEPT_SECONDS
     goals = f"{MOST_SECONDS:g} s, {MOST_MEMORY:g} GB and {MOST_KEPT_SECONDS:g} s"
     print(f"goals of {goals}: {'missed' if missed else 'reached'}")

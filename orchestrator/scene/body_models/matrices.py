@@ -84,7 +84,8 @@ class MatricesBody(SceneTable):
         Rule(
             'a whole number from 1 to 64, or "auto"',
             sweepable=False,
-            doc='1 to 64, residual vectors among them; `"auto"`: the fewest that meet `execution.tolerance`',
+            doc='1 to 64, residual vectors among them; `"auto"`: the fewest that meet `execution.tolerance`, '
+            "see [below](#how-many-modes)",
         ),
     ] = 20
     residual: Annotated[

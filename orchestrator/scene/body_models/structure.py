@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 import numpy as np
@@ -280,9 +280,11 @@ class StructureBody(BodyTable):
         return found | {"displacement_limit": FARTHEST * self._largest_length(stops)}
 
     def _largest_length(self, stops: Stops) -> float:
-        """Return the largest position, clearance or start displacement, m; 1 where all are 0."""
+        """Return the largest position, clearance or start displacement, m; 1 where all are 0. Points have arrays."""
         starts = [float(np.abs(part.displacements).max()) for part in self.assembly.parts]
-        return max([abs(stop.position) for stop in stops] + starts) or 1.0
+        largest = reduce(np.maximum, [np.abs(stop.position) for stop in stops], max(starts))
+        found = np.where(largest > 0.0, largest, 1.0)
+        return found if found.ndim else float(found)  # type: ignore[return-value]
 
     def fmu_integers(self, forcing: Forcing | None, stops: Stops) -> dict[str, int]:
         """Return the number of modes and of further observed points, and whether the damping couples the modes.

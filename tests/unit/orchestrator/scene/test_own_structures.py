@@ -11,6 +11,7 @@ import pytest
 import tomli_w
 
 import vibroimpact as vi
+from vibroimpact.fmus.core import lanes
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.scene import Scene, load_scene
@@ -154,19 +155,21 @@ def test_changes_reach_the_reduction_and_the_modes_that_it_finds(folder: Path) -
         load_scene(path, ["body[1].frequencies[4]=1"])
 
 
-def test_the_tolerance_of_a_scene_is_that_of_the_number_of_modes(
+def test_the_tolerance_and_the_highest_frequency_of_a_scene_are_those_of_the_number_of_modes(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[float] = []
+    asked: list[tuple[float, float]] = []
 
     def noted(request: Request) -> Modes:
-        asked.append(request.tolerance)
+        asked.append((request.tolerance, request.driven))
         return find_modes(request)
 
     monkeypatch.setattr(find, "find_modes", noted)
-    for tolerance in ("0.3", "1e-6"):
-        load_scene(folder / "rod.toml", ["body[1].modes=auto", f"execution.tolerance={tolerance}"])
-    assert asked == [0.3, 1e-6]
+    for tolerance, frequency in (("0.3", 3.0), ("1e-6", 8.0)):
+        changes = [f"execution.tolerance={tolerance}", f"forcing.frequency={frequency}"]
+        load_scene(folder / "rod.toml", ["body[1].modes=auto", *changes])
+    load_scene(folder / "rod.toml", ["body[1].modes=3", "forcing.frequency=5"])
+    assert asked == [(0.3, 6.0 * np.pi), (1e-6, 16.0 * np.pi), (1e-3, 0.0)]
 
 
 def test_keys_of_matrices_and_of_their_stop_and_force_are_swept_in_lanes(folder: Path) -> None:
@@ -185,6 +188,26 @@ def test_keys_of_matrices_and_of_their_stop_and_force_are_swept_in_lanes(folder:
         load_scene(write(folder)).with_values({**values, "forcing.amplitude": 4.0}), progress=False
     )
     assert float(dataset.sel(point).final_velocity) == float(alone.final_velocity)
+
+
+def test_points_over_the_place_of_a_stop_and_the_force_run_in_lanes_at_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def counted(plan: Any, points: Any, memory: Any) -> lanes.LanesEnd:
+        calls.append(points.count)
+        return run_lanes(plan, points, memory)
+
+    run_lanes = lanes.run_lanes
+    monkeypatch.setattr(lanes, "run_lanes", counted)
+    sweep = {
+        "stop[1].position": {"values": [0.0, 0.003, 0.2, 0.3]},
+        "forcing.amplitude": {"start": 1.0, "stop": 2.0, "points": 5},
+    }
+    dataset = vi.run(load_scene(write(folder, sweep=sweep)), progress=False)
+    assert dataset.attrs["execution"] == "lanes"
+    assert set(calls) == {20}
 
 
 def test_orbits_of_matrices_are_found_and_followed_over_a_frequency(folder: Path) -> None:

@@ -133,8 +133,32 @@ def test_an_automatic_number_of_modes_meets_its_tolerance() -> None:
     sizes = [len(each.natural) for each in found]
     assert sizes == sorted(sizes)
     assert sizes[0] < sizes[2]
-    with pytest.raises(UsageError, match=r"a tolerance that 64 modes meet up to .* Hz, got 1e-12"):
+    with pytest.raises(UsageError, match=r"64 modes meet up to .* Hz, ten times the lowest .*, got 1e-12"):
         reduce(model, points, modes="auto", tolerance=1e-12)
+
+
+def test_an_automatic_number_of_modes_reaches_beyond_what_drives_and_the_second_frequency() -> None:
+    model = solid((2, 2, 6), 0.01)
+    points, load = {"tip": {model.freedoms[-1]: 1.0}}, model.combination({model.freedoms[-1]: 1.0})[:, None]
+    exact = np.sqrt(
+        scipy.linalg.eigh(model.stiffness.toarray(), model.mass.toarray(), eigvals_only=True)[:20]
+    )
+    driven = float(exact[6])
+    few = reduce(model, points, modes="auto", tolerance=1e-2)
+    many = reduce(model, points, modes="auto", tolerance=1e-2, driven=driven)
+    assert len(many.natural) > len(few.natural)
+    assert few.remarks[-1].endswith("Hz, ten times the lowest elastic frequency.")
+    assert many.remarks[-1].endswith(
+        f"up to {driven / np.pi:.4g} Hz, twice the highest frequency of the forces and stops."
+    )
+    static = flexibility(model, load, 0.0)[0, 0]
+    for angular in driven * np.array([0.5, 1.001, 1.5]):
+        off = modal_flexibility(many, angular) - flexibility(model, load, angular)
+        assert abs(off[0, 0]) < 1.1e-2 * static
+    soft = chain_matrices([100.0, 1.0, 1.0, 1.0], [1.0, 1e4, 1e4, 1e4, 0.0])
+    found = reduce(soft, {"end": {"4.x": 1.0}}, modes="auto", tolerance=1e-2)
+    assert found.remarks[-1].endswith("the second elastic frequency.")
+    assert found.natural[1] == pytest.approx(reduce(soft, {}, modes=4).natural[1], rel=1e-2)
 
 
 @pytest.mark.parametrize("rayleigh", [(0.0, 0.0), (0.3, 0.02)])
@@ -242,6 +266,15 @@ def test_factors_beyond_the_memory_are_refused_before_they_are_made(monkeypatch:
         UsageError, match=r"within the available memory of 0\.0001 GB, got .* GB for \d+ unknowns"
     ):
         reduce(solid((2, 2, 8), 0.01), {}, modes=3)
+
+
+def test_factors_that_find_no_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("scipy.sparse.linalg.splu", full)
+    with pytest.raises(UsageError, match="within the memory, got larger ones for 3 unknowns"):
+        reduce(chain_matrices(MASSES, SPRINGS), {}, modes=3)
 
 
 @settings(max_examples=40)

@@ -207,7 +207,8 @@ double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_fl
     vi_part_keep(&sum[0], &so_far);
     for (int i = 0; i < n; ++i) {
         /* given motions first: modes are left out from the last on */
-        const int j = VI_STOPS_MOVE ? (i + vi_structure_free_modes(flight->model)) % n : i;
+        const int shifted = i + (vi_structure_stops_move(flight->model) ? vi_structure_free_modes(flight->model) : 0);
+        const int j = shifted < n ? shifted : shifted - n;
         vi_part_add(&so_far, point->shape[j], &instant->part[j]);
         vi_part_keep(&sum[i + 1], &so_far);
         ripple[i] = fabs(point->shape[j]) * instant->part[j].reach;

@@ -35,7 +35,7 @@ static const double SMALLEST = 1e-154;
 static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
     const double length = vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
-    double room = VI_STOPS_MOVE ? vi_stop_motions_room(s) : HUGE_VAL;
+    double room = vi_structure_stops_move(s->model) ? vi_stop_motions_room(s) : HUGE_VAL;
     room = VI_DEGREE > 1 ? vi_min(room, s->state->loads_last) : room;
     if (room < length) {
         *end = VI_ENDS_ANYWHERE;
@@ -429,7 +429,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (vi_structure_grows(s->model) && state->unbounded) {
         return VI_STEP_UNBOUNDED;
     }
-    if (VI_STOPS_MOVE && vi_structure_jams(s, VI_ROUNDING, jammed)) {
+    if (vi_structure_stops_move(s->model) && vi_structure_jams(s, VI_ROUNDING, jammed)) {
         return VI_STEP_STANDSTILL;
     }
     vi_structure_settle(s, stops_here(s, target, request));
