@@ -161,9 +161,13 @@ class Flexibility:
         moves[self._order] = self._scale[:, None] * motions
         masses = moves.T @ (self._mass @ moves)
         size = np.sqrt(np.abs(masses.diagonal()))
-        terms = (np.abs(moves) * (abs(self._mass) @ np.abs(moves))).sum(axis=0)
+        mass, scale = abs(self._mass), np.empty(len(self._names))
+        scale[self._order] = self._scale
+        terms = (np.abs(moves) * (mass @ np.abs(moves))).sum(axis=0)
+        # a motion without mass has the rounding of its displacements, which heavy unknowns may turn into mass
+        rounded = (ROUNDING * np.abs(motions).max(axis=0, initial=0.0)) ** 2 * float(scale @ (mass @ scale))
         values, ways = np.linalg.eigh(masses / np.where(size > 0.0, np.outer(size, size), 1.0))
-        if moves.shape[1] and (values[0] < 1e-12 or (size**2 <= ROUNDING * terms).any()):
+        if moves.shape[1] and (values[0] < 1e-12 or (size**2 <= ROUNDING * terms + rounded).any()):
             place = int(np.abs(motions @ ways[:, 0]).argmax())
             raise UsageError(
                 f"expected mass or stiffness for each motion, got neither for one, mostly of {self._names[place]}."

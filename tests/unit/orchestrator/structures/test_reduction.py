@@ -9,6 +9,7 @@ import scipy.linalg
 import scipy.sparse as sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.drawn_matrices import drawn_matrices
 from support.finite_elements import chain_matrices, hermite_beam, solid
 
 import vibroimpact as vi
@@ -301,3 +302,11 @@ def test_free_bodies_of_masses_over_twelve_decades_have_each_a_rigid_body_mode()
     for point, body in (("one", masses[:2]), ("last", masses[-2:])):
         own = 1.0 / (found.shapes[point][:15] ** 2).sum()
         assert own == pytest.approx(body.sum(), rel=1e-9)
+
+
+def test_motions_without_mass_beside_heavy_unknowns_are_refused() -> None:
+    """Masses of 1e-5 to 6.5e6 kg turn the rounding of five such motions into 1e-25 kg: theirs and rounding alone."""
+    drawn = drawn_matrices(np.random.default_rng(1998000074))
+    stiffness, mass = (sparse.csc_array(each) for each in (drawn.stiffness, drawn.mass))
+    with pytest.raises(UsageError, match="expected mass or stiffness for each motion"):
+        reduce(Matrices(stiffness, mass, None, drawn.names), {}, modes=64)
