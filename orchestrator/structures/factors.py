@@ -103,7 +103,7 @@ class Flexibility:
             lowest = float(energies.min(initial=0.0))
             if -4.0 * lowest > max(shift, DIGITS):
                 continue
-            rounding = max(DIGITS, -8.0 * lowest)
+            rounding = _rounding(energies)
             if rounding > DIGITS:
                 self.remarks += (
                     f"The stiffness has few digits: rigid-body modes have {rounding:.0e} of the energy of its terms.",
@@ -130,7 +130,7 @@ class Flexibility:
             _, ways = np.linalg.eigh(moves.T @ (self._matrix @ moves))
             moves = moves @ ways
             energies = self._energies(moves)
-            found = int((energies <= DIGITS).sum())
+            found = int((energies <= _rounding(energies)).sum())
             full = found == moves.shape[1] < count
             if full and found > MOST_RIGID:
                 raise UsageError(f"expected at most {MOST_RIGID} rigid-body modes, got more.")
@@ -173,6 +173,11 @@ class Flexibility:
                 f"expected mass or stiffness for each motion, got neither for one, mostly of {self._names[place]}."
             )
         return np.asarray(moves @ (ways / size[:, None] / np.sqrt(values)))
+
+
+def _rounding(energies: Floats) -> float:
+    """Return the relative energy up to which a motion is rigid, by the digits of the stiffness: some are negative."""
+    return max(DIGITS, -8.0 * float(energies.min(initial=0.0)))
 
 
 def _held(motions: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -310,3 +310,15 @@ def test_motions_without_mass_beside_heavy_unknowns_are_refused() -> None:
     stiffness, mass = (sparse.csc_array(each) for each in (drawn.stiffness, drawn.mass))
     with pytest.raises(UsageError, match="expected mass or stiffness for each motion"):
         reduce(Matrices(stiffness, mass, None, drawn.names), {}, modes=64)
+
+
+def test_many_rigid_bodies_in_a_text_of_ten_digits_are_all_found() -> None:
+    """24 rigid-body modes of springs over four decades: their rounding is seen before the last of them is sought."""
+    drawn = drawn_matrices(np.random.default_rng(1998000682))
+    stiffness = np.array([float(f"{each:.9e}") for each in drawn.stiffness.ravel()]).reshape(
+        drawn.stiffness.shape
+    )
+    matrices = Matrices(sparse.csc_array(stiffness), sparse.csc_array(drawn.mass), None, drawn.names)
+    found = reduce(matrices, {}, modes=30)
+    assert (found.natural == 0.0).sum() == drawn.rigid == 24
+    assert any("few digits" in remark for remark in found.remarks)
