@@ -49,9 +49,12 @@ CRUSHED = "expected room between their stops"
 
 def check(seed: int) -> str | None:
     """Return the fault of the scene of a seed."""
-    is_forced = bool(seed % 2)
-    tables = forced_structure(seed) if is_forced else drawn_structure(seed)
-    scene = Scene.from_dict(tables)
+    return fault(seed, forced_structure(seed) if seed % 2 else drawn_structure(seed))
+
+
+def fault(seed: int, tables: dict[str, Any]) -> str | None:
+    """Return the fault of a scene; odd seeds compare its run with those that are cut."""
+    is_forced, scene = bool(seed % 2), Scene.from_dict(tables)
     found = vi.run(scene)
     return (
         _outcome_problem(tables, found)

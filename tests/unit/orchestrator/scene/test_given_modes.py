@@ -83,6 +83,17 @@ def test_the_modes_of_a_beam_are_this_beam() -> None:
     np.testing.assert_allclose(one.impact_velocity[:first], other.impact_velocity[:first], rtol=1e-8)
 
 
+def test_the_rounding_of_a_product_leaves_a_damping_matrix_symmetric() -> None:
+    dashpots = 0.1 * np.array([[0.3, 1.7], [0.1, 0.7]])
+    rounded = dashpots @ np.array([[1.1, 0.3], [0.3, 0.7]]) @ dashpots.T
+    rounded[0, 1] = np.nextafter(rounded[1, 0], 1.0)
+    exact = 0.5 * (rounded + rounded.T)
+    one, other = (
+        vi.run(Scene.from_dict(changed(body={"damping_matrix": each.tolist()}))) for each in (rounded, exact)
+    )
+    assert (one.final_state.values == other.final_state.values).all()
+
+
 @pytest.mark.parametrize(
     ("tables", "key", "expected"),
     [
