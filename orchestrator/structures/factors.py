@@ -117,10 +117,10 @@ class Flexibility:
             lowest = float(energies.min(initial=0.0))
             if -4.0 * lowest > max(shift, DIGITS):
                 continue
-            rounding = max(DIGITS, -8.0 * lowest, self._few)
+            rounding = max(_rounding(energies), self._few)
             above = float(energies[energies > rounding].min(initial=np.inf))
             if self._few and above < GAP * rounding and (energies <= rounding).any():
-                rounding = max(DIGITS, -8.0 * lowest)
+                rounding = _rounding(energies)
                 self.remarks += (
                     f"The {self._digits} digits of the stiffness do not tell slow modes from rigid-body modes.",
                 )
@@ -150,7 +150,7 @@ class Flexibility:
             _, ways = np.linalg.eigh(moves.T @ (self._matrix @ moves))
             moves = moves @ ways
             energies = self._energies(moves)
-            found = int((energies <= max(DIGITS, self._few)).sum())
+            found = int((energies <= max(_rounding(energies), self._few)).sum())
             full = found == moves.shape[1] < count
             if full and found > MOST_RIGID:
                 raise UsageError(f"expected at most {MOST_RIGID} rigid-body modes, got more.")
@@ -181,9 +181,13 @@ class Flexibility:
         moves[self._order] = self._scale[:, None] * motions
         masses = moves.T @ (self._mass @ moves)
         size = np.sqrt(np.abs(masses.diagonal()))
-        terms = (np.abs(moves) * (abs(self._mass) @ np.abs(moves))).sum(axis=0)
+        mass, scale = abs(self._mass), np.empty(len(self._names))
+        scale[self._order] = self._scale
+        terms = (np.abs(moves) * (mass @ np.abs(moves))).sum(axis=0)
+        # a motion without mass has the rounding of its displacements, which heavy unknowns may turn into mass
+        rounded = (ROUNDING * np.abs(motions).max(axis=0, initial=0.0)) ** 2 * float(scale @ (mass @ scale))
         values, ways = np.linalg.eigh(masses / np.where(size > 0.0, np.outer(size, size), 1.0))
-        if moves.shape[1] and (values[0] < 1e-12 or (size**2 <= ROUNDING * terms).any()):
+        if moves.shape[1] and (values[0] < 1e-12 or (size**2 <= ROUNDING * terms + rounded).any()):
             place = int(np.abs(motions @ ways[:, 0]).argmax())
             raise UsageError(
                 f"expected mass or stiffness for each motion, got neither for one, mostly of {self._names[place]}."
@@ -203,6 +207,11 @@ def decimal_digits(values: Floats) -> int:
         while digits < _DIGITS_OF_DOUBLES and float(f"{value:.{digits - 1}e}") != value:
             digits += 1
     return digits
+
+
+def _rounding(energies: Floats) -> float:
+    """Return the relative energy up to which a motion is rigid, by the digits of the stiffness: some are negative."""
+    return max(DIGITS, -8.0 * float(energies.min(initial=0.0)))
 
 
 def _held(motions: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -81,10 +81,9 @@ class Lanczos:
     def _squares(self, values: Floats, shapes: Floats) -> Floats:
         """Return w^2 from the flexibility of slow modes, and from the strain energy of fast ones: where it is exact."""
         energies, terms = self._flexibility.energies(shapes)
-        is_fast = terms / np.maximum(energies, 1e-300) < self._largest / values
-        is_fast &= (
-            np.abs(energies * values - 1.0) < AGREE
-        )  # motions without mass may add energy to a fast mode
+        is_fast = terms * values < self._largest * energies
+        # motions without mass may add energy to a fast mode
+        is_fast &= np.abs(energies * values - 1.0) < AGREE
         return np.asarray(np.where(is_fast, energies, 1.0 / values))
 
     def _converge(self, count: int, most: int) -> None:

@@ -134,3 +134,28 @@ def test_a_run_that_is_cut_at_the_instant_of_a_release_goes_on() -> None:
             assert len(np.concatenate([part.sticks for part in parts])) == 1
     finally:
         driver.close()
+
+
+def test_a_body_at_rest_without_load_has_one_rest() -> None:
+    """Rounding of its speed, with damping that feeds energy, is no force that lets it go."""
+    bodies = [oscillator("a", 2.321), oscillator("b", 0.483, damping=-0.316, velocity_start=0.295)]
+    stop = {"at": "b", "side": "upper", "position": 0.482, "restitution": 0.0}
+    force = {"signal": "table", "at": "a", "times": [0.5, 1.0], "values": [0.4, 1.3]}
+    scene = {"body": bodies, "stop": [stop], "forcing": force, "record": {"recorded_time": 8.0}}
+    found = vi.run(Scene.from_dict({"scene": {"units": "nondimensional"}} | scene))
+    assert found.sizes["stick"] == 1
+    assert found.stick_start.item() == found.impact_time.item()
+    assert np.isnan(found.stick_end.item())
+
+
+def test_a_contact_that_pulls_lets_a_rest_without_load_go_at_once() -> None:
+    """Two points of a beam rest on each other without load until a ball parts them by a Hertz contact."""
+    beam = {"name": "c", "kind": "beam", "length": 1.0, "mass_per_length": 1.673, "flexural_rigidity": 1.036}
+    bodies = [oscillator("a", 1.02, velocity_start=0.112), beam | {"boundary": "clamped-pinned", "modes": 1}]
+    contacts = [
+        {"between": ["a", "c.0.55"], "clearance": 0.075, "law": "hertz", "stiffness": 1000.0},
+        {"between": ["c.0.3", "c.0.55"], "clearance": 0.0, "restitution": 1.0},
+    ]
+    found = run(bodies, contacts, scene={"units": "nondimensional"}, record={"recorded_time": 1.0})
+    assert found.stick_start.values.tolist() == [0.0]
+    assert found.stick_end.item() == pytest.approx(0.075 / 0.112, abs=1e-12)

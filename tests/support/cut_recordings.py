@@ -140,6 +140,8 @@ def difference(parts: Sequence[Events], edges: Sequence[float], whole: Events, a
     allowed : float
         Largest difference of times, s.
     """
+    joints = _joints(parts, edges[1:]) | _joints([whole], edges[-1:])
+    whole, *parts = (_joined(each, joints, allowed) for each in (whole, *parts))
     for name, rows_of, number in (("impacts", 0, CONTACT_OF_IMPACT), ("sticks", 1, CONTACT_OF_STICK)):
         for part, (begin, end) in zip(parts, pairwise(edges), strict=True):
             times = part[rows_of][:, TIME]
@@ -158,6 +160,32 @@ def difference(parts: Sequence[Events], edges: Sequence[float], whole: Events, a
         if not apart <= allowed:
             return f"{name} are {apart:.2g} s apart, allowed {allowed:.2g} s"
     return _wrongly_open(parts, edges, whole, allowed)
+
+
+def _joints(parts: Sequence[Events], ends: Sequence[float]) -> set[tuple[float, float]]:
+    """Return contacts and instants at which a rest ends and begins again: rounding parts a rest without load."""
+    found: set[tuple[float, float]] = set()
+    last: dict[float, float] = {}
+    for part, end in zip(parts, ends, strict=True):
+        for start, until, contact in part.sticks[np.argsort(part.sticks[:, TIME], kind="stable")].tolist():
+            if abs(start - last.get(contact, -np.inf)) <= ROOM:
+                found.add((contact, start))
+            last[contact] = end if np.isnan(until) else until
+    return found
+
+
+def _joined(events: Events, joints: set[tuple[float, float]], allowed: float) -> Events:
+    """Return a recording whose rests go on where another rest of the contact begins at such an instant."""
+    rows: list[Floats] = []
+    for row in events.sticks[np.argsort(events.sticks[:, TIME], kind="stable")].copy():
+        own = [at for contact, at in joints if contact == row[CONTACT_OF_STICK]]
+        if not any(abs(row[TIME] - at) <= allowed for at in own):
+            rows.append(row)
+            continue
+        for before in rows:
+            if before[CONTACT_OF_STICK] == row[CONTACT_OF_STICK] and abs(before[1] - row[TIME]) <= allowed:
+                before[1] = row[1]
+    return Events(events.impacts, np.array(rows).reshape(-1, events.sticks.shape[1]))
 
 
 def _wrongly_open(

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from support.drawn_structures import ENERGIES, Tables, drawn_structure, law_of, number, numbers, pick
+from support.drawn_structures import (
+    ENERGIES,
+    KINDS,
+    Tables,
+    drawn_structure,
+    law_of,
+    number,
+    numbers,
+    pick,
+)
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
 
@@ -20,11 +29,11 @@ SIGNALS = ("sine", "sine", "sine", "sine", "constant", "chirp", "pulse", "table"
 Floats = NDArray[np.float64]
 
 
-def forced_structure(seed: int) -> Tables:
+def forced_structure(seed: int, kinds: Sequence[str] = KINDS) -> Tables:
     """Return the tables of a valid scene whose forces are of any signals; stops may move, and motions may grow."""
     random = np.random.default_rng([seed, 51])
-    is_lone = random.random() < 0.25
-    tables = _lone_body(random) if is_lone else drawn_structure(seed)
+    is_lone = random.random() < 0.25 and kinds == KINDS
+    tables = _lone_body(random) if is_lone else drawn_structure(seed, kinds)
     if random.random() < 0.3:
         _feed(random, tables)
     tables["forcing"] = [_force(random, tables) for _ in range(int(random.integers(1 + is_lone, 7)))]
@@ -84,8 +93,9 @@ def _bodies(tables: Tables) -> list[Tables]:
 
 
 def _feed(random: np.random.Generator, tables: Tables) -> None:
-    """Make a spring or a dashpot negative, of a body that is no beam or of a link."""
-    owners = [each for each in _bodies(tables) if each.get("kind") != "beam"] + tables.get("link", [])
+    """Make a spring or a dashpot negative, of a body that has one by its name, or of a link."""
+    owners = [each for each in _bodies(tables) if each.get("kind") not in ("beam", "modes")]
+    owners += tables.get("link", [])
     if not owners:
         return
     owner, key = pick(random, *owners), pick(random, "stiffness", "damping")
@@ -140,7 +150,11 @@ def _place(random: np.random.Generator, tables: Tables) -> Tables:
     if not isinstance(tables["body"], list):
         return {}
     body = pick(random, *tables["body"])
-    ends = {"chain": f".{int(random.integers(len(body.get('masses', [1]))) + 1)}", "beam": ".0.55"}
+    ends = {
+        "chain": f".{int(random.integers(len(body.get('masses', [1]))) + 1)}",
+        "beam": ".0.55",
+        "modes": ".p",
+    }
     return {"at": body["name"] + ends.get(body.get("kind", ""), "")}
 
 

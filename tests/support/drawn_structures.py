@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
 
 Tables = dict[str, Any]
+KINDS = ("oscillator", "oscillator", "chain", "beam")
+OWN_KINDS = (*KINDS, *("modes",) * 4)
+"""Kinds of bodies of a scene, each as often as it stands here; the second with bodies of one's own."""
 BOUNDARIES = ("clamped-free", "pinned-pinned", "clamped-clamped", "clamped-pinned")
 SAMPLES = 60
 MOST_IMPACTS = 2000
@@ -30,9 +34,11 @@ def numbers(random: np.random.Generator, low: float, high: float, count: int) ->
     return [number(random, low, high) for _ in range(count)]
 
 
-def _body(random: np.random.Generator, name: str) -> tuple[Tables, list[str]]:
+def _body(random: np.random.Generator, name: str, kinds: Sequence[str]) -> tuple[Tables, list[str]]:
     """Return a body and the points of it that move."""
-    kind = pick(random, "oscillator", "oscillator", "chain", "beam")
+    kind = pick(random, *kinds)
+    if kind == "modes":
+        return _own_body(random, name)
     if kind == "oscillator":
         springs = {"stiffness": pick(random, 0.0, 1.0, number(random, 0.1, 30.0))}
         springs |= {"damping": pick(random, 0.0, number(random, 0.0, 0.3))}
@@ -61,6 +67,26 @@ def _body(random: np.random.Generator, name: str) -> tuple[Tables, list[str]]:
     return {"name": name, "kind": "beam"} | beam, [f"{name}.{place}" for place in ("0.3", "0.55", "0.8")]
 
 
+def _own_body(random: np.random.Generator, name: str) -> tuple[Tables, list[str]]:
+    """Return a body by its modes: rigid ones, equal ones, ones that feed energy, and coupled damping among them."""
+    count = int(random.integers(1, 7))
+    natural, ratios = numbers(random, 0.3, 20.0, count), numbers(random, -0.03, 0.1, count)
+    natural[0] = pick(random, 0.0, natural[0], natural[0])
+    natural[-1] = pick(random, natural[0], natural[-1], natural[-1])
+    body: Tables = {"name": name, "kind": "modes", "angular_frequencies": natural}
+    body |= pick(random, {}, {"damping_ratio": 0.02}, {"damping_ratio": ratios})
+    if random.random() < 0.5:
+        dashpots = random.normal(size=(count, pick(random, 1, count)))
+        body["damping_matrix"] = (0.1 * dashpots @ dashpots.T).tolist()
+    points = ("p", "q", "r")[: int(random.integers(1, 4))]
+    body["shapes"] = {
+        point: (pick(random, 0.05, 1.0, 3.0) * random.normal(size=count)).tolist() for point in points
+    }
+    body["participation"] = numbers(random, -1.0, 1.0, count)
+    body |= pick(random, {}, {"velocity_start": [number(random, -1.0, 1.0)]})
+    return body, [f"{name}.{point}" for point in points]
+
+
 def law_of(random: np.random.Generator) -> Tables:
     """Return the keys of a law of a stop or a contact."""
     law = pick(random, "restitution", "restitution", "restitution", "kelvin_voigt", "hertz", "hunt_crossley")
@@ -84,11 +110,11 @@ def _meeting(random: np.random.Generator, pair: list[str]) -> list[Tables]:
     return [{"between": pair, "clearance": clearance} | law_of(random)]
 
 
-def drawn_structure(seed: int) -> Tables:
+def drawn_structure(seed: int, kinds: Sequence[str] = KINDS) -> Tables:
     """Return the tables of a valid scene: two to four bodies, at rest or moving, with room between them."""
     random = np.random.default_rng(seed)
     names = ["a", "b", "c", "d"][: int(random.integers(2, 5))]
-    made = [_body(random, name) for name in names]
+    made = [_body(random, name, kinds) for name in names]
     points = [point for _, of_body in made for point in of_body]
     links = [
         {"between": pick(random, _pair(random, points), [points[0], "ground"])}

@@ -207,13 +207,15 @@ class ModesBody(BodyTable):
             self.damping_ratio if isinstance(self.damping_ratio, tuple) else (self.damping_ratio,) * count
         )
 
+        damping = np.array(self.damping_matrix or np.zeros((count, count)))
+
         def filled(given: tuple[float, ...]) -> tuple[float, ...]:
             return (*given, *(0.0,) * (count - len(given)))
 
         return ModesPart(
             self.natural,
             ratios,
-            np.array(self.damping_matrix) if self.damping_matrix else np.zeros((count, count)),
+            0.5 * (damping + damping.T),
             np.array(list(self.shapes.values())),
             filled(self.participation),
             filled(self.displacement_start),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from vibroimpact.orchestrator.scene.body_models import Body, ModesBody
 from vibroimpact.orchestrator.scene.body_models.modes import POINT_NAME
@@ -23,6 +23,8 @@ ALONE = "beside one body alone"
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
 FREQUENCY_KEYS = ("frequency", "mass_per_length")
+SKEW = 1e-9
+"""Largest difference of mirrored entries over the largest entry: a product of matrices is rounded."""
 
 
 def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
@@ -170,10 +172,20 @@ def modes_are_whole(draft: Draft) -> Iterator[Problem]:
         if not POINT_NAME.fullmatch(point):
             hint = "A dot is allowed within it."
             yield Problem("body.shapes", "names of letters, digits, _, - and dots", quoted(point), hint)
-    matrix = body.damping_matrix
-    if matrix != tuple(zip(*matrix, strict=False)):
+    if not _is_symmetric(body.damping_matrix):
         hint = "Gyroscopic terms are not modelled."
         yield Problem("body.damping_matrix", "a symmetric matrix", "one that is not", hint)
+
+
+def _is_symmetric(matrix: Sequence[Sequence[float]]) -> bool:
+    """Return whether mirrored entries of a square matrix differ by rounding at most."""
+    allowed = SKEW * max((abs(number) for row in matrix for number in row), default=0.0)
+    columns = zip(*matrix, strict=False)
+    return all(
+        abs(one - other) <= allowed
+        for row, column in zip(matrix, columns, strict=False)
+        for one, other in zip(row, column, strict=False)
+    )
 
 
 BODY_RULES = (

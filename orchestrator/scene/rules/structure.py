@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models import ModesBody, StructureBody
 from vibroimpact.orchestrator.scene.body_models.base import NoPoint
 from vibroimpact.orchestrator.scene.body_models.points import (
     ALL,
@@ -200,6 +200,21 @@ class _Points:
         if not wrong and first == second:
             got = f"{quoted(between[0])} and {quoted(between[1])}"
             yield Problem(key_path(where), "two points that are not the same", got)
+        elif not wrong and where[0] == "contact" and self._move_alike(first, second):
+            got = f"{quoted(between[0])} and {quoted(between[1])}"
+            yield Problem(key_path(where), "two points that move apart", got, "Their shapes are the same.")
+
+    def _move_alike(self, first: PointOfBody | NoPoint | None, second: PointOfBody | NoPoint | None) -> bool:
+        """Return whether two points of one body by its modes have the same shapes."""
+        if not (
+            isinstance(first, PointOfBody) and isinstance(second, PointOfBody) and first.body == second.body
+        ):
+            return False
+        part = self._body.parts[first.body]
+        if not isinstance(part, ModesBody):
+            return False
+        one, other = (part.shapes[part.points[int(point.place) - 1]] for point in (first, second))
+        return one == other
 
     def limits(self) -> Iterator[_Limit]:
         """Yield stops and contacts, with the points of each contact in one order, if all points are there."""

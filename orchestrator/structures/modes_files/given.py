@@ -130,7 +130,7 @@ def _damping(rows: Sequence[Sequence[float]], count: int) -> Floats:
     found = np.array([_each(f"damping_matrix[{place}]", row, count) for place, row in enumerate(rows, 1)])
     if np.abs(found - found.T).max() > _SKEW * np.abs(found).max():
         raise UsageError("damping_matrix: expected a symmetric matrix, got one that is not.")
-    return found
+    return np.asarray(0.5 * (found + found.T))
 
 
 def _shapes(given: GivenModes, count: int) -> tuple[Floats, tuple[str, ...]]:

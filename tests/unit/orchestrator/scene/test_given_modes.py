@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from copy import deepcopy
 from typing import Any
 
@@ -81,6 +82,32 @@ def test_the_modes_of_a_beam_are_this_beam() -> None:
     assert first > 5
     np.testing.assert_allclose(one.impact_time[:first], other.impact_time[:first], rtol=1e-11)
     np.testing.assert_allclose(one.impact_velocity[:first], other.impact_velocity[:first], rtol=1e-8)
+
+
+def test_a_contact_of_two_points_of_one_shape_is_refused_by_its_key() -> None:
+    shapes = {"tip": [2.0, -2.0], "end": [2.0, -2.0], "middle": [0.7, 1.4]}
+    own = TWO_MODES["body"] | {"name": "own", "shapes": shapes}
+    tables = {
+        "body": [own, {"name": "ball", "mass": 1.0, "stiffness": 1.0}],
+        "record": {"recorded_time": 1.0},
+    }
+    contact = {"restitution": 0.5, "clearance": 0.0}
+    text = re.escape('contact[1].between: expected two points that move apart, got "own.tip" and "own.end"')
+    with pytest.raises(SceneError, match=text):
+        Scene.from_dict(tables | {"contact": [contact | {"between": ["own.tip", "own.end"]}]})
+    for between in (["own.tip", "own.middle"], ["own.tip", "ball"]):
+        assert len(Scene.from_dict(tables | {"contact": [contact | {"between": between}]}).stops) == 1
+
+
+def test_the_rounding_of_a_product_leaves_a_damping_matrix_symmetric() -> None:
+    dashpots = 0.1 * np.array([[0.3, 1.7], [0.1, 0.7]])
+    rounded = dashpots @ np.array([[1.1, 0.3], [0.3, 0.7]]) @ dashpots.T
+    rounded[0, 1] = np.nextafter(rounded[1, 0], 1.0)
+    exact = 0.5 * (rounded + rounded.T)
+    one, other = (
+        vi.run(Scene.from_dict(changed(body={"damping_matrix": each.tolist()}))) for each in (rounded, exact)
+    )
+    assert (one.final_state.values == other.final_state.values).all()
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import scipy.linalg
 import scipy.sparse as sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.drawn_matrices import drawn_matrices
 from support.finite_elements import chain_matrices, hermite_beam, solid
 
 import vibroimpact as vi
@@ -366,3 +367,23 @@ def test_few_digits_do_not_make_the_slow_mode_of_a_fine_mesh_a_rigid_body_mode()
     found = reduce(given, {"tip": {exact.freedoms[-2]: 1.0}}, modes=4)
     assert found.natural[0] > 0.0
     assert found.remarks == ("The 10 digits of the stiffness do not tell slow modes from rigid-body modes.",)
+
+
+def test_motions_without_mass_beside_heavy_unknowns_are_refused() -> None:
+    """Masses of 1e-5 to 6.5e6 kg turn the rounding of five such motions into 1e-25 kg: theirs and rounding alone."""
+    drawn = drawn_matrices(np.random.default_rng(1998000074))
+    stiffness, mass = (sparse.csc_array(each) for each in (drawn.stiffness, drawn.mass))
+    with pytest.raises(UsageError, match="expected mass or stiffness for each motion"):
+        reduce(Matrices(stiffness, mass, None, drawn.names), {}, modes=64)
+
+
+def test_many_rigid_bodies_in_a_text_of_ten_digits_are_all_found() -> None:
+    """24 rigid-body modes of springs over four decades: their rounding is seen before the last of them is sought."""
+    drawn = drawn_matrices(np.random.default_rng(1998000682))
+    stiffness = np.array([float(f"{each:.9e}") for each in drawn.stiffness.ravel()]).reshape(
+        drawn.stiffness.shape
+    )
+    matrices = Matrices(sparse.csc_array(stiffness), sparse.csc_array(drawn.mass), None, drawn.names)
+    found = reduce(matrices, {}, modes=30)
+    assert (found.natural == 0.0).sum() == drawn.rigid == 24
+    assert any("few digits" in remark for remark in found.remarks)

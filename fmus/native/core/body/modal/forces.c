@@ -1,5 +1,9 @@
 #include "body/modal/forces.h"
 
+#include <math.h>
+#include <string.h>
+
+#include "body/landing.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
@@ -108,11 +112,20 @@ void vi_structure_accelerate(const vi_structure *s, double acceleration[], doubl
     }
 }
 
+void vi_structure_clear_rounding(const vi_structure *s, const double before[], double p[])
+{
+    const vi_structure_model *model = s->model;
+    for (int j = 0; j < vi_structure_modes(model) && model->coupled; ++j) {
+        const bool is_free = model->mode[j].stiffness == 0.0 && model->coupling[j][j] != 0.0;
+        p[j] = is_free && fabs(p[j]) <= VI_ROUNDING * fabs(before[j]) ? 0.0 : p[j];
+    }
+}
+
 void vi_structure_project(const vi_structure *s)
 {
     const vi_structure_model *model = s->model;
     vi_structure_state *state = s->state;
-    double g[VI_PORTS][VI_PORTS], x[VI_PORTS], v[VI_PORTS], dx[VI_PORTS], dv[VI_PORTS];
+    double g[VI_PORTS][VI_PORTS], x[VI_PORTS], v[VI_PORTS], dx[VI_PORTS], dv[VI_PORTS], p[VI_MODES];
     int held[VI_PORTS] = {0}, any = 0;
     for (int k = 0; k < model->contacts; ++k) {
         held[k] = state->status[k] == VI_CONTACT_HELD;
@@ -129,8 +142,10 @@ void vi_structure_project(const vi_structure *s)
     }
     vi_solve_active(model->contacts, g, x, held, dx);
     vi_solve_active(model->contacts, g, v, held, dv);
+    memcpy(p, state->p, sizeof p);
     for (int k = 0; k < model->contacts; ++k) {
         vi_structure_push(s, k, dx[k], state->q);
         vi_structure_push(s, k, dv[k], state->p);
     }
+    vi_structure_clear_rounding(s, p, state->p);
 }

@@ -26,6 +26,10 @@ void vi_structure_push(const vi_structure *s, int k, double force, double modal[
 /* A matrix between contacts with the signs of their stops: towards the stops counts positive. */
 void vi_structure_signed(const vi_structure *s, double matrix[VI_PORTS][VI_PORTS], double g[VI_PORTS][VI_PORTS]);
 
+/* Set velocities of damped modes without a spring to 0 where a stop has left the rounding of `before` alone. Such a body
+ * rests without load: its damping would turn the rounding into a force that lets it go. */
+void vi_structure_clear_rounding(const vi_structure *s, const double before[], double p[]);
+
 /* Put the held contacts back on their stops, at rest, which removes rounding. */
 void vi_structure_project(const vi_structure *s);
 

@@ -39,6 +39,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     for (int l = 0; l < model->contacts; ++l) {
         vi_structure_push(s, l, unit[l], view->p);
     }
+    vi_structure_clear_rounding(s, state->p, view->p);
     at[k] = 0.0;
     const vi_drift_start start = {state->q, view->p, vi_structure_drive_now(s, loads), at, sign, press};
     vi_drift drift;

@@ -150,6 +150,15 @@ static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift,
     return (vi_fall){true, lifted, 1.0};
 }
 
+/* Is held contact k, which bears no force of its own, pulled off its stop by thin contacts within this length? */
+static bool is_pulled(const vi_structure *s, const vi_drift *drift, const vi_situation *now, int k, double length)
+{
+    double size, value[4];
+    vi_polynomial_at(drift->force[k], length, value);
+    const double thin = vi_thin_part(s, drift, now->thin, now->at, k, length, &size);
+    return value[0] + thin < -VI_ROUNDING * size;
+}
+
 static void releases(const vi_structure *s, const vi_drift *drift, const vi_situation *now, int k, double length,
                      vi_event_found *first)
 {
@@ -169,6 +178,10 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
             event = VI_DRIFT_RELEASE;
             fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
             fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
+        }
+        if (lead > VI_ORDER && now->any_thin && is_pulled(s, drift, now, k, length)) {
+            fall = (vi_fall){true, 0.0, 1.0};
+            event = VI_DRIFT_GENTLE_RELEASE;
         }
     } else if (force[0] + thin >= -noise) {
         fall = force[0] >= -noise ? fall_through(force, length, noise) : fall;
