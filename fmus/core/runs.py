@@ -41,11 +41,16 @@ class RunsPlan(Structure):
 
     _fields_ = [
         *((name, RunsVariables) for name in ("parameters", "integers", "booleans")),
+        ("columns", c_int32),
+        ("places", c_void_p),
+        ("elements", c_void_p),
+        ("size", ctypes.c_size_t),
         ("integer_values", c_void_p),
         ("boolean_values", c_void_p),
         ("switches", RunsVariables),
         ("switch_values", c_void_p),
         *((name, RunsVariables) for name in ("finals", "flags")),
+        ("finals_size", ctypes.c_size_t),
         *((name, c_uint32) for name in ("record_count", "record_taken", "record_rows")),
         *((name, c_int32) for name in ("row_capacity", "chained", "displacement", "velocity", "phase", "stops")),
         ("stop_position", c_void_p),

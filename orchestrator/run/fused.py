@@ -86,16 +86,23 @@ class BodyDriver(RecordedBody):
                 self.integers.append(group)
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
-        count = size or sum(map(self._size, names))
+        count = size or sum(map(self.size, names))
         return self.instance.group(kind, [self.references[name] for name in names], size=count)
 
-    def _size(self, variable: str) -> int:
+    def size(self, variable: str) -> int:
+        """Return the number of values of a variable: more than one for an array."""
         return math.prod(self._shapes.get(variable, ()))
 
     @property
     def sets_arrays(self) -> bool:
         """Whether some real parameters are elements of arrays of the FMU, which are set as a whole."""
         return any(name not in self.references for name in self.float_names)
+
+    @property
+    def float_layout(self) -> tuple[NDArray[np.uint32], NDArray[np.int64], int]:
+        """Value references of the variables with the real parameters, the place of each, and their size."""
+        references = np.array(self._floats.references, dtype=np.uint32)
+        return references, self._places, len(self._floats.values)
 
     def _parameters(self, names: Sequence[str]) -> tuple[VariableGroup, NDArray[np.int64]]:
         """Return the group of the variables that hold parameters, and the place of each parameter in its buffer.
@@ -111,7 +118,7 @@ class BodyDriver(RecordedBody):
                 index = tuple(int(number) - 1 for number in numbers.split(","))
                 element = int(np.ravel_multi_index(index, self._shapes[variable]))
             if variable not in first:
-                first[variable], size = size, size + self._size(variable)
+                first[variable], size = size, size + self.size(variable)
             places.append(first[variable] + element)
         return self._group("Float64", tuple(first)), np.array(places, dtype=np.int64)
 

@@ -45,7 +45,7 @@ PERIODS, COUNTED = 4000, 20
 IN_LANES, SIDE, PLACES, AMPLITUDES = (2, 8), 100, (0.98, 1.1), (0.9, 1.1)
 #: Largest ratio of given modes to the beam: an impact, and a map. Points that leave the lanes run one by one on a
 #: Structure, whose arrays the loop in C does not set.
-MOST_RATIO, MOST_OF_MAPS = 1.1, 1.3
+MOST_RATIO, MOST_OF_MAPS = 1.1, 1.2
 KINDS = ("beam", "modes")
 
 

@@ -214,7 +214,7 @@ class _LaneRun:
     @property
     def _one_by_one(self) -> bool:
         """Whether points that the lanes leave out need Python in between."""
-        return self._samples is not None or not self._loop.is_in_c
+        return self._samples is not None or not self._loop.takes(self._points)
 
     def _left(self) -> Ints:
         return np.flatnonzero(self._state == core.PointState.is_left)

@@ -1,8 +1,8 @@
 """Many points of a scene by one call: the loop over the points runs in C (`fmus.core.run_points`), without Python.
 
 The FMU gets the same calls for each point as in `point`, so the rows are the same. A point with an error or a warning
-of its body runs again alone, for its message. Scenes whose points need Python in between, for a time series or an
-importer, have no such loop: `loop_of` returns None.
+of its body runs again alone, for its message. Scenes whose points need Python in between, for a time series, an
+importer or several observed points, have no such loop: `loop_of` returns None.
 """
 
 from __future__ import annotations
@@ -21,15 +21,14 @@ from vibroimpact.orchestrator.run.parameters import float_parameters, state_vari
 from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY, TOUCH_DOWN, RecordedBody
 from vibroimpact.orchestrator.run.window import forced_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.models import Stop
 
 SHORTEST_DEADLINE = 0.5
 """Least deadline of a point in the loop, s; the loop checks the time only every few hundredths of a second."""
 
-NOT_IN_THE_LOOP = (MODES, "execution.macro_step")
-"""Keys whose values need new components."""
+NOT_IN_THE_LOOP = ("modes", "macro_step", "seed")
+"""Names of keys whose values need new components, or are whole numbers: points share the integers of the body."""
 
 Floats = NDArray[np.float64]
 
@@ -84,10 +83,10 @@ def loop_of(scene: Scene, driver: RecordedBody, *, by_lanes: bool) -> PointLoop 
         not isinstance(driver, BodyDriver)
         or (scene.record.time_series is not None and not by_lanes)
         or scene.is_measured
-        or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
+        or len(scene.record.observed) > 1
+        or any(axis.key.rpartition(".")[2] in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)
         or (chained and scene.body.IS_STRUCTURE and not by_lanes)
-        or (driver.sets_arrays and not by_lanes)
     ):
         return None
     return PointLoop(scene, driver, by_lanes=by_lanes)
@@ -104,13 +103,12 @@ class PointLoop:
         others = [f"{port}.{name}" for name in ("stick_start", "force") for port in ports]
         finals = (*OBSERVED, *state_variables(scene), *others, *touch_downs)
         self.finals = (*finals, scene.body.SLOWEST) if scene.body.IS_STRUCTURE else finals
+        self.finals_size = sum(map(driver.size, self.finals))  # the last may be an array
         self._kept: list[NDArray[Any]] = []  # keeps arrays alive while C reads them
         instance = driver.instance
         functions = [instance.address_of(name) for name in core.RunsFmu.FUNCTIONS]
         self.fmu = core.RunsFmu(instance.pointer, *functions, instance.log.environment)
-        self.is_in_c = not driver.sets_arrays  # the loop in C sets single variables
-        kinds = (False, True) if self.is_in_c else ()
-        self._plans = {forced: self._planned(ports, forced=forced) for forced in kinds}
+        self._plans = {forced: self._planned(ports, forced=forced) for forced in (False, True)}
 
     # ---- input of C ----
 
@@ -135,8 +133,13 @@ class PointLoop:
         integers, integer_values = self._integers("Int64", np.int64)
         booleans, boolean_values = self._integers("Boolean", np.bool_)
         stops = self.scene.stops
+        variables, places, size = self.driver.float_layout
         return core.RunsPlan(
-            parameters=self._variables(names),
+            parameters=core.RunsVariables(self._address(variables, np.uint32), len(variables)),
+            columns=len(places),
+            places=self._address(places, np.int32),
+            elements=self._address(np.zeros(size), np.float64),
+            size=size,
             integers=integers,
             booleans=booleans,
             integer_values=integer_values,
@@ -144,6 +147,7 @@ class PointLoop:
             switches=self._variables(["record.impacts", "record.extrema", "record.periods"]),
             switch_values=self._address([record.impacts, record.extrema, self._periods(forced)], np.bool_),
             finals=self._variables(self.finals),
+            finals_size=self.finals_size,
             flags=self._variables(self._flags),
             record_count=references["record.count"],
             record_taken=references["record.taken"],
@@ -157,6 +161,10 @@ class PointLoop:
             stop_position=self._address([names.index(f"{port}.position") for port in ports], np.int32),
             stop_direction=self._address([_direction(stop) for stop in stops], np.float64),
         )
+
+    def takes(self, points: PreparedPoints) -> bool:
+        """Tell whether the loop in C takes points: they have the parameters of the driver."""
+        return points.scene.body.is_coupled == self.scene.body.is_coupled
 
     def plan(self, *, forced: bool) -> core.RunsPlan:
         """Return the plan that all points share."""
@@ -198,8 +206,8 @@ class PointLoop:
         return PreparedPoints(points.first, table, begin, end, columns, forced, periods, scene)
 
     def _scene_of(self, points: PointValues) -> Scene:
-        """Return a scene of the kind of the first point; points of the loop in C are of the scene's own kind."""
-        if self.is_in_c:
+        """Return a scene of the kind of the first point; bodies without arrays have one kind."""
+        if not self.driver.sets_arrays:
             return self.scene
         return self.scene.at({key: each[0].item() for key, each in points.values.items()})
 

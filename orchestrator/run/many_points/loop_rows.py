@@ -104,7 +104,7 @@ class LoopArrays:
             "outcome": np.zeros(count, dtype=np.int8),
             "reached": np.zeros(count),
             "seconds": np.zeros(count),
-            "finals": np.zeros((count, len(loop.finals))),
+            "finals": np.zeros((count, loop.finals_size)),
             "flags": np.zeros((count, 2 * contacts), dtype=np.bool_),
             "rows_of": np.zeros(count, dtype=np.int64),
             "rows": np.zeros((ROWS_ROOM, ROW_WIDTH)),
@@ -139,8 +139,8 @@ class LoopArrays:
         return self._arrays["finals"]
 
     def _carry(self, state: State | None) -> None:
-        self.state.has_carried = state is not None
-        if state is not None:
+        self.state.has_carried = self._loop.chained and state is not None
+        if self.state.has_carried:
             self.state.carried[:] = state
 
     @property
@@ -250,7 +250,7 @@ class LoopArrays:
             starts = self._stick_starts(arrays)
             began = np.fmin.reduce(starts, axis=1)
             long_enough = points.end[:count] - points.begin[:count]
-            slowest = arrays["finals"][:, -1]
+            slowest = arrays["finals"][:, len(self._loop.finals) - 1]
             if self._loop.scene.body.size == 1:
                 slowest = np.abs(slowest)  # a spring that pushes
             if not points.forced:

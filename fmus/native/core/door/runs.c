@@ -30,7 +30,7 @@ static void carry(const vi_runs_plan *plan, const double carried[2], double valu
 
 static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
 {
-    double *values = p->values + (size_t)p->at * plan->parameters.count;
+    double *values = p->values + (size_t)p->at * (size_t)plan->columns;
     if (plan->chained && !p->first[p->at]) {
         if (!p->has_carried) {
             return VI_RUNS_REFUSED;
@@ -39,11 +39,14 @@ static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
     } else {
         p->has_carried = 0;
     }
+    for (int k = 0; k < plan->columns; ++k) {
+        plan->elements[plan->places[k]] = values[k];
+    }
     const uint64_t logged = f->log->count;
     const bool good =
         vi_status_is_good(f->reset(f->instance))
-        && vi_status_is_good(f->set_float64(f->instance, plan->parameters.references, plan->parameters.count, values,
-                                    plan->parameters.count))
+        && vi_status_is_good(f->set_float64(f->instance, plan->parameters.references, plan->parameters.count,
+                                            plan->elements, plan->size))
         && (plan->integers.count == 0
             || vi_status_is_good(f->set_int64(f->instance, plan->integers.references, plan->integers.count,
                                       plan->integer_values, plan->integers.count)))
@@ -132,9 +135,10 @@ static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points
     if (result != GO_ON) {
         return result;
     }
-    double *finals = p->finals + (size_t)p->at * plan->finals.count;
+    double *finals = p->finals + (size_t)p->at * plan->finals_size;
     bool *flags = p->flags + (size_t)p->at * plan->flags.count;
-    if (!vi_status_is_good(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals, plan->finals.count))
+    if (!vi_status_is_good(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals,
+                                          plan->finals_size))
         || (plan->flags.count > 0
             && !vi_status_is_good(f->get_boolean(f->instance, plan->flags.references, plan->flags.count, flags,
                                          plan->flags.count)))

@@ -48,12 +48,17 @@ typedef struct {
 
 /* Everything that all points share. */
 typedef struct {
-    vi_runs_variables parameters, integers, booleans; /* set before initialization */
+    vi_runs_variables parameters, integers, booleans; /* set before initialization; parameters may be arrays */
+    int32_t columns;       /* numbers of a point: elements of the parameters */
+    const int32_t *places; /* [columns] of each among the elements of all parameters */
+    double *elements;      /* [size] of all parameters, as they are set; those of no place keep their values */
+    size_t size;
     const int64_t *integer_values;
     const bool *boolean_values;
     vi_runs_variables switches; /* of the record, set when recording begins */
     const bool *switch_values;
     vi_runs_variables finals, flags; /* read at the end */
+    size_t finals_size;              /* elements of the finals: arrays come last */
     uint32_t record_count, record_taken, record_rows;
     int32_t row_capacity; /* of the body's record */
     /* A run of a branch starts from the final state of the previous run: places of displacement, velocity and phase
