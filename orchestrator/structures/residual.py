@@ -74,10 +74,9 @@ class Rest:
         sizes = np.concatenate([self.flexibility, np.abs(wide[0].diagonal()[len(one) :])])
         reference = _Flexibility.of(np.vstack([one, two * ratio]), *_modes(*wide, sizes, self._least))
         kept = _Flexibility.of(one, *self.vectors()) if residual else None
-        own = np.where(
-            self.flexibility > 0.0, self.flexibility, np.inf
-        )  # a point that only rigid-body modes move
-        unit = np.sqrt(np.outer(own, own))
+        # a point that only rigid-body modes move has no flexibility; the product of two small ones may underflow
+        own = np.sqrt(np.where(self.flexibility > 0.0, self.flexibility, np.inf))
+        unit = np.outer(own, own)
         worst = 0.0
         for each in np.linspace(0.0, angular, FREQUENCIES) ** 2:
             if each >= reference.lowest or (kept is not None and each >= kept.lowest):

@@ -387,3 +387,11 @@ def test_many_rigid_bodies_in_a_text_of_ten_digits_are_all_found() -> None:
     found = reduce(matrices, {}, modes=30)
     assert (found.natural == 0.0).sum() == drawn.rigid == 24
     assert any("few digits" in remark for remark in found.remarks)
+
+
+def test_a_point_that_hardly_moves_has_an_error_beside_a_usual_one() -> None:
+    beam = hermite_beam(10, 1.0, 1.0, 1.0)
+    points = {"tip": {beam.freedoms[-2]: 1.0}, "still": {beam.freedoms[-2]: 1e-90}}
+    with np.errstate(all="raise", under="ignore"):
+        found = reduce(beam, points, modes=4)
+    assert 0.0 < found.error < 1.0
