@@ -6,7 +6,7 @@
 #include "door/orbit_response.h"
 
 /* Impacts in their order. Between two impacts the modes move freely, and each impact takes away (1 + restitution)
- * velocity. With these impacts given, the state follows from the past, and its errors decay. */
+ * velocity; restitution may fall with speed. With these impacts given, the state follows from the past, and its errors decay. */
 typedef struct {
     int64_t impacts;
     const int32_t *contact;

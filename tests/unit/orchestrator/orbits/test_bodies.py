@@ -96,10 +96,6 @@ def test_the_velocity_of_the_thesis_chain_is_the_known_one() -> None:
             ONE.replace("restitution = 0.7", 'law = "hertz"\nstiffness = 1e4'),
             r'stop\[1\].law: expected "restitution"',
         ),
-        (
-            ONE.replace("restitution = 0.7", "restitution = 0.7\nyield_velocity = 1"),
-            "yield_velocity: expected 0",
-        ),
     ],
 )
 def test_a_scene_whose_orbits_are_not_followed_is_one_line(text: str, said: str) -> None:
