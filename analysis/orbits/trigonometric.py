@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.bodies.impacting_body import Contact, Floats
+from vibroimpact.fmus.bodies.impacting_body import FALLING, Contact, Floats
 
 TURN = 2.0 * np.pi
 SPLITS = 60
@@ -17,8 +17,8 @@ MOST_PARTS = 1_000_000
 """Number of undecided parts above which they are not halved: zeros of so high a multiplicity hardly have a place."""
 BISECTIONS = 54
 EXTREMUM_STEPS = 4
-MOST_NEWTON = 12
-"""Newton steps for the speed of an impact: its equation is convex or concave, and they double the digits."""
+MOST_NEWTON = 40
+"""Most Newton steps for the speed of an impact: its equation is convex or concave, and they double the digits."""
 ROUNDING = 8.0 * np.finfo(float).eps
 """Rounding of a sum, over the sum of its amplitudes times one plus their phase's size."""
 
@@ -247,14 +247,17 @@ class FallingDistance(PeriodicFunction):
         speed = steady / (1.0 - self.feedback)
         for _ in range(MOST_NEWTON):
             equal, slope = self._equal(speed)
-            speed = speed - (speed - self.feedback * equal - steady) / (1.0 - self.feedback * slope)
+            change = (speed - self.feedback * equal - steady) / (1.0 - self.feedback * slope)
+            speed = speed - change
+            if (np.abs(change) <= np.finfo(float).eps * np.abs(speed)).all():
+                break
         return speed
 
     def _equal(self, speed: Floats) -> tuple[Floats, Floats]:
         """Return the speeds of equal impulse, with their derivatives."""
-        contact, whole = self.contact, 1.0 + self.contact.restitution
-        equal = (1.0 + contact.restitution_at(speed)) / whole * speed
-        return equal, (1.0 + contact.restitution_slope(speed)) / whole
+        whole, kept = 1.0 + self.contact.restitution, self.contact.restitution_at(speed)
+        share = np.where(speed > self.contact.yield_velocity, FALLING, 1.0)
+        return (1.0 + kept) / whole * speed, (1.0 + share * kept) / whole
 
     def _gain(self, steady: Floats) -> Floats:
         """Return the derivative of the speed of equal impulse over the steady velocity: positive, and falling."""

@@ -18,6 +18,8 @@ Integers = Mapping[str, int]
 Numbers = Mapping[str, float]
 DIRECTIONS = {1: 1.0, 2: -1.0}
 """Direction of a stop by the number of its side in FMUs: 1 is above, 2 below."""
+FALLING = 0.75
+"""Derivative of r(V) V over r(V) above the yield velocity, where r falls as V^(-1/4)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class Contact:
     def restitution_slope(self, speed: Floats | float) -> Floats:
         """Return the derivative r + r' V of the speed after an impact over the speed V before it: equations.md 4.2."""
         falls = (self.yield_velocity > 0.0) & (np.asarray(speed) > self.yield_velocity)
-        return np.where(falls, 0.75, 1.0) * self.restitution_at(speed)
+        return np.where(falls, FALLING, 1.0) * self.restitution_at(speed)
 
     def speed_before(self, speed: Floats) -> Floats:
         """Return the speeds before impacts that leave with given speeds r V, m/s."""
