@@ -123,6 +123,12 @@ class PeriodicOrbit:
         return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
 
     @property
+    def falling(self) -> NDArray[np.bool_]:
+        """Whether each impact is above its yield velocity, where its restitution falls with speed, shape (p,)."""
+        above = np.array([each.yield_velocity or np.inf for each in self.body.contacts])
+        return np.asarray(self.velocities > above[self.contacts])
+
+    @property
     def is_stable(self) -> bool:
         """Whether all multipliers are within the unit circle."""
         return bool(np.abs(self.multipliers[0]) < 1.0)

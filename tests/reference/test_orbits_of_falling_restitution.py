@@ -143,6 +143,22 @@ def test_branches_over_the_yield_velocity_and_the_frequency_are_orbits_of_the_cl
     assert closed_form(oscillator(1.0, 3.0))[0].velocities == closed_form(oscillator(1.0, 0.0))[0].velocities
 
 
+def test_branches_pass_the_corner_at_the_yield_velocity_on_their_way_to_the_graze() -> None:
+    grazes = []
+    for falls in (0.1, 0.5):
+        settings = FollowSettings(1.2, 2.2, 0.2)
+        follower = Follower(lambda w, falls=falls: oscillator(w, falls), settings)  # type: ignore[misc]
+        branch = follower.branch(closed_form(oscillator(1.25, falls))[0], 1.25)
+        assert branch.ends == ["end of the range", "graze"]
+        assert any(each.orbit.falling[0] for each in branch.orbits)
+        assert not branch.orbits[-1].orbit.falling[0]
+        grazes.append(next(point.at.value for point in branch.points if point.kind == "graze"))
+    # the free oscillator reaches the stop there, whatever the law of the stop
+    w = grazes[0]
+    assert FORCE / np.hypot(1.0 - w * w, 2.0 * RATIO * w) == pytest.approx(STOP, rel=1e-11)
+    assert grazes[1] == pytest.approx(w, abs=1e-11)
+
+
 def test_slow_impacts_keep_the_orbits_of_a_constant_restitution() -> None:
     for falls in (2.0, 1e300):
         for one, other in zip(
