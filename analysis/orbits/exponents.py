@@ -44,8 +44,8 @@ class Exponents:
     impacts : int
         Number of impacts that counted.
     sum_error : float
-        Sum of the exponents minus its exact value 2 ln r - 2 interval sum z w, over the size of the terms; where r
-        falls with speed, ln(r (r + r' V)) takes the place of 2 ln r.
+        Sum of the exponents minus its exact value 2 ln r - 2 interval sum z w, over the size of the terms. Where r
+        falls with speed, the mean of ln(r (r + r' V)) takes the place of 2 ln r.
     """
 
     per_impact: Floats

@@ -239,7 +239,7 @@ class ImpactingBody:
             return np.full((*w.shape[:-1], force.size), np.nan + 0j)
         return np.asarray(answer[..., 0])
 
-    def shrinking(self, contacts: NDArray[np.int32], speeds: Floats) -> Floats:
+    def shrinking(self, contacts: NDArray[np.integer], speeds: Floats) -> Floats:
         """Return r (r + r' V) of impacts, by which each shrinks volumes of states: equations.md 4.2.
 
         Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mpmath
@@ -129,7 +130,7 @@ def test_multipliers_are_those_of_differences_of_the_engine() -> None:
 
 
 def test_branches_over_the_yield_velocity_and_the_frequency_are_orbits_of_the_closed_form() -> None:
-    bodies = (lambda falls: oscillator(1.0, falls), 0.01, 3.0), (lambda w: oscillator(w, 0.1), 0.8, 1.2)
+    bodies = (partial(oscillator, 1.0), 0.01, 3.0), (partial(oscillator, yield_velocity=0.1), 0.8, 1.2)
     for body_at, low, high in bodies:
         value = 0.5 * (low + high)
         start = closed_form(body_at(value))[0]
@@ -143,11 +144,19 @@ def test_branches_over_the_yield_velocity_and_the_frequency_are_orbits_of_the_cl
     assert closed_form(oscillator(1.0, 3.0))[0].velocities == closed_form(oscillator(1.0, 0.0))[0].velocities
 
 
+def test_followed_impacts_have_the_restitution_of_their_speed() -> None:
+    found = vi.follow(scene(), "stop[1].yield_velocity", 0.05, 0.2, step=0.2, doublings=0)
+    speed, falls = found["impact_velocity"].values, found["yield_velocity"].values
+    kept = RESTITUTION * (speed / falls) ** -0.25
+    assert speed.size > 4
+    np.testing.assert_allclose(found["impact_restitution"].values, kept, rtol=1e-14)
+    np.testing.assert_allclose(found["impact_impulse"].values, (1.0 + kept) * speed, rtol=1e-14)
+
+
 def test_branches_pass_the_corner_at_the_yield_velocity_on_their_way_to_the_graze() -> None:
     grazes = []
     for falls in (0.1, 0.5):
-        settings = FollowSettings(1.2, 2.2, 0.2)
-        follower = Follower(lambda w, falls=falls: oscillator(w, falls), settings)  # type: ignore[misc]
+        follower = Follower(partial(oscillator, yield_velocity=falls), FollowSettings(1.2, 2.2, 0.2))
         branch = follower.branch(closed_form(oscillator(1.25, falls))[0], 1.25)
         assert branch.ends == ["end of the range", "graze"]
         assert any(each.orbit.falling[0] for each in branch.orbits)

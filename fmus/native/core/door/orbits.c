@@ -13,8 +13,7 @@ enum { MOST_STEPS = 60, MOST_HALVINGS = 30 };
  * rounding ends the search. */
 static const double SOLVED = 4.0 * DBL_EPSILON, ROUNDING = 1e3 * DBL_EPSILON;
 
-/* Share of a slow impact's speed that an orbit P(1,q) loses, below which rounding decides it: slow impacts of an undamped
- * body with a restitution of 1. */
+/* Share of its speed that a slow impact of P(1,q) loses, below which it is rounding: restitution 1 without damping. */
 static const double ELASTIC = 1e-12;
 
 /* ---- linear equations of the velocities ---- */

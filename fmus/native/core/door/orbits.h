@@ -2,8 +2,9 @@
  * are sums of sines of this period.
  *
  * The only unknowns are the phases of the impacts. Each impact is an impulse, and the response of a mode to a periodic
- * train of impulses has a closed form (equations.md 4.7). So p equations give the velocities from the phases; they are
+ * train of impulses has a closed form (equations.md 4.7). So p equations give the velocities from the phases. They are
  * linear where restitution is constant, and have one solution where it falls with speed.
+ *
  * The remaining p equations put the contact at its stop at each impact. No equation divides by a velocity, so an orbit
  * may be followed to a graze and through it. Stability is that of the flow with the saltation matrices of 4.2.
  *

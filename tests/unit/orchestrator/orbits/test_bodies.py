@@ -103,6 +103,13 @@ def test_a_scene_whose_orbits_are_not_followed_is_one_line(text: str, said: str)
         impacting_body(parse_scene(text + (UNFORCED if "frequency = 0\n" in text else RECORD), "scene.toml"))
 
 
+def test_a_contact_has_the_yield_velocity_of_its_stop() -> None:
+    falling = ONE.replace("restitution = 0.7", "restitution = 0.7\nyield_velocity = 0.3")
+    for text, expected in ((falling, 0.3), (ONE, 0.0)):
+        (contact,) = impacting_body(parse_scene(text + RECORD, "scene.toml")).contacts
+        assert (contact.restitution, contact.yield_velocity) == (0.7, expected)
+
+
 def test_a_chain_of_one_mass_has_the_orbits_of_the_oscillator() -> None:
     own = 'kind = "chain"\nmasses = [1]\nstiffnesses = [1]\ndampings = [0.1]'
     chain = ONE.replace("mass = 1\nstiffness = 1\ndamping_ratio = 0.05", own)
