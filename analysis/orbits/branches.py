@@ -195,14 +195,15 @@ def _record(orbit: PeriodicOrbit, most: int) -> RunRecord:
     periods[:q, 4] = np.bincount((phases // TURN).astype(int), minlength=q)
     order = np.argsort(phases)
     hit = [orbit.body.contacts[each] for each in orbit.contacts]
+    kept = [float(c.restitution_at(speed)) for c, speed in zip(hit, orbit.velocities, strict=True)]
     impacts = np.column_stack(
         [
             phases / w,
             np.mod(phases, TURN),
             orbit.velocities,
-            [(1.0 + c.restitution) * c.mass * speed for c, speed in zip(hit, orbit.velocities, strict=True)],
+            [(1.0 + r) * c.mass * speed for r, c, speed in zip(kept, hit, orbit.velocities, strict=True)],
             orbit.contacts + 1.0,
-            [c.restitution for c in hit],
+            kept,
             np.zeros(phases.size),
         ]
     )

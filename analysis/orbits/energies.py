@@ -28,7 +28,8 @@ def velocity_transfer(contact: Contact) -> Floats:
     Returns
     -------
     array, shape (modes, modes)
-        I - (1 + r) phi phi' / (phi . phi), with determinant -r, for mass-normalised modes.
+        I - (1 + r) phi phi' / (phi . phi), with determinant -r, for mass-normalised modes. Where r falls with speed, r
+        is that of slow impacts.
 
     Examples
     --------
@@ -164,7 +165,11 @@ class OrbitEnergies:
         for place, (number, speed) in enumerate(zip(orbit.contacts, orbit.velocities, strict=True)):
             contact = orbit.body.contacts[number]
             jump[place] = (
-                -(1.0 + contact.restitution) * speed * contact.direction * contact.mass * contact.shape
+                -(1.0 + contact.restitution_at(speed))
+                * speed
+                * contact.direction
+                * contact.mass
+                * contact.shape
             )
         return np.asarray(self._after[1] - jump)
 
@@ -238,8 +243,10 @@ class OrbitEnergies:
     @cached_property
     def lost(self) -> Floats:
         """Loss at each impact, (1 - r^2) of the energy before it, shape (p,)."""
-        hit = [self.orbit.body.contacts[number] for number in self.orbit.contacts]
-        return np.asarray(np.array([1.0 - each.restitution**2 for each in hit]) * self.kinetic)
+        orbit = self.orbit
+        hit = [orbit.body.contacts[number] for number in orbit.contacts]
+        kept = [each.restitution_at(speed) for each, speed in zip(hit, orbit.velocities, strict=True)]
+        return np.asarray((1.0 - np.array(kept) ** 2) * self.kinetic)
 
     @property
     def restitution(self) -> ResidualRestitution:

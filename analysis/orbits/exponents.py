@@ -44,7 +44,8 @@ class Exponents:
     impacts : int
         Number of impacts that counted.
     sum_error : float
-        Sum of the exponents minus its exact value 2 ln r - 2 interval sum z w, over the size of the terms.
+        Sum of the exponents minus its exact value 2 ln r - 2 interval sum z w, over the size of the terms. Where r
+        falls with speed, the mean of ln(r (r + r' V)) takes the place of 2 ln r.
     """
 
     per_impact: Floats
@@ -112,8 +113,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     per_impact = sums.sum(axis=0) / counted
     means = sums / np.diff(edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
-    restitutions = [body.contacts[each].restitution for each in impacts.contacts[first:]]
-    exact = 2.0 * float(np.mean(np.log(restitutions))) - 2.0 * interval * float(
+    shrinking = body.shrinking(impacts.contacts[first:], impacts.velocities[first:])
+    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * float(
         (body.damping_ratios * body.frequencies).sum()
     )
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
@@ -158,6 +159,7 @@ def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
 def _first_state(body: ImpactingBody, impacts: Impacts) -> Floats:
     """Return a state after the first impact: exact for one mode, otherwise the contact's own, with the rest at rest."""
     contact = body.contacts[impacts.contacts[0]]
-    away = -contact.direction * contact.restitution * impacts.velocities[0]
+    speed = impacts.velocities[0]
+    away = -contact.direction * contact.restitution_at(speed) * speed
     along = contact.shape * contact.mass
     return np.concatenate([along * contact.position, along * away])

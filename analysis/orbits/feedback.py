@@ -68,16 +68,16 @@ def impact_map(orbit: PeriodicOrbit, amplitude: float) -> ImpactMap:
     def acceleration(velocity: float) -> float:
         return force * math.cos(phase) + held - natural**2 * stop - 2.0 * decay * velocity
 
-    back = contact.restitution
+    back, slope = float(contact.restitution_at(speed)), float(contact.restitution_slope(speed))
     after, before = acceleration(-back * speed), acceleration(speed)
     first = (phi[0, 1] * after + back * speed * (-phi[0, 0])) / speed
-    second = back * phi[0, 1] / speed
+    second = slope * phi[0, 1] / speed
     jacobian = np.array(
         [
             [first, second],
             [
                 back * speed * phi[1, 0] - phi[1, 1] * after + before * first,
-                -back * phi[1, 1] + before * second,
+                -slope * phi[1, 1] + before * second,
             ],
         ]
     )

@@ -30,6 +30,8 @@ EASY_NEWTON = 3
 """Number of Newton steps up to which the next step along the branch is made longer."""
 MOST_TURN = 0.1
 """Change of the branch's direction between points, rad, above which a step is repeated with half its length."""
+CORNER = 1e-3
+"""Step along the branch, over the longest, below which it may turn by a corner at a yield velocity."""
 SHORTEST = 1e-9
 """Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
@@ -333,9 +335,14 @@ class Follower:
             tangent = self._tangent(orbit, value, now.tangent)
         except (OrbitError, np.linalg.LinAlgError):
             return None
-        if tangent @ now.tangent < np.cos(MOST_TURN):
+        if tangent @ now.tangent < np.cos(self._most_turn(now.orbit, orbit, step)):
             return None
         return BranchOrbit(float(value), orbit, tangent), newton
+
+    def _most_turn(self, before: PeriodicOrbit, after: PeriodicOrbit, step: float) -> float:
+        """Return the largest turn of a step: up to a right angle at a yield velocity, where branches have corners."""
+        has_corner = step < CORNER * self.settings.longest and (before.falling != after.falling).any()
+        return 0.5 * np.pi if has_corner else MOST_TURN
 
     def _closing_step(
         self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit

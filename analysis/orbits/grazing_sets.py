@@ -94,7 +94,7 @@ def grazing_sets(body: ImpactingBody, points: int = 2000) -> GrazingSets:
         after, after_velocity = _first_meeting(_Flight(body, grazes), 1.0, fastest)
         before, before_velocity = _first_meeting(_Flight(body, grazes), -1.0, fastest)
         # the flight that ends in the graze begins with the velocity -r V
-        speeds = np.where(before_velocity < 0.0, -before_velocity, np.nan) / contact.restitution
+        speeds = contact.speed_before(np.where(before_velocity < 0.0, -before_velocity, np.nan))
     speeds[~np.isfinite(speeds)] = np.nan
     for length, columns in ((after, (after_velocity,)), (before, (speeds,))):
         broken = np.abs(np.diff(length, prepend=length[0])) > JUMP * TURN / w

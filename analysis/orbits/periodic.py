@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.trigonometric import SumOfSines
+from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
@@ -116,11 +116,17 @@ class PeriodicOrbit:
 
     @property
     def exact_determinant(self) -> float:
-        """Product of restitutions squared and of the decay of all modes over the orbit: equations.md 4.2."""
+        """Product of r (r + r' V) of the impacts and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
-        squared = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
+        squared = np.prod(body.shrinking(self.contacts, self.velocities))
         decay = float((body.damping_ratios * body.frequencies).sum())
         return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
+
+    @property
+    def falling(self) -> NDArray[np.bool_]:
+        """Whether each impact is above its yield velocity, where its restitution falls with speed, shape (p,)."""
+        above = np.array([each.yield_velocity or np.inf for each in self.body.contacts])
+        return np.asarray(self.velocities > above[self.contacts])
 
     @property
     def is_stable(self) -> bool:
@@ -211,6 +217,11 @@ def _refuse_end(end: OrbitEnd, phases: Floats) -> None:
         raise OrbitError(
             "orbit: expected impacts that place each body without a spring, got a body that could be anywhere. "
             "Tie it to the ground, or let it hit a body or a stop that is tied."
+        )
+    if end is OrbitEnd.unsolved:
+        raise OrbitError(
+            f"orbit: expected impacts that lose energy at phases {np.round(phases, 6).tolist()}, got slow ones with a "
+            "restitution of 1, whose speeds have no bound. Add damping."
         )
     if end is not OrbitEnd.done:
         raise OrbitError(
@@ -304,8 +315,8 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
 def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
     """Return all orbits P(1,q) of a contact, physical or not, the fastest first: equations.md 4.3, any number of modes.
 
-    The distance from the stop at the impact is a sum of sines of the phase. One sine has at most two zeros; all zeros
-    of several sines are found.
+    The distance from the stop at the impact is a sum of sines of the phase. One sine has at most two zeros. All zeros
+    of several sines are found, also where restitution falls with speed.
 
     Raises
     ------
@@ -313,7 +324,8 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
         An undamped mode gives infinitely many orbits.
     """
     hit = np.array([contact], dtype=np.int32)
-    phases = _phases_of_one_sine if body.has_one_sine else _phases_of_sines
+    is_linear = body.has_one_sine and not body.contacts[contact].yield_velocity > 0.0
+    phases = _phases_of_one_sine if is_linear else _phases_of_sines
     orbits = []
     for phase in phases(body, hit, periods):
         velocity = evaluated(body, hit, np.array([phase]), periods).velocities
@@ -337,10 +349,22 @@ def _phases_of_one_sine(body: ImpactingBody, hit: NDArray[np.int32], periods: in
 
 
 def _phases_of_sines(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
-    """Return the phases with distance 0 of a body with several sines or moving stops."""
-    end, level, cosine, sine = body.kernel.wave(int(hit[0]), periods)
-    _refuse_end(end, np.zeros(1))
-    return SumOfSines(level, np.array(list(body.harmonics), dtype=float), cosine, sine).zeros()
+    """Return the phases with distance 0: of several sines, moving stops, or a restitution that falls with speed."""
+    contact, order = body.contacts[int(hit[0])], np.array(list(body.harmonics), dtype=float)
+    wave = body.kernel.wave(int(hit[0]), periods)
+    _refuse_end(wave.end, np.zeros(1))
+    if not contact.yield_velocity > 0.0:
+        return SumOfSines(wave.level, order, wave.cosine, wave.sine).zeros()
+    return FallingDistance(
+        wave.level,
+        *wave.answer,
+        order,
+        wave.steady_cosine,
+        wave.steady_sine,
+        body.loose == 0,
+        body.angular_frequency,
+        contact,
+    ).zeros()
 
 
 def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.int32], periods: int) -> None:

@@ -18,6 +18,8 @@ Integers = Mapping[str, int]
 Numbers = Mapping[str, float]
 DIRECTIONS = {1: 1.0, 2: -1.0}
 """Direction of a stop by the number of its side in FMUs: 1 is above, 2 below."""
+FALLING = 0.75
+"""Derivative of r(V) V over r(V) above the yield velocity, where r falls as V^(-1/4)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,8 @@ class Contact:
         Coefficient of restitution, 0 to 1.
     motion : mapping of int to complex
         Complex amplitudes of the stop's motion, m, by their harmonic n: position + Re(amplitude e^(i n phase)).
+    yield_velocity : float
+        Speed above which the restitution falls as (V / yield_velocity)^(-1/4), m/s; 0: it is constant.
     name : str
         Name of a contact of two points, such as `contact 1`; empty for a stop.
     """
@@ -45,12 +49,35 @@ class Contact:
     position: float
     restitution: float
     motion: Mapping[int, complex] = field(default_factory=dict)
+    yield_velocity: float = 0.0
     name: str = ""
 
     @cached_property
     def mass(self) -> float:
         """Effective mass at the contact, kg: 1 / (shape . shape), equations.md 5.3."""
         return 1.0 / float(self.shape @ self.shape)
+
+    def restitution_at(self, speed: Floats | float) -> Floats:
+        """Return the coefficient of restitution for speeds towards the stop, m/s: equations.md 1.6."""
+        speeds = np.asarray(speed, dtype=np.float64)
+        if not self.yield_velocity > 0.0:
+            return np.full_like(speeds, self.restitution)
+        with np.errstate(over="ignore"):  # a yield velocity next to 0 leaves no restitution
+            return self.restitution / np.maximum(speeds / self.yield_velocity, 1.0) ** 0.25
+
+    def restitution_slope(self, speed: Floats | float) -> Floats:
+        """Return the derivative r + r' V of the speed after an impact over the speed V before it: equations.md 4.2."""
+        falls = (self.yield_velocity > 0.0) & (np.asarray(speed) > self.yield_velocity)
+        return np.where(falls, FALLING, 1.0) * self.restitution_at(speed)
+
+    def speed_before(self, speed: Floats) -> Floats:
+        """Return the speeds before impacts that leave with given speeds r V, m/s."""
+        slow = speed / self.restitution
+        return (
+            slow * np.maximum(slow / self.yield_velocity, 1.0) ** (1.0 / 3.0)
+            if self.yield_velocity > 0.0
+            else slow
+        )
 
     def stop_at(self, phase: float) -> float:
         """Return the position of the stop at a phase of the clock, m."""
@@ -151,6 +178,7 @@ class ImpactingBody:
             stop_cosine=stops.real,
             stop_sine=0.0 - stops.imag,
             restitution=np.array([contact.restitution for contact in self.contacts]),
+            yield_velocity=np.array([contact.yield_velocity for contact in self.contacts]),
             coupling=self.coupling,
         )
 
@@ -211,6 +239,22 @@ class ImpactingBody:
             return np.full((*w.shape[:-1], force.size), np.nan + 0j)
         return np.asarray(answer[..., 0])
 
+    def shrinking(self, contacts: NDArray[np.integer], speeds: Floats) -> Floats:
+        """Return r (r + r' V) of impacts, by which each shrinks volumes of states: equations.md 4.2.
+
+        Parameters
+        ----------
+        contacts : array of int, shape (impact,)
+            From 0.
+        speeds : array, shape (impact,)
+            V, m/s.
+        """
+        found = np.empty(speeds.size)
+        for place, each in enumerate(self.contacts):
+            own = contacts == place
+            found[own] = each.restitution_at(speeds[own]) * each.restitution_slope(speeds[own])
+        return found
+
     @cached_property
     def scale(self) -> float:
         """Size of the displacements at the contacts, m; rounding errors are relative to it."""
@@ -230,5 +274,7 @@ def contacts_of(shapes: Iterable[Floats], numbers: Numbers, integers: Integers) 
     found = []
     for k, shape in enumerate(shapes, start=1):
         position, restitution = (numbers[f"contact[{k}].{name}"] for name in ("position", "restitution"))
-        found.append(Contact(shape, DIRECTIONS[integers[f"contact[{k}].side"]], position, restitution))
+        falls_above = numbers.get(f"contact[{k}].yield_velocity", 0.0)
+        side = DIRECTIONS[integers[f"contact[{k}].side"]]
+        found.append(Contact(shape, side, position, restitution, yield_velocity=falls_above))
     return tuple(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, Structure, c_double, c_int32, c_size_t, c_void_p
+from ctypes import POINTER, Structure, byref, c_double, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
@@ -16,6 +16,7 @@ from vibroimpact.fmus.errors import UsageError
 
 Array = NDArray[np.float64]
 MOST_IMPACTS = 64
+MOST_SINES = 48
 
 
 class OrbitEnd(IntEnum):
@@ -27,6 +28,7 @@ class OrbitEnd(IntEnum):
     singular = 3
     critical = 4
     adrift = 5
+    unsolved = 6
 
 
 class BODY(Structure):
@@ -34,13 +36,21 @@ class BODY(Structure):
 
     ARRAYS = (
         *("natural", "damping_ratio", "order", "cosine", "sine", "held", "shape", "impulse", "direction"),
-        *("position", "stop_cosine", "stop_sine", "restitution"),
+        *("position", "stop_cosine", "stop_sine", "restitution", "yield_velocity"),
     )
     _fields_ = [
         *((name, c_int32) for name in ("modes", "contacts", "harmonics")),
         ("angular_frequency", c_double),
         *((name, c_void_p) for name in ARRAYS),
         ("coupling", c_void_p),
+    ]
+
+
+class _Wave(Structure):
+    _fields_ = [
+        ("level", c_double),
+        ("answer", c_double * 2),
+        *((name, c_double * MOST_SINES) for name in ("cosine", "sine", "steady_cosine", "steady_sine")),
     ]
 
 
@@ -65,8 +75,9 @@ class OrbitBody:
         Motion of the stops about their positions, m.
     shape, impulse : array, shape (contacts, modes)
         Displacement of each contact for unit modal displacements; modal velocities that give the contact 1 m/s.
-    direction, position, restitution : array, shape (contacts,)
-        +1 for a stop above, -1 below; mean position, m; coefficient of restitution.
+    direction, position, restitution, yield_velocity : array, shape (contacts,)
+        +1 for a stop above, -1 below; mean position, m; coefficient of restitution; speed above which it falls, m/s
+        (0: constant).
     coupling : array, shape (modes, modes), optional
         Damping that couples the modes, 1/s; it replaces the damping ratios. No damping of modes without a spring.
     """
@@ -117,7 +128,7 @@ class OrbitBody:
         end = _library().vi_door_orbit(self.address, train, *(each.ctypes.data for each in filled))
         return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
 
-    def wave(self, contact: int, periods: int) -> tuple[OrbitEnd, float, Array, Array]:
+    def wave(self, contact: int, periods: int) -> Wave:
         """Return the distance of P(1,q) beyond its stop over the phase of its impact: equations.md 4.3.
 
         Parameters
@@ -126,17 +137,13 @@ class OrbitBody:
             From 0.
         periods : int
             q.
-
-        Returns
-        -------
-        tuple of OrbitEnd, float, array, array
-            level + cosine cos(order phase) + sine sin(order phase), m, valid if the end is `done`; the arrays have
-            shape (harmonics,).
         """
         train = _train(np.array([contact], dtype=np.int32), np.zeros(1), periods)
-        found = np.empty(1), np.empty(self.harmonics), np.empty(self.harmonics)
-        end = _library().vi_door_orbit_wave(self.address, train, *(each.ctypes.data for each in found))
-        return OrbitEnd(end), float(found[0][0]), found[1], found[2]
+        found = _Wave()
+        end = _library().vi_door_orbit_wave(self.address, train, byref(found))
+        names = ("cosine", "sine", "steady_cosine", "steady_sine")
+        rows = (np.array(getattr(found, name)[: self.harmonics]) for name in names)
+        return Wave(OrbitEnd(end), found.level, (found.answer[0], found.answer[1]), *rows)
 
     def motion(
         self, contacts: NDArray[np.int32], phases: Array, periods: int, velocities: Array
@@ -157,6 +164,33 @@ class OrbitBody:
         what, known = np.empty(3), _numbers(states, (phases.size, 2 * self.modes))
         _check(_library().vi_door_orbit_maximum(self.address, train, known.ctypes.data, what.ctypes.data))
         return float(what[0]), float(what[1]), int(what[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wave:
+    """Distance of one impact beyond its stop over its phase: equations.md 4.3.
+
+    Attributes
+    ----------
+    end : OrbitEnd
+        The numbers are valid if `end` is `done`.
+    level : float
+        Constant part, m.
+    answer : tuple of float
+        Distance, s, and approach speed that a unit speed of equal impulse adds.
+    cosine, sine : array, shape (harmonics,)
+        Distance at a constant restitution: level + cosine cos(order phase) + sine sin(order phase), m.
+    steady_cosine, steady_sine : array, shape (harmonics,)
+        The same of the steady motion relative to the stop, m.
+    """
+
+    end: OrbitEnd
+    level: float
+    answer: tuple[float, float]
+    cosine: Array
+    sine: Array
+    steady_cosine: Array
+    steady_sine: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,7 +249,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_orbit_couple.argtypes = [c_int32, c_int32, *[c_void_p] * 7]
     # plain addresses: converting arrays runs Python code, where Ctrl-C would turn into an error of an argument
     library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
-    library.vi_door_orbit_wave.argtypes = [body, train, *[c_void_p] * 3]
+    library.vi_door_orbit_wave.argtypes = [body, train, POINTER(_Wave)]
     library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_maximum.argtypes = [body, train, *[c_void_p] * 2]
     return library

@@ -23,15 +23,16 @@ def coupled(plan: ControlPlan, controller: Path) -> tuple[list[ComponentSpec], l
         **float_parameters(scene, None),
         **integer_parameters(scene),
     }
-    contact = orbit.body.contacts[int(orbit.contacts[0])]
+    contact, speed = orbit.body.contacts[int(orbit.contacts[0])], float(orbit.velocities[0])
     numbers |= {
         f"{port}.law": contact_law("external").number,
         "forcing.angular_frequency": orbit.body.angular_frequency,
         "forcing.phase": float(orbit.phases[0]),
         "displacement_start": contact.position,
-        "velocity_start": -contact.direction * contact.restitution * float(orbit.velocities[0]),
+        "velocity_start": -contact.direction * float(contact.restitution_at(speed)) * speed,
     }
-    stop = {"law": contact_law("restitution").number, "restitution": contact.restitution}
+    law = {"restitution": contact.restitution, "yield_velocity": contact.yield_velocity}
+    stop = {"law": contact_law("restitution").number, **law}
     errors = {"noise": settings.noise, "seed": settings.seed}
     components = [
         ComponentSpec("body", fmu_path("Oscillator"), numbers),

@@ -44,7 +44,6 @@ class Limit:
     """Reason why the state after an impact on a rigid stop does not follow from the modes or masses."""
 
 
-_NONE = "0 where orbits are followed"
 LIMITS = {
     "body": Limit(
         lanes=True, orbits="an oscillator, a chain, a beam or several bodies whose orbits are followed"
@@ -56,8 +55,7 @@ LIMITS = {
     "stop": Limit(orbits="a restitution stop"),
     "motion": Limit(lanes=True),
     "law": Limit(orbits='"restitution": impacts without duration'),
-    "yield_velocity": Limit(orbits=_NONE),
-    "distance": Limit(lanes=True, orbits=_NONE),
+    "distance": Limit(lanes=True, orbits="0 where orbits are followed"),
     "reduced": Limit(thrown_back="a Chain with fewer modes than masses does not move one mass alone"),
     "projection": Limit(
         lanes=True,
@@ -105,8 +103,6 @@ def seen(scene: Scene) -> Iterator[Seen]:
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')
-        elif stop.yield_velocity > 0.0:
-            yield Seen("yield_velocity", f"{key}.yield_velocity", f"{stop.yield_velocity:g}")
     if scene.falling_force:
         yield Seen("distance", "exciter.distance", "a force that falls with the distance")
     if not scene.is_one_body:

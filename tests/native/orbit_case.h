@@ -16,7 +16,7 @@ typedef struct {
     double order[HARMONICS], cosine[HARMONICS * MODES], sine[HARMONICS * MODES];
     double stop_cosine[HARMONICS * CONTACTS], stop_sine[HARMONICS * CONTACTS];
     double shape[CONTACTS * MODES], impulse[CONTACTS * MODES];
-    double direction[CONTACTS], position[CONTACTS], restitution[CONTACTS];
+    double direction[CONTACTS], position[CONTACTS], restitution[CONTACTS], yield_velocity[CONTACTS];
     int32_t contact[IMPACTS];
     double phase[IMPACTS];
 } orbit_case;
@@ -69,7 +69,8 @@ static void draw(uint64_t *seed, orbit_case *drawn)
                             .position = drawn->position,
                             .stop_cosine = drawn->stop_cosine,
                             .stop_sine = drawn->stop_sine,
-                            .restitution = drawn->restitution};
+                            .restitution = drawn->restitution,
+                            .yield_velocity = drawn->yield_velocity};
     for (int j = 0; j < body->modes; ++j) {
         drawn->natural[j] = uniform(seed, 0.3, 6.0);
         drawn->damping_ratio[j] = random_ratio(seed);
@@ -87,6 +88,7 @@ static void draw(uint64_t *seed, orbit_case *drawn)
         drawn->direction[k] = choice(seed, 2) ? 1.0 : -1.0;
         drawn->position[k] = uniform(seed, -0.5, 1.0);
         drawn->restitution[k] = uniform(seed, 0.0, 1.0);
+        drawn->yield_velocity[k] = choice(seed, 2) ? uniform(seed, 0.01, 0.5) : 0.0;
     }
     draw_sines(seed, drawn);
     drawn->train = (vi_orbit_train){.impacts = 1 + (int)choice(seed, IMPACTS),

@@ -1,4 +1,4 @@
-"""Orbits of random bodies under several sines and constant forces, on moving stops, against matrix exponentials."""
+"""Orbits of random bodies under several sines, on moving stops of falling restitution, against matrix exponentials."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def bodies(draw: st.DrawFn) -> ImpactingBody:
         motion = {order: 0.2 * complex(draw(some), draw(some)) for order in orders if draw(st.booleans())}
         position, restitution = draw(st.floats(-0.2, 1.0)), draw(st.floats(0.1, 0.95))
         side = draw(st.sampled_from([-1.0, 1.0]))
-        contacts.append(Contact(shape, side, side * position, restitution, motion))
+        falls_above = draw(st.one_of(st.just(0.0), st.floats(1e-3, 1.0)))
+        contacts.append(Contact(shape, side, side * position, restitution, motion, falls_above))
     force, held = (np.array([draw(some) for _ in natural]) for _ in range(2))
     w = draw(st.floats(0.3, 2.0))
     return ImpactingBody(

@@ -49,7 +49,7 @@ class Flow:
         """Return the state after an impact."""
         stop, n, after = self.body.contacts[contact], self.body.frequencies.size, state.copy()
         speed = self.gap(contact, state, phase, 1)
-        after[n:] -= (1.0 + stop.restitution) * speed * stop.direction * stop.mass * stop.shape
+        after[n:] -= (1.0 + stop.restitution_at(abs(speed))) * speed * stop.direction * stop.mass * stop.shape
         return after
 
 

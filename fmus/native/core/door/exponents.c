@@ -72,7 +72,9 @@ VI_DOOR int vi_door_exponents(const vi_orbit_body *body, const vi_orbit_run *run
             return VI_ORBIT_REFUSED;
         }
         fly(&response, run->phase[i - 1], run->phase[i], u, state);
-        const double taken = (1.0 + body->restitution[contact]) * body->direction[contact] * velocity;
+        double slope;
+        const double equal = vi_orbit_equal_speed(body, contact, velocity, &slope);
+        const double taken = (1.0 + body->restitution[contact]) * body->direction[contact] * equal;
         for (int j = 0; j < modes; ++j) {
             state[modes + j] -= taken * body->impulse[(ptrdiff_t)contact * modes + j];
         }

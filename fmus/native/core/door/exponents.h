@@ -5,8 +5,8 @@
 #include "door/door.h"
 #include "door/orbit_response.h"
 
-/* Impacts in their order. Between two impacts the modes move freely, and each impact takes away (1 + restitution)
- * velocity. With these impacts given, the state follows from the past, and its errors decay. */
+/* Impacts in their order. Between two impacts the modes move freely, and each impact takes (1 + restitution)
+ * velocity, where restitution may fall with speed. With these impacts given, the state follows from the past, and its errors decay. */
 typedef struct {
     int64_t impacts;
     const int32_t *contact;

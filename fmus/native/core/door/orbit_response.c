@@ -5,12 +5,15 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "contact/contact_law.h"
 #include "motion/magnitude.h"
 
 static const double TURN = 6.283185307179586;
 /* Fastest rate of coupled modes over the angular frequency of the force. Above, no series follows them: a period would
  * take more than 1e6 steps. */
 static const double MOST_OF_SERIES = 1e5;
+/* Derivative of r(V) V over r(V) above the yield velocity, where r falls as V^(-1/4). */
+static const double FALLING = 0.75;
 
 static bool is_finite(int count, const double values[])
 {
@@ -41,7 +44,8 @@ static bool is_body(const vi_orbit_body *body)
     }
     for (int k = 0; good && k < body->contacts; ++k) {
         good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0
-               && body->restitution[k] <= 1.0;
+               && body->restitution[k] <= 1.0 && body->yield_velocity[k] >= 0.0
+               && isfinite(body->yield_velocity[k]);
     }
     return good;
 }
@@ -279,6 +283,25 @@ void vi_orbit_drag(const vi_orbit_response *response, const double v[], double d
     }
 }
 
+/* Coefficient of restitution of an impact at a contact. */
+static double restitution_at(const vi_orbit_body *body, int contact, double velocity)
+{
+    const vi_contact_law law = {.restitution = body->restitution[contact],
+                                .yield_velocity = body->yield_velocity[contact]};
+    return vi_contact_law_restitution(&law, velocity);
+}
+
+double vi_orbit_equal_speed(const vi_orbit_body *body, int contact, double velocity, double *slope)
+{
+    const double r = restitution_at(body, contact, velocity), whole = 1.0 + body->restitution[contact];
+    if (r == body->restitution[contact]) {
+        *slope = 1.0;
+        return velocity;
+    }
+    *slope = (1.0 + FALLING * r) / whole;
+    return (1.0 + r) / whole * velocity;
+}
+
 void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
@@ -402,7 +425,10 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
     const int modes = body->modes;
     const double *shape = body->shape + (ptrdiff_t)contact * modes;
     const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
-    const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
+    const double lost = 1.0 + restitution_at(body, contact, velocity), speed = body->direction[contact] * velocity;
+    double share; /* derivative of the loss over the speed, over the loss per speed */
+    (void)vi_orbit_equal_speed(body, contact, velocity, &share);
+    share *= (1.0 + body->restitution[contact]) / lost;
     double before[VI_MODES] = {0.0}, force[VI_MODES], drag[VI_MODES], lost_drag[VI_MODES], stop[3];
     vi_orbit_stop(body, contact, phase, stop);
     double acceleration = -stop[2]; /* of the contact relative to its stop, before the impact */
@@ -423,9 +449,9 @@ void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase,
         }
         const double later = displaced / speed;
         for (int j = 0; j < modes; ++j) {
-            const double held_back = speed * lost_drag[j] + acceleration * impulse[j];
+            const double held_back = speed * lost_drag[j] + share * acceleration * impulse[j];
             change[j][c] -= lost * impulse[j] * displaced;
-            change[modes + j][c] += lost * (held_back * later - impulse[j] * faster);
+            change[modes + j][c] += lost * (held_back * later - share * impulse[j] * faster);
         }
     }
 }

@@ -19,7 +19,8 @@ enum {
     VI_ORBIT_RESONANT = 2, /* an undamped mode's response to the force, or to its impacts, is unbounded */
     VI_ORBIT_SINGULAR = 3, /* no velocities solve the equations for these phases */
     VI_ORBIT_CRITICAL = 4, /* coupled modes next to critical damping, and far more rates than the force: no series */
-    VI_ORBIT_ADRIFT = 5    /* no impact of the train tells the position of a mode without a spring */
+    VI_ORBIT_ADRIFT = 5,   /* no impact of the train tells the position of a mode without a spring */
+    VI_ORBIT_UNSOLVED = 6  /* the search for the velocities, where restitution falls with speed, did not end */
 };
 
 /* A body of mass-normalised modes; shapes are [contact][mode]. Force and stops move periodically, as sums of sines. Each
@@ -38,6 +39,7 @@ typedef struct {
     const double *position; /* [contacts] m, mean position of each stop */
     const double *stop_cosine, *stop_sine; /* [harmonics][contacts] m, motion of each stop about its position */
     const double *restitution; /* [contacts] */
+    const double *yield_velocity; /* [contacts] m/s, above which restitution falls with speed; 0: constant */
     const vi_orbit_coupling *coupling; /* complex modes where damping couples the modes that have springs, else NULL */
 } vi_orbit_body;
 
@@ -78,6 +80,10 @@ double vi_orbit_evening(const vi_orbit_response *response, int contact, int j);
 
 /* Accelerations that the damping takes from modal velocities v. */
 void vi_orbit_drag(const vi_orbit_response *response, const double v[], double drag[]);
+
+/* Speed whose impulse with the restitution below the yield velocity is that of an impact, (1 + r(V)) V / (1 + r), m/s:
+ * equations.md 4.7. It is V itself up to the yield velocity. *slope: its derivative over V, at a kink from below. */
+double vi_orbit_equal_speed(const vi_orbit_body *body, int contact, double velocity, double *slope);
 
 /* Free motion of all modes for `u` seconds, without constant forces. */
 void vi_orbit_free(const vi_orbit_response *response, double u, double x[], double v[]);

@@ -1,11 +1,20 @@
 #include "door/orbits.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
 /* Share of a mode's displacement that no other mode gives to the contacts, below which its position is not known. */
 static const double ADRIFT = 1e-9;
+/* Most Newton steps for the velocities where restitution falls with speed, and most halvings of a step. */
+enum { MOST_STEPS = 60, MOST_HALVINGS = 30 };
+/* Error of the velocities' equations, over the size of their terms, at which they are solved; and largest error where
+ * rounding ends the search. */
+static const double SOLVED = 4.0 * DBL_EPSILON, ROUNDING = 1e3 * DBL_EPSILON;
+
+/* Share of its speed that a slow impact of P(1,q) loses, below which it is rounding: restitution 1 without damping. */
+static const double ELASTIC = 1e-12;
 
 /* ---- linear equations of the velocities ---- */
 
@@ -69,6 +78,81 @@ static void answer(const vi_orbit_response *response, int i, int k, double g[3])
         g[1] += weight * v[j];
         g[2] += weight * (vi_orbit_evening(response, contact[k], j) - response->mode[j].stiffness * x[j] - drag[j]);
     }
+}
+
+/* ---- velocities where restitution falls with speed: equations.md 4.7 ---- */
+
+/* The p equations of the velocities, and what the impacts take: speeds of equal impulse, with their derivatives. */
+typedef struct {
+    double g[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS][3], steady[VI_ORBIT_IMPACTS][3];
+    double equal[VI_ORBIT_IMPACTS], share[VI_ORBIT_IMPACTS];
+} speeds;
+
+/* Find what the impacts take and the errors of the equations; return the root of the errors' squares. `size`: of the
+ * largest terms. */
+static double find_errors(const vi_orbit_response *response, const double velocity[], speeds *s, double error[],
+                          double *size)
+{
+    const int n = response->train->impacts;
+    double squares = 0.0; /* never a maximum, which would lose a NaN */
+    for (int k = 0; k < n; ++k) {
+        s->equal[k] = vi_orbit_equal_speed(response->body, response->train->contact[k], velocity[k], &s->share[k]);
+    }
+    *size = 0.0;
+    for (int i = 0; i < n; ++i) {
+        double terms = fabs(velocity[i]) + fabs(s->steady[i][1]);
+        error[i] = velocity[i] - s->steady[i][1];
+        for (int k = 0; k < n; ++k) {
+            const double answered = s->g[i][k][1] * s->equal[k];
+            error[i] -= answered;
+            terms += fabs(answered);
+        }
+        squares += error[i] * error[i];
+        *size = fmax(*size, terms);
+    }
+    return sqrt(squares);
+}
+
+/* Set the matrix of the velocities' equations, linear about the present velocities. */
+static void set_matrix(int n, const speeds *s, double matrix[][VI_ORBIT_IMPACTS])
+{
+    for (int i = 0; i < n; ++i) {
+        for (int k = 0; k < n; ++k) {
+            matrix[i][k] = (i == k ? 1.0 : 0.0) - s->g[i][k][1] * s->share[k];
+        }
+    }
+}
+
+/* Find the velocities by Newton's method from those of a restitution of 0. Returns one of VI_ORBIT_*. */
+static int find_falling(const vi_orbit_response *response, speeds *s, double velocity[])
+{
+    const int n = response->train->impacts;
+    double matrix[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS], right[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS + 1];
+    double error[VI_ORBIT_IMPACTS], tried[VI_ORBIT_IMPACTS], size;
+    double largest = find_errors(response, velocity, s, error, &size);
+    for (int step = 0; step < MOST_STEPS && !(largest <= SOLVED * size); ++step) {
+        set_matrix(n, s, matrix);
+        for (int i = 0; i < n; ++i) {
+            right[i][0] = error[i];
+        }
+        if (!solve(n, matrix, 1, right)) {
+            return VI_ORBIT_SINGULAR;
+        }
+        double part = 1.0, left = largest;
+        for (int halving = 0; !(left < largest) || halving == 0; ++halving, part *= 0.5) {
+            if (halving > MOST_HALVINGS) {
+                (void)find_errors(response, velocity, s, error, &size);
+                return largest <= ROUNDING * size ? VI_ORBIT_DONE : VI_ORBIT_UNSOLVED;
+            }
+            for (int i = 0; i < n; ++i) {
+                tried[i] = velocity[i] - part * right[i][0];
+            }
+            left = find_errors(response, tried, s, error, &size);
+        }
+        largest = left;
+        memcpy(velocity, tried, (size_t)n * sizeof velocity[0]);
+    }
+    return largest <= ROUNDING * size ? VI_ORBIT_DONE : VI_ORBIT_UNSOLVED;
 }
 
 /* ---- modes without a spring ---- */
@@ -136,8 +220,8 @@ static void put_in_place(const vi_orbit_response *response, const placing *place
     }
 }
 
-/* Let the modes drift for one radian by the momentum that a train adds. The momentum follows from the speeds[impact]
- * [stride] and from `held` times the constant forces. The drift is 0 for an orbit. */
+/* Let the modes drift for one radian by the momentum that a train adds. The momentum follows from the
+ * speeds[impact] of equal impulse, and from `held` times the constant forces. The drift is 0 for an orbit. */
 static void drift(const vi_orbit_response *response, const double speed[], double held, double distance[], int stride)
 {
     const vi_orbit_body *body = response->body;
@@ -146,7 +230,7 @@ static void drift(const vi_orbit_response *response, const double speed[], doubl
         double momentum = held * response->length * body->held[l];
         for (int k = 0; k < n; ++k) {
             const int32_t contact = response->train->contact[k];
-            momentum -= (1.0 + body->restitution[contact]) * body->direction[contact] * speed[k * stride]
+            momentum -= (1.0 + body->restitution[contact]) * body->direction[contact] * speed[k]
                         * body->impulse[(ptrdiff_t)contact * body->modes + l];
         }
         for (int i = 0; i < n; ++i) {
@@ -155,6 +239,34 @@ static void drift(const vi_orbit_response *response, const double speed[], doubl
                                     * momentum / body->angular_frequency;
         }
     }
+}
+
+/* Find the equations of the velocities, and the velocities; `matrix` and `right` are overwritten. */
+static int find_velocities(const vi_orbit_response *response, speeds *s, double velocity[],
+                           double matrix[][VI_ORBIT_IMPACTS], double right[][VI_ORBIT_IMPACTS + 1])
+{
+    const int n = response->train->impacts;
+    bool any = false;
+    for (int i = 0; i < n; ++i) {
+        const int32_t contact = response->train->contact[i];
+        vi_orbit_steady_at(response, i, s->steady[i]);
+        for (int k = 0; k < n; ++k) {
+            answer(response, i, k, s->g[i][k]);
+        }
+        right[i][0] = s->steady[i][1];
+        /* an impact without restitution: with a restitution of 1 an undamped body might have no velocities */
+        const bool falls = response->body->yield_velocity[contact] > 0.0;
+        s->share[i] = falls ? 1.0 / (1.0 + response->body->restitution[contact]) : 1.0;
+        any = any || falls;
+    }
+    set_matrix(n, s, matrix);
+    if (!solve(n, matrix, 1, right)) {
+        return VI_ORBIT_SINGULAR;
+    }
+    for (int i = 0; i < n; ++i) {
+        velocity[i] = s->equal[i] = right[i][0];
+    }
+    return any ? find_falling(response, s, velocity) : VI_ORBIT_DONE;
 }
 
 VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train, double velocity[], double distance[],
@@ -170,61 +282,57 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
         return VI_ORBIT_ADRIFT;
     }
     const int n = train->impacts;
-    double equations[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS], kept[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS];
-    double g[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS][3];
-    double right[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS + 1];
-    double steady[VI_ORBIT_IMPACTS][3];
-    for (int i = 0; i < n; ++i) {
-        vi_orbit_steady_at(&response, i, steady[i]);
-        for (int k = 0; k < n; ++k) {
-            answer(&response, i, k, g[i][k]);
-            equations[i][k] = kept[i][k] = (i == k ? 1.0 : 0.0) - g[i][k][1];
-        }
-        right[i][0] = steady[i][1];
-    }
-    if (!solve(n, equations, 1, right)) {
-        return VI_ORBIT_SINGULAR;
-    }
-    for (int i = 0; i < n; ++i) {
-        velocity[i] = right[i][0];
+    double matrix[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS], right[VI_ORBIT_IMPACTS][VI_ORBIT_IMPACTS + 1];
+    speeds s;
+    const int unsolved = find_velocities(&response, &s, velocity, matrix, right);
+    if (unsolved != VI_ORBIT_DONE) {
+        return unsolved;
     }
     /* right-hand sides of the velocities' derivatives over the time of each impact */
     for (int i = 0; i < n; ++i) {
-        double own = steady[i][2];
-        distance[i] = steady[i][0];
+        double own = s.steady[i][2];
+        distance[i] = s.steady[i][0];
         for (int k = 0; k < n; ++k) {
-            distance[i] += g[i][k][0] * velocity[k];
-            own += k == i ? 0.0 : g[i][k][2] * velocity[k];
-            right[i][k] = k == i ? 0.0 : -g[i][k][2] * velocity[k];
+            distance[i] += s.g[i][k][0] * s.equal[k];
+            own += k == i ? 0.0 : s.g[i][k][2] * s.equal[k];
+            right[i][k] = k == i ? 0.0 : -s.g[i][k][2] * s.equal[k];
         }
         right[i][i] = own;
     }
-    if (!solve(n, kept, n, right)) {
+    set_matrix(n, &s, matrix);
+    if (!solve(n, matrix, n, right)) {
         return VI_ORBIT_SINGULAR;
     }
     const double second = 1.0 / body->angular_frequency; /* per radian */
     for (int i = 0; i < n; ++i) {
         for (int m = 0; m < n; ++m) {
-            double slope = m == i ? velocity[i] - g[i][i][1] * velocity[i] : -g[i][m][1] * velocity[m];
-            for (int k = 0; k < n; ++k) {
-                slope += g[i][k][0] * right[k][m];
-            }
-            distance_slope[i * n + m] = slope * second;
             velocity_slope[i * n + m] = right[i][m] * second;
+            right[i][m] *= s.share[i]; /* of the speed of equal impulse */
         }
     }
-    double place[VI_MODES];
+    for (int i = 0; i < n; ++i) {
+        for (int m = 0; m < n; ++m) {
+            double slope = m == i ? velocity[i] - s.g[i][i][1] * s.equal[i] : -s.g[i][m][1] * s.equal[m];
+            for (int k = 0; k < n; ++k) {
+                slope += s.g[i][k][0] * right[k][m];
+            }
+            distance_slope[i * n + m] = slope * second;
+        }
+    }
+    double place[VI_MODES], faster[VI_ORBIT_IMPACTS];
     put_in_place(&response, &placed, distance, 1, place);
-    drift(&response, velocity, 1.0, distance, 1);
+    drift(&response, s.equal, 1.0, distance, 1);
     for (int m = 0; m < n; ++m) {
+        for (int i = 0; i < n; ++i) {
+            faster[i] = s.share[i] * velocity_slope[i * n + m];
+        }
         put_in_place(&response, &placed, distance_slope + m, n, place);
-        drift(&response, velocity_slope + m, 0.0, distance_slope + m, n);
+        drift(&response, faster, 0.0, distance_slope + m, n);
     }
     return VI_ORBIT_DONE;
 }
 
-VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, double *level, double cosine[],
-                               double sine[])
+VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, vi_orbit_wave *wave)
 {
     vi_orbit_response response;
     const int refused = train->impacts == 1 ? vi_orbit_respond(&response, body, train) : VI_ORBIT_REFUSED;
@@ -237,21 +345,27 @@ VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *
     }
     double g[3], place[VI_MODES];
     answer(&response, 0, 0, g);
-    if (!(fabs(1.0 - g[1]) > 0.0)) {
+    const int32_t contact = train->contact[0];
+    if (!(fabs(1.0 - g[1]) > (body->yield_velocity[contact] > 0.0 ? ELASTIC : 0.0))) {
         return VI_ORBIT_SINGULAR;
     }
-    const int32_t contact = train->contact[0];
-    const double direction = body->direction[contact], none = 0.0;
+    const double direction = body->direction[contact], none = 0.0, one = 1.0;
     vi_orbit_gap gap;
     vi_orbit_steady_gap(&response, contact, &gap);
-    *level = direction * (gap.level - body->position[contact]);
-    put_in_place(&response, &placed, level, 1, place);
-    drift(&response, &none, 1.0, level, 1);
+    wave->level = direction * (gap.level - body->position[contact]);
+    put_in_place(&response, &placed, &wave->level, 1, place);
+    drift(&response, &none, 1.0, &wave->level, 1);
+    wave->answer[0] = g[0];
+    wave->answer[1] = g[1];
+    put_in_place(&response, &placed, wave->answer, 1, place);
+    drift(&response, &one, 0.0, wave->answer, 1);
     for (int k = 0; k < body->harmonics; ++k) {
         const double w = body->order[k] * body->angular_frequency;
         const double x[2] = {direction * gap.cosine[k], direction * gap.sine[k]};
         const double speed[2] = {w * x[1] / (1.0 - g[1]), -w * x[0] / (1.0 - g[1])};
-        double *const part[2] = {&cosine[k], &sine[k]};
+        double *const part[2] = {&wave->cosine[k], &wave->sine[k]};
+        wave->steady_cosine[k] = x[0];
+        wave->steady_sine[k] = x[1];
         for (int side = 0; side < 2; ++side) {
             *part[side] = x[side] + g[0] * speed[side];
             put_in_place(&response, &placed, part[side], 1, place);
@@ -271,7 +385,9 @@ static void after_impact(const vi_orbit_response *response, const double velocit
     vi_orbit_steady(response, train->phase[i], state, state + body->modes);
     for (int k = 0; k < train->impacts; ++k) {
         const int32_t contact = train->contact[k];
-        const double taken = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact];
+        double slope;
+        const double equal = vi_orbit_equal_speed(body, contact, velocity[k], &slope);
+        const double taken = (1.0 + body->restitution[contact]) * equal * body->direction[contact];
         double x[VI_MODES], v[VI_MODES];
         vi_orbit_train_answer(response, contact, k == i ? 0.0 : vi_orbit_since(response, i, k), x, v);
         for (int j = 0; j < body->modes; ++j) {

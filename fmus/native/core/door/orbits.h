@@ -2,7 +2,9 @@
  * are sums of sines of this period.
  *
  * The only unknowns are the phases of the impacts. Each impact is an impulse, and the response of a mode to a periodic
- * train of impulses has a closed form (equations.md 4.7). So p linear equations give the velocities from the phases.
+ * train of impulses has a closed form (equations.md 4.7). So p equations give the velocities from the phases. They are
+ * linear where restitution is constant, and have one solution where it falls with speed.
+ *
  * The remaining p equations put the contact at its stop at each impact. No equation divides by a velocity, so an orbit
  * may be followed to a graze and through it. Stability is that of the flow with the saltation matrices of 4.2.
  *
@@ -20,10 +22,17 @@
 VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train, double velocity[], double distance[],
                           double distance_slope[], double velocity_slope[]);
 
-/* Find the distance of one impact beyond its stop over its phase, m: level, and the sum of cosine cos(order phase) +
- * sine sin(order phase). `train` has this impact at any phase. An orbit has distance 0. */
-VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, double *level, double cosine[],
-                               double sine[]);
+/* Distance of one impact beyond its stop over its phase, m: equations.md 4.3. */
+typedef struct {
+    double level;     /* without the impact, constant part */
+    double answer[2]; /* distance and approach speed that a unit speed of equal impulse adds */
+    /* distance at a constant restitution: level + the sum of cosine cos(order phase) + sine sin(order phase) */
+    double cosine[VI_ORBIT_HARMONICS], sine[VI_ORBIT_HARMONICS];
+    double steady_cosine[VI_ORBIT_HARMONICS], steady_sine[VI_ORBIT_HARMONICS]; /* the same of the steady motion */
+} vi_orbit_wave;
+
+/* Find the distance of one impact; `train` has this impact at any phase. An orbit has distance 0. */
+VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *train, vi_orbit_wave *wave);
 
 /* Find the motion of an orbit: modal displacements and velocities after each impact, state[impact][2 modes].
  * monodromy[2 modes][2 modes]: derivative of the first state over that a train earlier; NaN where a speed is 0. */

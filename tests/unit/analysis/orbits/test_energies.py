@@ -98,12 +98,15 @@ def test_what_an_elastic_impact_loses_is_nothing_and_a_plastic_one_all_that_it_m
 
 def test_one_mode_keeps_nothing_for_others() -> None:
     one = np.ones(1)
-    stop = Contact(one, -1.0, -0.8, 0.75)
-    body = ImpactingBody(one, 0.04 * one, 0.45 * one, 0.1 * one, 1.1, 0.7, (stop,), one)
-    for orbit in closed_form(body):
+    for falls_above in (0.0, 0.2):
+        stop = Contact(one, -1.0, -0.8, 0.75, yield_velocity=falls_above)
+        body = ImpactingBody(one, 0.04 * one, 0.45 * one, 0.1 * one, 1.1, 0.7, (stop,), one)
+        (orbit,) = closed_form(body)
         found = orbit_energies(orbit)
-        assert found.change.item() == pytest.approx(-found.lost.item(), abs=1e-15)
+        assert found.change.item() == pytest.approx(-found.lost.item(), abs=1e-14)
         assert found.identity_error < CLOSED
+        expected = float(stop.restitution_at(orbit.velocities[0]))
+        assert found.restitution.value == pytest.approx(expected, rel=1e-12)
 
 
 def test_an_orbit_between_two_stops_closes_the_identity() -> None:

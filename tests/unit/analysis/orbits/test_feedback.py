@@ -24,6 +24,7 @@ def body_of(
     restitution: float = 0.75,
     direction: float = 1.0,
     mass: float = 1.0,
+    yield_velocity: float = 0.0,
 ) -> ImpactingBody:
     """Return an oscillator of natural frequency 1."""
     shape = np.array([1.0 / math.sqrt(mass)])
@@ -34,7 +35,7 @@ def body_of(
         np.zeros(1),
         angular_frequency,
         0.0,
-        (Contact(shape, direction, direction * position, restitution),),
+        (Contact(shape, direction, direction * position, restitution, yield_velocity=yield_velocity),),
         shape,
     )
 
@@ -52,7 +53,7 @@ def next_impact(
     oscillator = Oscillator(mass, 2.0 * float(body.damping_ratios[0]) * mass, mass, amplitude, w)
     at = guess
     for _ in range(30):
-        start = contact.position, -contact.direction * contact.restitution * speed
+        start = contact.position, -contact.direction * float(contact.restitution_at(speed)) * speed
         x, v = flow(oscillator, start, at - time, phase=w * time)
         at -= (x - contact.position) / v
     return at, contact.direction * v
@@ -67,11 +68,13 @@ def test_gains_of_the_equation_sheet() -> None:
 
 
 @pytest.mark.parametrize(("periods", "w", "position"), [(1, 0.88, 0.3), (2, 3.2, 0.1)])
-@pytest.mark.parametrize(("direction", "mass"), [(1.0, 1.0), (-1.0, 1.2)])
+@pytest.mark.parametrize(("direction", "mass", "falls"), [(1.0, 1.0, 0.0), (-1.0, 1.2, 0.0), (1.0, 1.2, 0.1)])
 def test_derivatives_of_the_impact_map_are_those_of_the_flow(
-    direction: float, mass: float, periods: int, w: float, position: float
+    direction: float, mass: float, falls: float, periods: int, w: float, position: float
 ) -> None:
-    body = body_of(angular_frequency=w, direction=direction, mass=mass, position=position)
+    body = body_of(
+        angular_frequency=w, direction=direction, mass=mass, position=position, yield_velocity=falls
+    )
     orbit = orbit_of(body, periods)
     about, size = impact_map(orbit, 0.42), 1e-6
     time, speed = float(orbit.phases[0]) / w, float(orbit.velocities[0])

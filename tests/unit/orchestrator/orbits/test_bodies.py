@@ -96,15 +96,18 @@ def test_the_velocity_of_the_thesis_chain_is_the_known_one() -> None:
             ONE.replace("restitution = 0.7", 'law = "hertz"\nstiffness = 1e4'),
             r'stop\[1\].law: expected "restitution"',
         ),
-        (
-            ONE.replace("restitution = 0.7", "restitution = 0.7\nyield_velocity = 1"),
-            "yield_velocity: expected 0",
-        ),
     ],
 )
 def test_a_scene_whose_orbits_are_not_followed_is_one_line(text: str, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         impacting_body(parse_scene(text + (UNFORCED if "frequency = 0\n" in text else RECORD), "scene.toml"))
+
+
+def test_a_contact_has_the_yield_velocity_of_its_stop() -> None:
+    falling = ONE.replace("restitution = 0.7", "restitution = 0.7\nyield_velocity = 0.3")
+    for text, expected in ((falling, 0.3), (ONE, 0.0)):
+        (contact,) = impacting_body(parse_scene(text + RECORD, "scene.toml")).contacts
+        assert (contact.restitution, contact.yield_velocity) == (0.7, expected)
 
 
 def test_a_chain_of_one_mass_has_the_orbits_of_the_oscillator() -> None:

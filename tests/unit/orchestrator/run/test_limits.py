@@ -29,7 +29,6 @@ SEEN_IN = {
     "forcing": "[body]\nmass = 1.0\nstiffness = 1.0\n[record]\nrecorded_time = 2\n" + STOP,
     "stop": MASS + RECORD,
     "law": MASS + RECORD + YIELDING,
-    "yield_velocity": MASS + RECORD + STOP + "yield_velocity = 0.1\n",
     "distance": MASS + RECORD + STOP + EXCITER,
     "reduced": CHAIN.replace("stiffnesses", "modes = 1\nstiffnesses") + RECORD + STOP,
     "projection": BEAM.replace("length", 'impact_projection = "collocation"\nlength', 1) + RECORD + STOP,
