@@ -7,16 +7,18 @@ from typing import Any
 
 import xarray as xr
 
+from vibroimpact.analysis.orbits.basins import MOST_PERIODS
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
-from vibroimpact.orchestrator.orbits.basins import POINTS, BasinsOfScene, Plane, Span
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.control import Controlled
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.maps import MapOfScene, settings_of
+from vibroimpact.orchestrator.orbits.planes import POINTS, Plane, Span
 from vibroimpact.orchestrator.orbits.transients import Transients
 from vibroimpact.returned import of_study, runs_of_study
 
@@ -186,6 +188,7 @@ def basins(
     points: tuple[int, int] = (POINTS, POINTS),
     *,
     number: int | None = None,
+    periods: int = MOST_PERIODS,
 ) -> xr.Dataset:
     """Find the attractor that each start in a plane of initial states ends on.
 
@@ -200,6 +203,8 @@ def basins(
     number : int, optional
         Number of the mass of a chain, or of the mode of a beam, whose start is varied. The others keep the scene's
         start. The default is the mass that hits first, or mode 1.
+    periods : int
+        Budget: most forcing periods for which one start is followed. The slowest decay says how many are needed.
 
     Returns
     -------
@@ -214,7 +219,7 @@ def basins(
     UsageError
         The scene has another kind of body, stop or force, or the plane has no starts.
     """
-    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number)))
+    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number), periods))
 
 
 def control(

@@ -13,7 +13,8 @@ class Basins(Operation):
     """Find the attractor of each start in a plane of displacements and velocities, and the share of each attractor.
 
     Long runs find the attractors, and classes of runs name them. A start counts as soon as it is close to an
-    attractor: within a distance from which all test starts came back.
+    attractor: within a distance from which all test starts came back. The slowest decay that was met says how long
+    starts are followed. Shares have confidence intervals, and the largest share that may have been missed is printed.
 
     Example: vibroimpact basins examples/basins.toml --points 500 -o basins.nc --figure basins.png
     """
@@ -45,6 +46,9 @@ class Basins(Operation):
         int | None,
         Option(help="Mass of a chain (first impacting one) or mode of a beam (1) with these starts."),
     ] = None
+    periods: Annotated[int, Option(help="Budget: most forcing periods for which one start is followed.")] = (
+        100_000
+    )
     output: DatasetFile = None
     figure: FigureFile = None
     changes: Changes = None

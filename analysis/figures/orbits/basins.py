@@ -36,7 +36,6 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     for place, colour in enumerate(colours):
         x = dataset["attractor_displacement"].values[place]
         y = dataset["attractor_velocity"].values[place]
-        share = float(dataset["basin_fraction"].values[place])
         axis.plot(
             x[np.isfinite(x)],
             y[np.isfinite(y)],
@@ -44,7 +43,7 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             color=colour,
             markeredgecolor="black",
             markersize=4.5,
-            label=f"{names[place]}: {100.0 * share:.3g} %",
+            label=f"{names[place]}: {_share(dataset, place)}",
         )
     for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
         if (labels == value).any():
@@ -57,6 +56,13 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     )
     legend_outside(figure, axis, ncols=2)
     return figure
+
+
+def _share(dataset: xr.Dataset, place: int) -> str:
+    """Return the share of an attractor with its confidence interval in words."""
+    names = ("basin_fraction", "basin_fraction_low", "basin_fraction_high")
+    share, low, high = (100.0 * float(dataset[name].values[place]) for name in names if name in dataset)
+    return f"{share:.3g} % ({low:.3g} to {high:.3g} %)"
 
 
 register_results("basins", "basins of attraction", draw_basins)
