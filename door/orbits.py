@@ -189,6 +189,7 @@ def basins(
     *,
     number: int | None = None,
     periods: int = MOST_PERIODS,
+    edges: bool = False,
 ) -> xr.Dataset:
     """Find the attractor that each start in a plane of initial states ends on.
 
@@ -205,6 +206,8 @@ def basins(
         start. The default is the mass that hits first, or mode 1.
     periods : int
         Budget: most forcing periods for which one start is followed. The slowest decay says how many are needed.
+    edges : bool
+        Whether edges between basins are followed to the saddles on them: `edge_orbit`, `edge_multiplier`.
 
     Returns
     -------
@@ -219,7 +222,7 @@ def basins(
     UsageError
         The scene has another kind of body, stop or force, or the plane has no starts.
     """
-    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number), periods))
+    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number), periods, edges))
 
 
 def control(

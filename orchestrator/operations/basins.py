@@ -49,6 +49,9 @@ class Basins(Operation):
     periods: Annotated[int, Option(help="Budget: most forcing periods for which one start is followed.")] = (
         100_000
     )
+    edges: Annotated[
+        bool, Option(help="Follow the edges between basins to the saddles on them, which `follow` takes.")
+    ] = False
     output: DatasetFile = None
     figure: FigureFile = None
     changes: Changes = None

@@ -22,6 +22,7 @@ from vibroimpact.analysis.orbits.basins import (
     partners,
 )
 from vibroimpact.analysis.orbits.borders import border_dimension, border_share
+from vibroimpact.analysis.orbits.edges import Track
 from vibroimpact.analysis.orbits.symmetry import mirrored_contacts
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
@@ -30,6 +31,7 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
+from vibroimpact.orchestrator.orbits.edges import EDGE_ROWS, edge_tracks, edge_values, print_edges
 from vibroimpact.orchestrator.orbits.planes import (
     Plane,
     axes_of,
@@ -82,6 +84,7 @@ TABLE = ResultTable(
     ("border_fraction", "", "1", "share of the starts next to one that ends elsewhere"),
     ("border_dimension", "", "1", "dimension of the border between basins"),
     ("border_dimension_error", "", "1", "standard error of it"),
+    *EDGE_ROWS,
 )
 BLOCK = 16_384
 """Starts followed in one call; Ctrl-C takes effect between calls."""
@@ -135,8 +138,10 @@ def search_attributes(found: Basins) -> dict[str, Any]:
     }
 
 
-def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:
-    """Return the dataset of a plane: ends of the starts, attractors, borders."""
+def basins_dataset(
+    scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins, edges: list[Track] | None = None
+) -> xr.Dataset:
+    """Return the dataset of a plane: ends of the starts, attractors, borders, and edges that were tracked."""
     labels = found.labels.reshape(y.size, x.size)
     across, along = axes_of(scene, plane.number)
     most = max([len(each.states) for each in found.attractors], default=0)
@@ -155,6 +160,7 @@ def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basi
         "border_fraction": border_share(labels),
         "border_dimension": np.nan if dimension is None else dimension.value,
         "border_dimension_error": np.nan if dimension is None else dimension.error,
+        **({} if edges is None else edge_values(edges, (across, along))),
     }
     attributes = scene_attributes(scene, HISTORY) | {"units_system": scene.units} | search_attributes(found)
     return TABLE.dataset(values, attributes, units=scene.units, of=element_of(scene, plane.number))
@@ -173,6 +179,7 @@ class BasinsOfScene(Study[Basins]):
     scene: Scene
     plane: Plane
     periods: int = MOST_PERIODS
+    edges: bool = False
 
     def __post_init__(self) -> None:
         self.plane.refuse()
@@ -191,6 +198,8 @@ class BasinsOfScene(Study[Basins]):
             [max(size, np.abs(ends).max()) for size, ends in zip(scale, spans, strict=True)], half
         )
         labels = np.where(beyond, BEYOND_A_STOP, UNDECIDED).astype(np.int16)
+        self.tracks: list[Track] = []
+        self._body = body
         self.known = Basins(states, labels, sizes, most_periods=self.periods)
 
     @classmethod
@@ -198,7 +207,7 @@ class BasinsOfScene(Study[Basins]):
         """Open the scene, and place the starts."""
         spans = span_of(options.x, "x"), span_of(options.y, "y")
         plane = Plane(*spans, points_of(options.points), options.number)
-        return cls(opened_scene(options.scene, options.changes or ()), plane, options.periods)
+        return cls(opened_scene(options.scene, options.changes or ()), plane, options.periods, options.edges)
 
     def rows(self) -> Generator[Basins, None, None]:
         """Follow the starts block by block."""
@@ -209,12 +218,23 @@ class BasinsOfScene(Study[Basins]):
                 self.status(f"{100.0 * now.decided:.1f} % of {now.possible} starts; {names}")
                 if now.attractors:
                     yield now
+            if self.edges:
+                yield from self._track(flow)
         finally:
             flow.close()
 
+    def _track(self, flow: BodyFlow) -> Generator[Basins, None, None]:
+        """Follow the edges between the basins."""
+        labels = self.known.labels.reshape(self.y.size, self.x.size)
+        for track in edge_tracks(self.known, labels, self._body, flow, block=BLOCK):
+            self.tracks.append(track)
+            self.status(f"edges: {len(self.tracks)}")
+            yield self.known
+
     def made(self) -> xr.Dataset:
         """Return the dataset of the plane as far as it is known."""
-        return basins_dataset(self.scene, self.plane, self.x, self.y, self.known)
+        edges = self.tracks if self.edges else None
+        return basins_dataset(self.scene, self.plane, self.x, self.y, self.known, edges)
 
     def print_results(self) -> None:
         """Print each attractor with its share, and the undecided starts."""
@@ -242,6 +262,8 @@ class BasinsOfScene(Study[Basins]):
         _say_partners(found, data["attractor_partner"].values.tolist())
         _say_aperiodic(found)
         _say_border(data)
+        if self.edges:
+            print_edges(self.tracks, found.names)
 
 
 def say_search(found: Basins) -> None:

@@ -157,6 +157,12 @@ class BodyFlow:
             well &= np.concatenate([_went_well(each) for each in columns])
         return Blocks(np.stack(features, axis=1), states, well)
 
+    def impacts(self, state: Floats, periods: int) -> Floats:
+        """Return the impacts from a state at phase 0 on: see `analysis.orbits.edges.EdgeFlow`."""
+        (columns,) = self._run(self._measuring, state[None], (0, periods), first=False)
+        assert columns.impacts is not None
+        return columns.impacts.rows.copy()
+
     def section(self, states: Floats, periods: int) -> Section:
         """Return the motions at each forcing phase 0: see `analysis.orbits.basins.Flow`."""
         tables = [each.periods for each in self._run(self._recording, states, (0, periods), first=False)]

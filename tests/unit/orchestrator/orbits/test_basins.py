@@ -329,3 +329,40 @@ def test_what_has_no_basins_is_one_line(arguments: list[str], said: str) -> None
 def test_masses_that_a_chain_has_not_are_refused() -> None:
     with pytest.raises(UsageError, match="number: expected a mass from 1 to 2, got 3"):
         vi.basins(scene(CHAIN), number=3)
+
+
+# ---- edges ----
+
+
+def test_the_edge_of_two_basins_has_the_unstable_orbit_that_is_known_in_closed_form(tmp_path: Path) -> None:
+    of = scene(forcing__angular_frequency=1.4)
+    found = vi.basins(of, points=(12, 12), edges=True)
+    (unstable,) = (orbit for orbit in vi.find_orbits(of, 1, 1) if not orbit.is_stable)
+    assert found.edge_orbit.values.tolist() == ["P(1,1)"]
+    assert found.edge_multiplier.values[0] == pytest.approx(unstable.multipliers.real, rel=1e-9)
+    phase, stop = found.edge_seed.values[0].split(":")
+    assert (float(phase), stop) == (pytest.approx(unstable.phases[0], rel=1e-9), "1")
+    x, v = unstable.at(np.array([2.0 * np.pi]))
+    at = float(found.edge_displacement[0, 0]), float(found.edge_velocity[0, 0])
+    assert at == pytest.approx((x[0], v[0]), abs=1e-5)
+    assert vi.draw(found).axes
+
+
+@pytest.mark.usefixtures("brief_transients")
+def test_the_edge_of_a_chaotic_pair_has_a_symmetric_saddle_that_follow_takes() -> None:
+    changes = {"stop": TWO_CHAOTIC, "forcing__angular_frequency": 0.9, "body__damping_ratio": 0.04}
+    of = scene(**changes)
+    found = vi.basins(of, (-1.0, 1.0), (-3.0, 3.0), (12, 12), edges=True)
+    assert found.edge_orbit.values.tolist() == ["P(2,1), 1 at stop 1, 1 at stop 2"]
+    largest, second = found.edge_multiplier.values[0]
+    assert (largest, second) == pytest.approx((2.857171, 0.048073), rel=1e-5)
+    assert largest * second == pytest.approx(0.7**4 * np.exp(-2.0 * 0.04 * 2.0 * np.pi / 0.9), rel=1e-9)
+    seed = [(float(p), int(s)) for p, s in (each.split(":") for each in found.edge_seed.values[0].split(","))]
+    assert seed[1][0] - seed[0][0] == pytest.approx(np.pi, abs=1e-9), "half a period apart"
+    branch = vi.follow(of, "forcing.angular_frequency", 0.89, 0.91, seed=seed, doublings=0)
+    assert (branch.impact_count == 2).any()
+
+
+def test_a_plane_of_one_basin_has_no_edge() -> None:
+    found = vi.basins(scene(forcing__angular_frequency=0.72), points=(5, 5), edges=True)
+    assert found.sizes["edge"] == 0
