@@ -12,6 +12,7 @@ from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
+from vibroimpact.orchestrator.orbits.basin_shares import VALUES, BasinShares
 from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.control import Controlled
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
@@ -190,6 +191,9 @@ def basins(
     number: int | None = None,
     periods: int = MOST_PERIODS,
     edges: bool = False,
+    parameter: str | None = None,
+    parameter_range: tuple[float, float] | None = None,
+    values: int = VALUES,
 ) -> xr.Dataset:
     """Find the attractor that each start in a plane of initial states ends on.
 
@@ -208,6 +212,12 @@ def basins(
         Budget: most forcing periods for which one start is followed. The slowest decay says how many are needed.
     edges : bool
         Whether edges between basins are followed to the saddles on them: `edge_orbit`, `edge_multiplier`.
+    parameter : str, optional
+        Number of the scene over which the shares of the attractors are found, in one plane of starts.
+    parameter_range : tuple of float, optional
+        Ends of its range.
+    values : int
+        Number of values in that range.
 
     Returns
     -------
@@ -216,13 +226,19 @@ def basins(
         stop. Each attractor has a name (`P(1,1)`, `chaos`, ...), its `basin_fraction`, its states at forcing phase 0,
         and `attractor_impacts`, impacts per forcing period at each stop. The attribute `undetected_share_below` bounds
         the share of starts on attractors that the sample of chaotic starts missed (95 % confidence).
+        With `parameter` the dataset has `basin_fraction` over the dims (parameter, attractor) instead.
 
     Raises
     ------
     UsageError
         The scene has another kind of body, stop or force, or the plane has no starts.
     """
-    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number), periods, edges))
+    plane = Plane(x, y, points, number)
+    if parameter is None:
+        return of_study(BasinsOfScene(given_scene(scene), plane, periods, edges))
+    if parameter_range is None:
+        raise UsageError("basins: parameter_range: expected two ends of the parameter's range, got none.")
+    return of_study(BasinShares(given_scene(scene), plane, parameter, parameter_range, values, periods))
 
 
 def control(

@@ -62,7 +62,7 @@ PROBES, PROBE_PERIODS, PROBE_FALL = 24, 400, 7.0
 """Number of probe starts, least number of periods in which they must come back, and logarithm of their fall."""
 MOST_PROBED = 32
 """Largest number of states of an attractor around which probe starts begin."""
-STEP = 1e-6
+STEP = 1e-8
 """Step of the differences that give the multipliers of an attractor, over the size of the motion."""
 SAME = 1e-5
 """Distance, over the size of the motion, below which two attractors are equal."""
@@ -322,26 +322,29 @@ class _Search(OnTheirWay):
         left = self.left()
         if not left.size:
             return
-        chosen = self._draw.choice(left, min(CHAOS_SAMPLE, left.size), replace=False)
-        kinds, states = self._flow.classes(self._now[chosen], self._transient)
-        aperiodic = _are_aperiodic(kinds, states)
-        if not aperiodic.all() and left.size > chosen.size:
-            chosen = self._draw.choice(left, min(MOST_SINGLE, left.size), replace=False)
-            kinds, states = self._flow.classes(self._now[chosen], self._transient)
-            aperiodic = _are_aperiodic(kinds, states)
-        kinds = self._with_long_periods(kinds, states)
-        aperiodic = _are_aperiodic(kinds, states)
-        for kind, state in zip(kinds, states, strict=True):
-            self._add(kind, state)
-        for place, state, kind in zip(chosen, states, kinds, strict=True):
-            self._basins.labels[place] = self._ended_on(kind, state)
+        chosen, kinds = self._long_runs(left, CHAOS_SAMPLE)
+        if not _are_aperiodic(kinds, self._now[chosen]).all() and left.size > chosen.size:
+            chosen, kinds = self._long_runs(left, MOST_SINGLE)
+        for place, kind in zip(chosen, kinds, strict=True):
+            self._add(kind, self._now[place])
+        for place, kind in zip(chosen, kinds, strict=True):
+            self._basins.labels[place] = self._ended_on(kind, self._now[place])
         self.match(self.left())
-        whole = aperiodic.all()
-        of_sample = [kind for kind, each in zip(kinds, aperiodic, strict=True) if each]
-        if aperiodic.any():
-            self._assign(
-                left if whole else chosen[aperiodic], chosen[aperiodic], of_sample, states[aperiodic]
-            )
+        aperiodic = _are_aperiodic(kinds, self._now[chosen])
+        if aperiodic.any() and not aperiodic.all():
+            # some of them may not yet have come near to the attractors of the others
+            self.follow(chosen[aperiodic], self._transient)
+            aperiodic &= (self._basins.labels[chosen] == UNDECIDED) & ~self._lost[chosen]
+        kinds = [kind for kind, each in zip(kinds, aperiodic, strict=True) if each]
+        if kinds:
+            places = left if aperiodic.all() else chosen[aperiodic]
+            self._assign(places, chosen[aperiodic], kinds, self._now[chosen[aperiodic]])
+
+    def _long_runs(self, left: Places, most: int) -> tuple[Places, list[RunClass]]:
+        """Run some of the starts for long; return them and their classes."""
+        chosen = self._draw.choice(left, min(most, left.size), replace=False)
+        kinds, self._now[chosen] = self._flow.classes(self._now[chosen], self._transient)
+        return chosen, self._with_long_periods(kinds, self._now[chosen])
 
     def _with_long_periods(self, kinds: list[RunClass], states: Floats) -> list[RunClass]:
         """Return the classes of runs; chaos and unknown ones get the period with which their section repeats."""

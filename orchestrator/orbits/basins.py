@@ -37,8 +37,7 @@ from vibroimpact.orchestrator.orbits.planes import (
     axes_of,
     beyond_stops,
     element_of,
-    points_of,
-    span_of,
+    plane_of,
     spans_of,
     start_states,
 )
@@ -205,9 +204,8 @@ class BasinsOfScene(Study[Basins]):
     @classmethod
     def prepare(cls, options: Options, stack: ExitStack) -> Self:
         """Open the scene, and place the starts."""
-        spans = span_of(options.x, "x"), span_of(options.y, "y")
-        plane = Plane(*spans, points_of(options.points), options.number)
-        return cls(opened_scene(options.scene, options.changes or ()), plane, options.periods, options.edges)
+        scene = opened_scene(options.scene, options.changes or ())
+        return cls(scene, plane_of(options), options.periods, options.edges)
 
     def rows(self) -> Generator[Basins, None, None]:
         """Follow the starts block by block."""

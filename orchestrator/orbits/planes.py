@@ -11,6 +11,7 @@ import numpy as np
 from vibroimpact.analysis.orbits.basins import Floats
 from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.bodies import modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
@@ -187,3 +188,8 @@ def points_of(text: str) -> tuple[int, int]:
     if len(parts) > 2 or not all(part.isascii() and part.isdigit() for part in parts):
         raise UsageError(f"--points: expected a number of starts, or two as 300x200, got {text!r}.")
     return int(parts[0]), int(parts[-1])
+
+
+def plane_of(options: Options) -> Plane:
+    """Return the plane that the arguments of the operation describe."""
+    return Plane(span_of(options.x, "x"), span_of(options.y, "y"), points_of(options.points), options.number)

@@ -12,7 +12,7 @@ from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
 from vibroimpact.analysis.figures.sweep.diagrams import edges
 
-_COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
+COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
 _MARKS = "osD^vPX*"
 WIDE = 22
 """Characters of a legend's entry up to which two entries fit side by side."""
@@ -23,7 +23,7 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     """Draw the attractor of each start state, and the attractors at forcing phase 0."""
     labels = dataset["basin"].values
     names = [str(name) for name in dataset["attractor_name"].values]
-    colours = [_COLOURS[place % len(_COLOURS)] for place in range(len(names))]
+    colours = [COLOURS[place % len(COLOURS)] for place in range(len(names))]
     figure = canvas(95)
     axis = figure.subplots()
     axis.pcolormesh(
