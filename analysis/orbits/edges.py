@@ -99,7 +99,7 @@ class EdgeTracking:
         self._block, self._period = block, period
 
     def track(self, between: tuple[int, int], places: NDArray[np.int64]) -> Track | None:
-        """Return the edge state between two starts side by side; None if their ends do not differ at phase 0.
+        """Return the edge state between two starts side by side; None if both ended on one side of the edge.
 
         Parameters
         ----------
@@ -108,11 +108,11 @@ class EdgeTracking:
         places : array of int, shape (2,)
             Both starts.
         """
-        pair = self._flow.follow(self._basins.starts[places], 1, first=True).states
-        labels = ends_of(self._basins, self._flow, pair, block=self._block)
-        if labels[0] != between[0] or labels[1] == between[0]:
+        pair = self._bisected(
+            self._flow.follow(self._basins.starts[places], 1, first=True).states, between[0]
+        )
+        if pair is None:
             return None
-        pair = self._bisected(pair, between[0])
         states: list[Floats] = []
         rows: list[Floats] = []
         gap = self._distance(pair)
@@ -120,6 +120,8 @@ class EdgeTracking:
         while orbit is None and len(states) < TRACKED:
             if self._distance(pair) > APART:
                 pair = self._bisected(pair, between[0])
+                if pair is None:  # rounding has moved both to one side
+                    return None
             impacts = self._flow.impacts(pair[0], 1)
             impacts[:, 0] += len(states) * self._period
             states.append(pair[0])
@@ -127,21 +129,26 @@ class EdgeTracking:
             pair = self._flow.follow(pair, 1).states
             gap = max(gap, self._distance(pair))
             if len(states) % LOOKED_AT == 0:
-                orbit = self._refine(np.concatenate(rows[-2 * LOOKED_AT :]))
+                found = self._refine(np.concatenate(rows[-2 * LOOKED_AT :]))
+                orbit = None if found is None or found.is_stable else found
         return Track(between, np.array(states), gap, orbit)
 
     def _distance(self, pair: Floats) -> float:
         return float((np.abs(pair[1] - pair[0]) / self._basins.scale).max())
 
-    def _bisected(self, pair: Floats, label: int) -> Floats:
-        """Return two states next to each other on the segment between two states: one ends on `label`, one does not."""
+    def _bisected(self, pair: Floats, label: int) -> Floats | None:
+        """Return two states next to each other between two states: one ends on `label`, one does not.
+
+        None if the two states do not straddle the border.
+        """
         shares = np.linspace(0.0, 1.0, INNER + 2)
         for _ in range(MOST_BISECTIONS):
             if self._distance(pair) <= TOGETHER:
                 break
             between = pair[0] + shares[:, None] * (pair[1] - pair[0])
-            inner = ends_of(self._basins, self._flow, between[1:-1], block=self._block)
-            is_one = np.concatenate([[True], inner == label, [False]])
+            is_one = ends_of(self._basins, self._flow, between, block=self._block) == label
+            if not is_one[0] or is_one[-1]:
+                return None
             last = int(np.flatnonzero(is_one[:-1] & ~is_one[1:])[0])
             if (between[last] == pair[0]).all() and (between[last + 1] == pair[1]).all():
                 break

@@ -18,8 +18,8 @@ from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.orbits.find import orbit_of_impacts
 
-MOST_PAIRS, PAIRS_OF_STARTS = 6, 2
-"""Most pairs of attractors whose edges are tracked, and pairs of starts from which each edge is."""
+MOST_PAIRS, PAIRS_OF_STARTS, MOST_TRIED = 6, 2, 6
+"""Most pairs of attractors whose edges are tracked, pairs of starts from which each edge is, and those tried."""
 SHOWN = 2
 """Number of multipliers that are printed and kept."""
 EDGE_ROWS = (
@@ -46,10 +46,12 @@ def edge_tracks(
     tracking = EdgeTracking(found, flow, refine, block=block, period=body.period)
     known: list[PeriodicOrbit] = []
     for between, places in neighbouring_pairs(labels)[:MOST_PAIRS]:
-        for pair in places[:: max(1, len(places) // PAIRS_OF_STARTS)][:PAIRS_OF_STARTS]:
-            track = tracking.track(between, pair)
+        tracked = 0
+        for pair in places[:: max(1, len(places) // MOST_TRIED)][:MOST_TRIED]:
+            track = tracking.track(between, pair) if tracked < PAIRS_OF_STARTS else None
             if track is None:
                 continue
+            tracked += 1
             if track.orbit is None or not any(same_orbit(track.orbit, other) for other in known):
                 yield track
             if track.orbit is not None:

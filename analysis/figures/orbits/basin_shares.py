@@ -25,7 +25,7 @@ def draw_basin_shares(dataset: xr.Dataset) -> Figure:
         axis.fill_between(
             x, 100.0 * below, 100.0 * above, color=colour, linewidth=0.0, step="mid", label=name
         )
-        there = shares[:, place] > 0.0
+        there = (shares[:, place] > 0.0) & (shares[:, place] < 1.0)
         off = 100.0 * np.array(
             [shares[there, place] - low[there, place], high[there, place] - shares[there, place]]
         )
