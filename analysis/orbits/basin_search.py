@@ -36,7 +36,7 @@ from vibroimpact.analysis.orbits.chaotic_groups import (
     merged,
 )
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.recurrence import correlation_dimension, long_period, recurrence
+from vibroimpact.analysis.orbits.recurrence import Recurrence, correlation_dimension, long_period, recurrence
 
 Places = NDArray[np.int64]
 
@@ -369,7 +369,8 @@ class _Search(OnTheirWay):
     def _assign(self, places: Places, chosen: Places, kinds: list[RunClass], states: Floats) -> None:
         """Assign aperiodic starts to attractors, separated by long runs of the chosen starts from the given states."""
         section = self._flow.section(states, BLOCK * BLOCKS)
-        recurs = recurrence(section.states).recurs
+        by_cells = recurrence(section.states)
+        recurs = by_cells.recurs
         if not recurs.all():  # transients among them: only those that recur have ended
             chosen = places = chosen[recurs]
             if not chosen.size:
@@ -379,7 +380,8 @@ class _Search(OnTheirWay):
         are_new = len(self._basins.numbers) < 2
         measured = self._flow.measure(states, BLOCK, BLOCKS).features
         chaotic = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
-        own = self._grouped(_Runs(chaotic, measured, section.states, section.extremes))
+        runs = _Runs(chaotic, measured, section.states, section.extremes)
+        own = self._grouped(runs, by_cells if recurs.all() else recurrence(section.states))
         labels = np.zeros(self._basins.labels.size, np.int64)
         if len(self._basins.numbers) > 1 and places.size > chosen.size:
             labels[places] = self.groups_by_blocks(places)
@@ -395,7 +397,7 @@ class _Search(OnTheirWay):
             missed = missed_share(chosen.size)
             self._basins.undetected_share_below += missed * places.size / self._basins.possible
 
-    def _grouped(self, runs: _Runs) -> NDArray[np.int64]:
+    def _grouped(self, runs: _Runs, by_cells: Recurrence) -> NDArray[np.int64]:
         """Return the group of each of some long runs; a new group gets an attractor."""
         found = self._basins
         if len(found.numbers) > 1:
@@ -403,6 +405,7 @@ class _Search(OnTheirWay):
         earlier = 0 if self._runs is None else len(self._runs.chaotic)
         if self._runs is not None:
             runs = _Runs(*(np.concatenate(both) for both in zip(self._runs, runs, strict=True)))
+            by_cells = recurrence(runs.sections)
         self._runs, found.groups = runs, grouped(runs.features)
         known = int(found.groups.labels[0]) if earlier else -1
         numbers = np.full(len(found.groups.means), found.numbers[0] if earlier else -1, np.int16)
@@ -414,7 +417,6 @@ class _Search(OnTheirWay):
                 numbers[group] = len(found.attractors)
                 found.attractors.append(attractor)
         found.numbers = numbers
-        by_cells = recurrence(runs.sections)
         agree = _same_partition(by_cells.labels, found.groups.labels)
         found.separation = Separation(len(numbers), int(by_cells.labels.max()) + 1, agree)
         return found.groups.labels[earlier:]

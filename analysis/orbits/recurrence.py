@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 BINS = (16, 32, 64, 128, 256, 512, 1024)
 """Cells along each axis of the section, from the largest cells on."""
+MOST_CELLS = 30_000
+"""Largest number of visited cells; more would take too much memory."""
 RETURNS, RECURRENT = 0.9, 0.5
 """Shares of the later half of a motion in cells of its earlier half.
 
@@ -69,7 +71,7 @@ def recurrence(sections: Floats) -> Recurrence:
 
     Parameters
     ----------
-    sections : array, shape (motion, period, variable)
+    sections : array, shape (motion, period, 2)
         States at forcing phase 0, finite, at least 2 periods.
 
     Examples
@@ -87,6 +89,8 @@ def recurrence(sections: Floats) -> Recurrence:
         cells = np.minimum(np.floor((sections - low) / size * bins), bins - 1).astype(np.int64)
         visited = _visited(cells, bins)
         count = int(visited.max()) + 1
+        if found is not None and count > MOST_CELLS:
+            break
         early, late = (_shares(part, count) for part in (visited[:, :half], visited[:, half:]))
         shared = (
             late @ (early > 0.0).T
@@ -105,11 +109,10 @@ def recurrence(sections: Floats) -> Recurrence:
 
 def _visited(cells: NDArray[np.int64], bins: int) -> NDArray[np.int64]:
     """Return the number of the cell of each state, shape (motion, period), counted over the visited cells."""
-    keys = np.zeros(cells.shape[:2], np.int64)
-    for variable in range(cells.shape[2]):
-        # renumbered after each variable, so that the keys stay small
-        keys = np.unique(keys * bins + cells[..., variable], return_inverse=True)[1].reshape(keys.shape)
-    return keys
+    keys = cells[..., 0] * bins + cells[..., 1]
+    is_visited = np.zeros(bins * bins, np.int64)
+    is_visited[keys] = 1
+    return np.asarray((np.cumsum(is_visited) - 1)[keys])
 
 
 def _shares(visited: NDArray[np.int64], cells: int) -> Floats:

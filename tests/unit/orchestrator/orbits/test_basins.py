@@ -129,7 +129,11 @@ def brief_transients(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("brief_transients")
 def test_chaotic_attractors_that_are_mirror_images_of_each_other_are_two() -> None:
-    changes = {"stop": TWO_CHAOTIC, "forcing__angular_frequency": 0.9, "body__damping_ratio": 0.04}
+    changes: dict[str, Any] = {
+        "stop": TWO_CHAOTIC,
+        "forcing__angular_frequency": 0.9,
+        "body__damping_ratio": 0.04,
+    }
     of = scene(**changes)
     found = vi.basins(of, (-1.0, 1.0), (-3.0, 3.0), (40, 40))
     assert found.attractor_name.values.tolist() == ["chaos a", "chaos b"]
@@ -156,7 +160,7 @@ def test_chaotic_attractors_that_are_mirror_images_of_each_other_are_two() -> No
 @pytest.mark.usefixtures("brief_transients")
 def test_one_chaotic_attractor_stays_one_and_says_what_its_sample_may_have_missed() -> None:
     stop = [{"position": 0.0, "restitution": 0.8}]
-    changes = {
+    changes: dict[str, Any] = {
         "stop": stop,
         "forcing__amplitude": 1.0,
         "forcing__angular_frequency": 2.9,
@@ -205,7 +209,7 @@ SLOW_NEIGHBOURS = {
     "record": {"recorded_periods": 8},
 }
 """P(12,16) has the multiplier -.8597; its neighbours grow 40 times before they come back."""
-WEAKLY_DAMPED = {
+WEAKLY_DAMPED: dict[str, Any] = {
     "scene": {"units": "nondimensional"},
     "body": {"mass": 1.0, "stiffness": 1.0, "damping": 0.002},
     "forcing": {"amplitude": 0.5, "angular_frequency": 3.2},
@@ -341,7 +345,8 @@ def test_the_edge_of_two_basins_has_the_unstable_orbit_that_is_known_in_closed_f
     assert found.edge_orbit.values.tolist() == ["P(1,1)"]
     assert found.edge_multiplier.values[0] == pytest.approx(unstable.multipliers.real, rel=1e-9)
     phase, stop = found.edge_seed.values[0].split(":")
-    assert (float(phase), stop) == (pytest.approx(unstable.phases[0], rel=1e-9), "1")
+    assert stop == "1"
+    assert float(phase) == pytest.approx(unstable.phases[0], rel=1e-9)
     x, v = unstable.at(np.array([2.0 * np.pi]))
     at = float(found.edge_displacement[0, 0]), float(found.edge_velocity[0, 0])
     assert at == pytest.approx((x[0], v[0]), abs=1e-5)
@@ -350,7 +355,11 @@ def test_the_edge_of_two_basins_has_the_unstable_orbit_that_is_known_in_closed_f
 
 @pytest.mark.usefixtures("brief_transients")
 def test_the_edge_of_a_chaotic_pair_has_a_symmetric_saddle_that_follow_takes() -> None:
-    changes = {"stop": TWO_CHAOTIC, "forcing__angular_frequency": 0.9, "body__damping_ratio": 0.04}
+    changes: dict[str, Any] = {
+        "stop": TWO_CHAOTIC,
+        "forcing__angular_frequency": 0.9,
+        "body__damping_ratio": 0.04,
+    }
     of = scene(**changes)
     found = vi.basins(of, (-1.0, 1.0), (-3.0, 3.0), (12, 12), edges=True)
     assert found.edge_orbit.values.tolist() == ["P(2,1), 1 at stop 1, 1 at stop 2"]
