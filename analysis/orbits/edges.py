@@ -146,11 +146,12 @@ class EdgeTracking:
             if self._distance(pair) <= TOGETHER:
                 break
             between = pair[0] + shares[:, None] * (pair[1] - pair[0])
+            between[-1] = pair[1]  # a product rounds
             is_one = ends_of(self._basins, self._flow, between, block=self._block) == label
-            if not is_one[0] or is_one[-1]:
+            changes = np.flatnonzero(is_one[:-1] != is_one[1:])
+            if not changes.size:
                 return None
-            last = int(np.flatnonzero(is_one[:-1] & ~is_one[1:])[0])
-            if (between[last] == pair[0]).all() and (between[last + 1] == pair[1]).all():
-                break
-            pair = between[last : last + 2]
+            last = int(changes[0])
+            # rounding may have exchanged the ends of states next to a border with many folds
+            pair = between[last : last + 2][:: 1 if is_one[last] else -1]
         return pair

@@ -92,7 +92,7 @@ def _periods(track: Track) -> int:
 def print_edges(tracks: list[Track], names: list[str]) -> None:
     """Print the orbit on each edge with its multipliers, and how `follow` takes it."""
     if not tracks:
-        say("No two starts side by side end on different attractors: there is no edge to follow.")
+        say("No edge was followed: no two starts side by side straddle one to within rounding.")
         return
     rows = table("Edges between basins", "<between", "<orbit on the edge", "<largest multipliers", "<seed")
     for each in tracks:
