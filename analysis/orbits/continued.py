@@ -81,9 +81,9 @@ def _of_one_class(one: Attractor, other: Attractor) -> bool:
 def features_apart(one: Attractor, other: Attractor) -> float:
     """Return the largest difference of the features of two attractors, over the size of both motions.
 
-    Features are the impacts in a forcing period at each stop over those of all stops, the sums of their velocities,
-    also weighted by the cosine and sine of their phases, the largest velocity, and the extremes of the displacement.
-    It is infinite where only one of them has no impacts.
+    The features are impacts in a forcing period at each stop, over those of all stops, and the largest velocity.
+    Sums of velocities count, too, also weighted by the cosine and sine of their phases, and the extremes of the motion.
+    The difference is infinite where only one of them has no impacts.
     """
     kinds = {each.kind.kind is OrbitClass.no_impacts for each in (one, other)}
     if len(kinds) > 1:
