@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import xarray as xr
 
@@ -71,7 +71,7 @@ class Study(ABC, Generic[Row]):
 
     @classmethod
     @abstractmethod
-    def prepare(cls, options: Any, stack: ExitStack) -> Self | None:
+    def prepare(cls, options: Any, stack: ExitStack) -> Study[Any] | None:
         """Return the study that the arguments of its operation describe; None where they describe no study.
 
         Parameters

@@ -7,16 +7,19 @@ from typing import Any
 
 import xarray as xr
 
+from vibroimpact.analysis.orbits.basins import MOST_PERIODS
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
-from vibroimpact.orchestrator.orbits.basins import POINTS, BasinsOfScene, Plane, Span
+from vibroimpact.orchestrator.orbits.basin_shares import VALUES, BasinShares
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.control import Controlled
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.maps import MapOfScene, settings_of
+from vibroimpact.orchestrator.orbits.planes import POINTS, Plane, Span
 from vibroimpact.orchestrator.orbits.transients import Transients
 from vibroimpact.returned import of_study, runs_of_study
 
@@ -186,6 +189,11 @@ def basins(
     points: tuple[int, int] = (POINTS, POINTS),
     *,
     number: int | None = None,
+    periods: int = MOST_PERIODS,
+    edges: bool = False,
+    parameter: str | None = None,
+    parameter_range: tuple[float, float] | None = None,
+    values: int = VALUES,
 ) -> xr.Dataset:
     """Find the attractor that each start in a plane of initial states ends on.
 
@@ -200,6 +208,16 @@ def basins(
     number : int, optional
         Number of the mass of a chain, or of the mode of a beam, whose start is varied. The others keep the scene's
         start. The default is the mass that hits first, or mode 1.
+    periods : int
+        Budget: most forcing periods for which one start is followed. The slowest decay says how many are needed.
+    edges : bool
+        Whether edges between basins are followed to the saddles on them: `edge_orbit`, `edge_multiplier`.
+    parameter : str, optional
+        Number of the scene over which the shares of the attractors are found, in one plane of starts.
+    parameter_range : tuple of float, optional
+        Ends of its range.
+    values : int
+        Number of values in that range.
 
     Returns
     -------
@@ -208,13 +226,19 @@ def basins(
         stop. Each attractor has a name (`P(1,1)`, `chaos`, ...), its `basin_fraction`, its states at forcing phase 0,
         and `attractor_impacts`, impacts per forcing period at each stop. The attribute `undetected_share_below` bounds
         the share of starts on attractors that the sample of chaotic starts missed (95 % confidence).
+        With `parameter` the dataset has `basin_fraction` over the dims (parameter, attractor) instead.
 
     Raises
     ------
     UsageError
         The scene has another kind of body, stop or force, or the plane has no starts.
     """
-    return of_study(BasinsOfScene(given_scene(scene), Plane(x, y, points, number)))
+    plane = Plane(x, y, points, number)
+    if parameter is None:
+        return of_study(BasinsOfScene(given_scene(scene), plane, periods, edges))
+    if parameter_range is None:
+        raise UsageError("basins: parameter_range: expected two ends of the parameter's range, got none.")
+    return of_study(BasinShares(given_scene(scene), plane, parameter, parameter_range, values, periods))
 
 
 def control(

@@ -140,7 +140,7 @@ def grouped(features: Floats) -> Groups:
     runs, blocks = features.shape[:2]
     flat = features.reshape(runs, blocks, -1)
     rounding = np.abs(flat).mean(axis=(0, 1)) / BLOCK + 1e-300  # an impact across the edge of a block
-    labels = _components(_linked(flat, rounding))
+    labels = components(_linked(flat, rounding))
     kinds = range(int(labels.max(initial=0)) + 1)
     means = np.array([flat[labels == kind].mean(axis=(0, 1)) for kind in kinds])
     spreads = np.array([flat[labels == kind].std(axis=(0, 1)) for kind in kinds])
@@ -166,7 +166,7 @@ def _linked(flat: Floats, rounding: Floats) -> NDArray[np.bool_]:
     return linked
 
 
-def _components(linked: NDArray[np.bool_]) -> NDArray[np.int64]:
+def components(linked: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the connected component of each run, the largest numbered 0."""
     labels = np.full(len(linked), -1, np.int64)
     for seed in range(len(linked)):

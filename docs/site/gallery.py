@@ -124,6 +124,12 @@ def kinds() -> dict[str, Picture]:
             "vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity -o sets.nc",
         ),
         "basins": _of("basins", "basins", "vibroimpact basins examples/basins.toml -o basins.nc"),
+        "basin_shares": _of(
+            "basin_shares",
+            "shares",
+            "vibroimpact basins examples/basins.toml --parameter forcing.angular_frequency --from 0.9 --to 1.6 "
+            "--points 20 -o shares.nc",
+        ),
         "control": _of(
             "control",
             "kept",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,37 +11,67 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.orbits.basin_search import find_basins
 from vibroimpact.analysis.orbits.basins import (
     BEYOND_A_STOP,
+    MOST_PERIODS,
     UNDECIDED,
+    Attractor,
     Basins,
     Floats,
-    border_dimension,
-    border_share,
-    find_basins,
+    partners,
 )
+from vibroimpact.analysis.orbits.borders import border_dimension, border_share
+from vibroimpact.analysis.orbits.edges import Track
+from vibroimpact.analysis.orbits.symmetry import mirrored_contacts
 from vibroimpact.analysis.study import Study
-from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.basins import Basins as Options
-from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
-from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.orbits.edges import EDGE_ROWS, edge_tracks, edge_values, print_edges
+from vibroimpact.orchestrator.orbits.planes import (
+    Plane,
+    axes_of,
+    beyond_stops,
+    element_of,
+    plane_of,
+    spans_of,
+    start_states,
+)
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import StructureBody
 from vibroimpact.orchestrator.ssp import opened_scene
 
 HISTORY = "basins of attraction found by vibroimpact"
+ATTRACTOR_ROWS = (
+    ("attractor_name", "attractor", "1", "what it is", "text"),
+    ("basin_fraction", "attractor", "1", "share of the starts that end on it"),
+    ("basin_fraction_low", "attractor", "1", "lower end of the 95 % confidence interval of the share"),
+    ("basin_fraction_high", "attractor", "1", "upper end of the 95 % confidence interval of the share"),
+    (
+        "attractor_impacts",
+        "attractor stop",
+        "1",
+        "mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter",
+    ),
+    ("attractor_speed", "attractor stop", "m s-1", "mean impact velocity at each stop"),
+    ("attractor_phase_spread", "attractor stop", "rad", "circular standard deviation of the impact phases"),
+    ("attractor_lowest", "attractor", "m", "smallest observed displacement"),
+    ("attractor_highest", "attractor", "m", "largest observed displacement"),
+    ("attractor_dimension", "attractor", "1", "correlation dimension of its states at forcing phase 0"),
+    ("attractor_multiplier", "attractor", "1", "modulus of its slowest multiplier in a forcing period"),
+    ("attractor_partner", "attractor", "1", "number of its mirror image, from 0; -1 without one"),
+)
+"""Variables of attractors that have no state of the plane."""
 TABLE = ResultTable(
     "basins",
     ("displacement_start", "displacement_start", "m", "displacement{of} at the start"),
     ("velocity_start", "velocity_start", "m s-1", "velocity{of} at the start"),
     ("basin", "velocity_start displacement_start", "1", "attractor, from 0; -1 undecided, -2 beyond a stop"),
-    ("attractor_name", "attractor", "1", "what it is", "text"),
-    ("basin_fraction", "attractor", "1", "share of the starts that end on it"),
+    *ATTRACTOR_ROWS,
     ("attractor_displacement", "attractor period", "m", "displacement at forcing phase 0"),
     ("attractor_velocity", "attractor period", "m s-1", "velocity at forcing phase 0"),
     (
@@ -51,156 +80,69 @@ TABLE = ResultTable(
         "1",
         "distance from which starts were seen to come back, over the size of the motion",
     ),
-    (
-        "attractor_impacts",
-        "attractor stop",
-        "1",
-        "mean number of impacts in a forcing period at each stop, but for the slow ones of a chatter",
-    ),
     ("border_fraction", "", "1", "share of the starts next to one that ends elsewhere"),
     ("border_dimension", "", "1", "dimension of the border between basins"),
     ("border_dimension_error", "", "1", "standard error of it"),
+    *EDGE_ROWS,
 )
-POINTS = 200
-"""Default number of starts along each axis."""
-MOST_STARTS = 16_000_000
 BLOCK = 16_384
 """Starts followed in one call; Ctrl-C takes effect between calls."""
-ROUNDING = 1e-13
-"""Part of a span by which its ends stay away from the contacts that cut it off."""
-REACH = 2.0
-"""Default half width of the plane, over the size of the scene's own motion."""
-
-Span = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Plane:
-    """The plane of start states.
+def attractor_values(found: Basins, images: Any, stops: int) -> dict[str, Any]:
+    """Return the variables of `ATTRACTOR_ROWS`; `images` are the mirrored contacts, or None."""
+    each_one = [each.features for each in found.attractors]
+    ends = found.intervals
 
-    Attributes
-    ----------
-    x, y : tuple of float, or None
-        Ends of the axes of displacement (m) and velocity (m/s); None: from the scene's own motion.
-    points : tuple of int
-        Starts along both axes.
-    number : int or None
-        Mass of a chain, or mode of a beam, whose start is varied; the others start as in the scene. None: the mass
-        that the first stop hits, or mode 1.
-    """
+    def of_stops(values: list[Floats]) -> Floats:
+        return np.array(values).reshape(-1, stops)
 
-    x: Span | None = None
-    y: Span | None = None
-    points: tuple[int, int] = (POINTS, POINTS)
-    number: int | None = None
-
-    def refuse(self) -> None:
-        """Raise UsageError unless the plane has finite spans in order and 2 to MOST_STARTS starts."""
-        for name, span in (("x", self.x), ("y", self.y)):
-            if span is not None and not (
-                math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]
-            ):
-                got = f"{span[0]:g} to {span[1]:g}"
-                raise UsageError(
-                    f"basins: {name}: expected two finite numbers, the smaller one first, got {got}."
-                )
-        if min(self.points) < 2 or math.prod(self.points) > MOST_STARTS:
-            raise UsageError(
-                f"basins: points: expected 2 at least along each axis and {MOST_STARTS} in all, "
-                f"got {self.points[0]} x {self.points[1]}."
-            )
+    return {
+        "attractor_name": found.names,
+        "basin_fraction": found.fractions,
+        "basin_fraction_low": ends[:, 0],
+        "basin_fraction_high": ends[:, 1],
+        "attractor_impacts": of_stops([each.impacts for each in each_one]),
+        "attractor_speed": of_stops([each.speed for each in each_one]),
+        "attractor_phase_spread": of_stops([each.phase_spread for each in each_one]),
+        "attractor_lowest": np.array([each.extremes[0] for each in each_one]),
+        "attractor_highest": np.array([each.extremes[1] for each in each_one]),
+        "attractor_dimension": np.array([each.dimension for each in each_one]),
+        "attractor_multiplier": np.array([each.multiplier for each in found.attractors]),
+        "attractor_partner": partners(found.attractors, images),
+    }
 
 
-def _axes(scene: Scene, number: int | None) -> tuple[int, int]:
-    """Return the indices of the plane's displacement and velocity among the start values."""
-    if not scene.body.IS_STRUCTURE:
-        if number not in (None, 1):
-            raise UsageError(f"basins: number: expected 1, an oscillator's only mass, got {number}.")
-        return 0, 1
-    size = len(state_variables(scene)) // 2
-    chosen = number if number is not None else _first_hit(scene)
-    if not 1 <= chosen <= size:
-        raise UsageError(f"basins: number: expected a {scene.body.ELEMENT} from 1 to {size}, got {chosen}.")
-    return chosen - 1, size + chosen - 1
+def search_attributes(found: Basins) -> dict[str, Any]:
+    """Return the attributes that say how complete a search is."""
+    counts = found.separation
+    separated = (
+        {}
+        if counts is None
+        else {
+            "separated_by_features": counts.by_features,
+            "separated_by_recurrence": counts.by_recurrence,
+            "separations_agree": int(counts.agree),
+        }
+    )
+    return {
+        "decided": found.decided,
+        "chaotic_by_sample": found.told_by_sample,
+        "undetected_share_below": found.undetected_share_below,
+        "missed_share_below": found.missed_share_below,
+        "most_periods": found.most_periods,
+        "followed_periods": found.followed_periods,
+        "needed_periods": found.needed_periods,
+        **separated,
+    }
 
 
-def _first_hit(scene: Scene) -> int:
-    """Return the mass that a chain's first stop hits; for a beam 1, its first mode."""
-    return integer_parameters(scene).get("contact[1].mass_number", 1)
-
-
-def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[Floats, Floats, Floats]:
-    """Return displacements, velocities and the start states of a plane, shape (y * x, variable)."""
-    numbers = float_parameters(scene, None)
-    own = np.array([numbers.get(name, 0.0) for name in scene.body.start_names])
-    across, along = _axes(scene, plane.number)
-    x, y = (np.linspace(*span, count) for span, count in zip(spans, plane.points, strict=True))
-    states = np.repeat(own[None], x.size * y.size, axis=0)
-    states[:, across], states[:, along] = np.tile(x, y.size), np.repeat(y, x.size)
-    return x, y, states
-
-
-def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return a mask of the states at time 0 beyond a stop, shape (state,)."""
-    modal = modal_displacements(scene, states[:, : states.shape[1] // 2])
-    beyond = np.zeros(len(states), np.bool_)
-    for contact in body.contacts:
-        at = modal @ contact.shape
-        beyond |= contact.direction * (at - contact.stop_at(body.phase)) > 0.0
-    return beyond
-
-
-def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span, Span], tuple[float, float]]:
-    """Return the ends of both axes, and the size of the scene's own motion."""
-    flow = BodyFlow(scene, workers=1)
-    try:
-        numbers = float_parameters(scene, None)
-        own = np.array([[numbers.get(name, 0.0) for name in flow.names]])
-        seen = [flow.follow(own, 1, first=True).states[0]]
-        for periods in (1, 2, 3, 5, 7, 11, 50, 100):
-            seen.append(flow.follow(seen[-1][None], periods).states[0])
-    finally:
-        flow.close()
-    half = own.shape[1] // 2
-    table = np.nan_to_num(np.abs(np.array([own[0], *seen])))
-    size = max(float(table[:, :half].max()), body.scale / float(np.abs(body.contacts[0].shape).max()) * 1e-3)
-    speed = max(float(table[:, half:].max()), size * body.angular_frequency)
-    x = plane.x or (-REACH * size, REACH * size)
-    y = plane.y or (-REACH * speed, REACH * speed)
-    if plane.x is None and not scene.body.IS_STRUCTURE:
-        # a plane beyond the stops has no starts
-        for contact in body.contacts:
-            stop = contact.stop_at(body.phase)
-            x = (x[0], min(x[1], stop)) if contact.direction > 0 else (max(x[0], stop), x[1])
-    elif plane.x is None and isinstance(scene.body, StructureBody):
-        x = _free_span(scene, body, own[:, :half], _axes(scene, plane.number)[0], x)
-    return (x, y), (size, speed)
-
-
-def _free_span(scene: Scene, body: ImpactingBody, own: Floats, across: int, span: Span) -> Span:
-    """Return the part of a span of one displacement that no stop or contact cuts off; all of it without such a part.
-
-    The other displacements are those of the scene's start, `own`, shape (1, displacement).
-    """
-    ends = np.repeat(own, 2, axis=0)
-    ends[:, across] = 0.0, 1.0
-    at_0, at_1 = modal_displacements(scene, ends)
-    low, high = span
-    for contact in body.contacts:
-        slope = contact.direction * float((at_1 - at_0) @ contact.shape)
-        room = contact.direction * (contact.stop_at(body.phase) - float(at_0 @ contact.shape))
-        if slope > 0.0:
-            high = min(high, room / slope)
-        elif slope < 0.0:
-            low = max(low, room / slope)
-    inner = ROUNDING * (high - low)  # an end on a contact stays on its free side
-    return (low + inner, high - inner) if low < high else span
-
-
-def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:
-    """Return the dataset of a plane: ends of the starts, attractors, borders."""
+def basins_dataset(
+    scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins, edges: list[Track] | None = None
+) -> xr.Dataset:
+    """Return the dataset of a plane: ends of the starts, attractors, borders, and edges that were tracked."""
     labels = found.labels.reshape(y.size, x.size)
-    across, along = _axes(scene, plane.number)
+    across, along = axes_of(scene, plane.number)
     most = max([len(each.states) for each in found.attractors], default=0)
     points = np.full((len(found.attractors), most, 2), np.nan)
     for place, attractor in enumerate(found.attractors):
@@ -210,60 +152,17 @@ def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basi
         "displacement_start": x,
         "velocity_start": y,
         "basin": labels,
-        "attractor_name": found.names,
-        "basin_fraction": found.fractions,
+        **attractor_values(found, mirrored_contacts(impacting_body(scene)), len(scene.stops)),
         "attractor_displacement": points[..., 0],
         "attractor_velocity": points[..., 1],
         "attractor_radius": np.array([each.radius for each in found.attractors]),
-        "attractor_impacts": np.array([each.impacts for each in found.attractors]).reshape(
-            -1, len(scene.stops)
-        ),
         "border_fraction": border_share(labels),
         "border_dimension": np.nan if dimension is None else dimension.value,
         "border_dimension_error": np.nan if dimension is None else dimension.error,
+        **({} if edges is None else edge_values(edges, (across, along))),
     }
-    attributes = scene_attributes(scene, HISTORY) | {
-        "units_system": scene.units,
-        "decided": found.decided,
-        "chaotic_by_sample": found.told_by_sample,
-        "undetected_share_below": found.undetected_share_below,
-    }
-    return TABLE.dataset(values, attributes, units=scene.units, of=_element(scene, plane.number))
-
-
-def _element(scene: Scene, number: int | None) -> str:
-    if not scene.body.IS_STRUCTURE:
-        return ""
-    place = _axes(scene, number)[0] + 1
-    return f" of {scene.body.ELEMENT} {place}"
-
-
-def span_of(text: str | None, name: str) -> Span | None:
-    """Return `LOW:HIGH` as two numbers; another text raises UsageError.
-
-    >>> span_of("-1:0.5", "x")
-    (-1.0, 0.5)
-    """
-    if text is None:
-        return None
-    parts = text.split(":")
-    try:
-        low, high = map(float, parts)
-    except ValueError:
-        raise UsageError(f"--{name}: expected LOW:HIGH, two numbers, got {text!r}.") from None
-    return low, high
-
-
-def points_of(text: str) -> tuple[int, int]:
-    """Return `N` or `NxM` as the starts along both axes; another text raises UsageError.
-
-    >>> points_of("200"), points_of("300x200")
-    ((200, 200), (300, 200))
-    """
-    parts = text.lower().split("x")
-    if len(parts) > 2 or not all(part.isascii() and part.isdigit() for part in parts):
-        raise UsageError(f"--points: expected a number of starts, or two as 300x200, got {text!r}.")
-    return int(parts[0]), int(parts[-1])
+    attributes = scene_attributes(scene, HISTORY) | {"units_system": scene.units} | search_attributes(found)
+    return TABLE.dataset(values, attributes, units=scene.units, of=element_of(scene, plane.number))
 
 
 @dataclass(eq=False)
@@ -278,13 +177,17 @@ class BasinsOfScene(Study[Basins]):
 
     scene: Scene
     plane: Plane
+    periods: int = MOST_PERIODS
+    edges: bool = False
 
     def __post_init__(self) -> None:
         self.plane.refuse()
+        if self.periods < 1:
+            raise UsageError(f"basins: periods: expected 1 at least, got {self.periods}.")
         self.scene = self.scene.unswept()
         body = impacting_body(self.scene)
-        _axes(self.scene, self.plane.number)
-        spans, scale = _spans(self.scene, body, self.plane)
+        axes_of(self.scene, self.plane.number)
+        spans, scale = spans_of(self.scene, body, self.plane)
         self.x, self.y, states = start_states(self.scene, self.plane, spans)
         beyond = beyond_stops(self.scene, body, states)
         if beyond.all():
@@ -294,14 +197,15 @@ class BasinsOfScene(Study[Basins]):
             [max(size, np.abs(ends).max()) for size, ends in zip(scale, spans, strict=True)], half
         )
         labels = np.where(beyond, BEYOND_A_STOP, UNDECIDED).astype(np.int16)
-        self.known = Basins(states, labels, sizes)
+        self.tracks: list[Track] = []
+        self._body = body
+        self.known = Basins(states, labels, sizes, most_periods=self.periods)
 
     @classmethod
     def prepare(cls, options: Options, stack: ExitStack) -> Self:
         """Open the scene, and place the starts."""
-        spans = span_of(options.x, "x"), span_of(options.y, "y")
-        plane = Plane(*spans, points_of(options.points), options.number)
-        return cls(opened_scene(options.scene, options.changes or ()), plane)
+        scene = opened_scene(options.scene, options.changes or ())
+        return cls(scene, plane_of(options), options.periods, options.edges)
 
     def rows(self) -> Generator[Basins, None, None]:
         """Follow the starts block by block."""
@@ -312,63 +216,124 @@ class BasinsOfScene(Study[Basins]):
                 self.status(f"{100.0 * now.decided:.1f} % of {now.possible} starts; {names}")
                 if now.attractors:
                     yield now
+            if self.edges:
+                yield from self._track(flow)
         finally:
             flow.close()
 
+    def _track(self, flow: BodyFlow) -> Generator[Basins, None, None]:
+        """Follow the edges between the basins."""
+        labels = self.known.labels.reshape(self.y.size, self.x.size)
+        for track in edge_tracks(self.known, labels, self._body, flow, block=BLOCK):
+            self.tracks.append(track)
+            self.status(f"edges: {len(self.tracks)}")
+            yield self.known
+
     def made(self) -> xr.Dataset:
         """Return the dataset of the plane as far as it is known."""
-        return basins_dataset(self.scene, self.plane, self.x, self.y, self.known)
+        edges = self.tracks if self.edges else None
+        return basins_dataset(self.scene, self.plane, self.x, self.y, self.known, edges)
 
     def print_results(self) -> None:
         """Print each attractor with its share, and the undecided starts."""
         found, data = self.known, self.dataset
         rows = table(
             f"Basins of attraction: {self.scene.title or self.scene.source}",
-            *("<attractor", ">share of the starts", "<displacement, velocity at forcing phase 0"),
+            *("<attractor", ">share of the starts", ">95 % confidence", ">multiplier a period"),
+            "<displacement, velocity at forcing phase 0",
         )
-        for place, name in enumerate(found.names):
+        ends = found.intervals
+        for place, (name, each) in enumerate(zip(found.names, found.attractors, strict=True)):
             states = np.column_stack(
                 [data[f"attractor_{what}"].values[place] for what in ("displacement", "velocity")]
             )
-            told_states = "; ".join(f"{a:.6g}, {b:.6g}" for a, b in states[:4] if np.isfinite(a))
+            shown = "; ".join(f"{a:.6g}, {b:.6g}" for a, b in states[:4] if np.isfinite(a))
             rows.add_row(
                 name,
                 f"{100.0 * found.fractions[place]:.2f} %",
-                told_states + (" ..." if len(states) > 4 else ""),
+                f"{100.0 * ends[place, 0]:.2f} to {100.0 * ends[place, 1]:.2f} %",
+                f"{each.multiplier:.5g}" if each.has_period else "",
+                shown + (" ..." if len(each.states) > 4 else ""),
             )
         wide_terminal().print(rows)
-        _say_rest(found, data)
+        say_search(found)
+        _say_partners(found, data["attractor_partner"].values.tolist())
+        _say_aperiodic(found)
+        _say_border(data)
+        if self.edges:
+            print_edges(self.tracks, found.names)
 
 
-def _say_rest(found: Basins, data: xr.Dataset) -> None:
+def say_search(found: Basins) -> None:
+    """Print how many starts are undecided, and the shares that may have been missed."""
     undecided = 1.0 - found.decided
     if undecided > 0.0:
-        say(f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known.")
+        say(
+            f"{100.0 * undecided:.3g} % of the starts came near to no attractor that is known in "
+            f"{found.followed_periods} periods."
+        )
+    if found.needed_periods > found.most_periods:
+        say(
+            f"The slowest motion needs {found.needed_periods} periods, more than the budget of "
+            f"{found.most_periods}. Raise --periods."
+        )
     if found.told_by_sample:
         say(
-            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were. Such a "
-            f"sample may miss an attractor with up to {100.0 * found.undetected_share_below:.2g} % of the starts "
+            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were."
+        )
+    if found.attractors:
+        say(
+            f"An attractor that was missed has less than {100.0 * found.missed_share_below:.2g} % of the plane "
             "(95 % confidence)."
         )
-    _say_chaotic(found)
+
+
+def _say_partners(found: Basins, partner: list[int]) -> None:
+    """Print the attractors that are mirror images of each other, or of themselves."""
+    for place, other in enumerate(partner):
+        if other > place:
+            say(f"{found.names[place]} and {found.names[other]} are mirror images of each other.")
+        elif other == place:
+            say(f"{found.names[place]} is its own mirror image.")
+
+
+def _say_aperiodic(found: Basins) -> None:
+    """Print the features of attractors without a period, and whether recurrence separates them, too."""
+    aperiodic = [
+        (name, each) for name, each in zip(found.names, found.attractors, strict=True) if not each.has_period
+    ]
+    for name, each in aperiodic:
+        if not each.is_one:
+            say(
+                "Chaotic runs differ by more than their own scatter: there may be several chaotic attractors."
+            )
+        else:
+            say(f"{name}: {_features_in_words(each)}.")
+    counts = found.separation
+    if counts is None:
+        return
+    if not counts.agree:
+        say(
+            f"Features of impacts separate {counts.by_features} of these attractors, recurrence in the strobe "
+            f"section {counts.by_recurrence}: they disagree."
+        )
+    elif counts.by_features > 1:
+        say("Features of impacts and recurrence in the strobe section separate the same attractors.")
+
+
+def _features_in_words(each: Attractor) -> str:
+    """Return impact rates, spreads of impact phases and the dimension of an attractor in words."""
+    features = each.features
+    rates = ", ".join(f"{rate:.3g} at stop {stop}" for stop, rate in enumerate(features.impacts, start=1))
+    spreads = ", ".join(f"{spread:.3g}" for spread in features.phase_spread)
+    dimension = f"dimension {features.dimension:.2f}" if features.dimension else "no dimension: a long period"
+    return f"impacts in a forcing period: {rates}; spread of impact phases {spreads} rad; {dimension}"
+
+
+def _say_border(data: xr.Dataset) -> None:
     share, dimension = float(data["border_fraction"]), float(data["border_dimension"])
     if np.isfinite(dimension):
         error = float(data["border_dimension_error"])
         say(f"{100.0 * share:.3g} % lie on a border, whose dimension is {dimension:.3f} +- {error:.3f}.")
     elif share > 0.0:
         say(f"{100.0 * share:.3g} % lie on a border.")
-
-
-def _say_chaotic(found: Basins) -> None:
-    """Print the impact rates that distinguish chaotic attractors, or that there may be several."""
-    chaotic = [
-        (name, each) for name, each in zip(found.names, found.attractors, strict=True) if each.is_chaotic
-    ]
-    for name, each in chaotic:
-        if not each.is_one:
-            say(
-                "Chaotic runs differ by more than their own scatter: there may be several chaotic attractors."
-            )
-        elif len(chaotic) > 1:
-            rates = ", ".join(f"{rate:.3g} at stop {stop}" for stop, rate in enumerate(each.impacts, start=1))
-            say(f"{name}: impacts in a forcing period: {rates}.")

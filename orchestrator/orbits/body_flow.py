@@ -13,10 +13,12 @@ import numpy as np
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
-from vibroimpact.analysis.orbits.basins import Ends, Floats
+from vibroimpact.analysis.orbits.basins import Ends, Floats, Section
 from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import ComponentError, UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.free_motion import FreeMotion
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.forces import phases_of_new_start
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
@@ -89,6 +91,19 @@ class BodyFlow:
         self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = scene.body.start_names
+        body = impacting_body(scene)
+        decay = body.slowest_decay * body.period
+        self.decay = decay if decay > 0.0 else math.inf
+        self._free = FreeMotion.of(scene, body)
+
+    @property
+    def free_state(self) -> Floats | None:
+        """State at forcing phase 0 of the steady motion without impacts; None where it hits a stop."""
+        return None if self._free is None else self._free.state
+
+    def stays_free(self, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Return a mask of the states from which no stop can be met: see `analysis.orbits.basins.Flow`."""
+        return np.zeros(len(states), np.bool_) if self._free is None else self._free.stays_free(states)
 
     def _loop(self, record: dict[str, Any]) -> PointLoop | _OneByOne:
         limits = {"execution.how": "auto", "execution.deadline": DEADLINE}
@@ -141,6 +156,20 @@ class BodyFlow:
             states = np.concatenate([_final(each) for each in columns])
             well &= np.concatenate([_went_well(each) for each in columns])
         return Blocks(np.stack(features, axis=1), states, well)
+
+    def impacts(self, state: Floats, periods: int) -> Floats:
+        """Return the impacts from a state at phase 0 on: see `analysis.orbits.edges.EdgeFlow`."""
+        (columns,) = self._run(self._measuring, state[None], (0, periods), first=False)
+        assert columns.impacts is not None
+        return columns.impacts.rows.copy()
+
+    def section(self, states: Floats, periods: int) -> Section:
+        """Return the motions at each forcing phase 0: see `analysis.orbits.basins.Flow`."""
+        tables = [each.periods for each in self._run(self._recording, states, (0, periods), first=False)]
+        rows = np.concatenate([table for table in tables if table is not None])
+        highest, lowest = rows[..., 0], rows[..., 1]
+        extremes = np.column_stack([lowest.min(axis=1, initial=np.inf), highest.max(axis=1, initial=-np.inf)])
+        return Section(rows[..., 2:4], extremes)
 
     def _features(self, columns: RunColumns, periods: int) -> Floats:
         assert columns.impacts is not None

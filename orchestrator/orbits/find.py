@@ -193,7 +193,9 @@ def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
         return orbit_of_impacts(impacting_body(scene), impacts_at({}))
 
 
-def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit | None:
+def orbit_of_impacts(
+    body: ImpactingBody, rows: Floats | None, *, longest: int = LONGEST
+) -> PeriodicOrbit | None:
     """Return the orbit of the last impacts of a run; None unless it has few periods."""
     if rows is None or not len(rows):
         return None
@@ -201,7 +203,7 @@ def orbit_of_impacts(body: ImpactingBody, rows: Floats | None) -> PeriodicOrbit 
         (rows[:, 0] - rows[0, 0] + (rows[0, 1] - rows[:, 1]) / body.angular_frequency) / body.period + 0.5
     )
     phases, contacts = rows[:, 1] + 2.0 * np.pi * turns, rows[:, 4].astype(int) - 1
-    for periods in range(1, LONGEST + 1):
+    for periods in range(1, longest + 1):
         count = int(np.count_nonzero(phases < phases[0] + 2.0 * np.pi * periods - REPEATS))
         if 2 * count > phases.size:
             return None

@@ -28,9 +28,9 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.transients import TransientsOf
-from vibroimpact.orchestrator.orbits.basins import beyond_stops
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
+from vibroimpact.orchestrator.orbits.planes import beyond_stops
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene

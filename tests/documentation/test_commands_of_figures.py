@@ -81,6 +81,8 @@ COMMANDS = {
     "basins examples/basins.toml --points 500 --x=-5:1 --y=-6:6 -o basins.nc --figure basins.png": Shown(
         ("87.23 %", "12.77 %", "1.132 +- 0.025")
     ),
+    "basins examples/basins.toml --parameter forcing.angular_frequency --from 0.9 --to 1.6 --values 36 --points 40 "
+    "--x=-2:1 --y=-3:3 --figure shares.png": Shown(("24.88 %", "0.19 % of the plane"), is_long=True),
     f"control {BIFURCATION} --from 1 --to 0.7 -o kept.nc --keep parts": Shown(
         ("Kept to 0.7107: kept to the end of the plan.", "1.3e-05 away"), is_long=True
     ),

@@ -20,8 +20,9 @@ from vibroimpact.analysis.orbits.basins import Basins
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit
 from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.orbits.basins import BasinsOfScene, Plane
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.follow import Following
+from vibroimpact.orchestrator.orbits.planes import Plane
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 

@@ -85,6 +85,9 @@ KINDS = {
     "map of Nordmark": "maps --kind nordmark --alpha 0.5 --gamma 0.1 --from -0.1 --to 0.1 --points 10",
     "map of square roots": "maps --kind square-root --from 0.1 --to 0.2 --points 10",
     "basins": "basins basins.toml --points 6",
+    "basins and edges": "basins basins.toml --points 6 --edges",
+    "shares of basins": "basins basins.toml --points 6 --parameter forcing.angular_frequency "
+    "--from 1 --to 1.2 --values 2",
     "control": "control forced.toml --from 0.9 --to 0.899 --step 0.001",
     "transients": "transients forced.toml --starts 2",
     "Lyapunov exponents": "lyapunov forced.toml --set record.recorded_periods=300",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
@@ -11,8 +12,10 @@ from vibroimpact.analysis.figures.families import register_results
 from vibroimpact.analysis.figures.page import canvas, label, legend_outside
 from vibroimpact.analysis.figures.sweep.diagrams import edges
 
-_COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
+COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
 _MARKS = "osD^vPX*"
+WIDE = 22
+"""Characters of a legend's entry up to which two entries fit side by side."""
 _UNDECIDED, _BEYOND = "#FFFFFF", "#5A5A5A"
 
 
@@ -20,7 +23,7 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     """Draw the attractor of each start state, and the attractors at forcing phase 0."""
     labels = dataset["basin"].values
     names = [str(name) for name in dataset["attractor_name"].values]
-    colours = [_COLOURS[place % len(_COLOURS)] for place in range(len(names))]
+    colours = [COLOURS[place % len(COLOURS)] for place in range(len(names))]
     figure = canvas(95)
     axis = figure.subplots()
     axis.pcolormesh(
@@ -36,7 +39,6 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     for place, colour in enumerate(colours):
         x = dataset["attractor_displacement"].values[place]
         y = dataset["attractor_velocity"].values[place]
-        share = float(dataset["basin_fraction"].values[place])
         axis.plot(
             x[np.isfinite(x)],
             y[np.isfinite(y)],
@@ -44,8 +46,10 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             color=colour,
             markeredgecolor="black",
             markersize=4.5,
-            label=f"{names[place]}: {100.0 * share:.3g} %",
+            label=f"{names[place]}: {_share(dataset, place)}",
         )
+    if "edge_orbit" in dataset:
+        _draw_edges(axis, dataset)
     for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
         if (labels == value).any():
             axis.plot([], [], "s", color=colour, markeredgecolor="black", markersize=4.5, label=words)
@@ -55,8 +59,25 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
         xlabel=label(dataset["displacement_start"]),
         ylabel=label(dataset["velocity_start"]),
     )
-    legend_outside(figure, axis, ncols=2)
+    longest = max(map(len, axis.get_legend_handles_labels()[1]), default=0)
+    legend_outside(figure, axis, ncols=2 if longest <= WIDE else 1)
     return figure
+
+
+def _draw_edges(axis: Axes, dataset: xr.Dataset) -> None:
+    """Draw the states at forcing phase 0 of the orbits on edges."""
+    for place, name in enumerate(map(str, dataset["edge_orbit"].values)):
+        x, y = (dataset[f"edge_{what}"].values[place] for what in ("displacement", "velocity"))
+        there = np.isfinite(x)
+        words = f"on an edge: {name.partition(')')[0]})" if name else "edge state without a known orbit"
+        axis.plot(x[there], y[there], "x" if name else "+", color="black", markersize=5.5, label=words)
+
+
+def _share(dataset: xr.Dataset, place: int) -> str:
+    """Return the share of an attractor with its confidence interval in words."""
+    names = ("basin_fraction", "basin_fraction_low", "basin_fraction_high")
+    share, *ends = (f"{100.0 * float(dataset[name].values[place]):.3g}" for name in names if name in dataset)
+    return f"{share} % ({' to '.join(ends)} %)" if ends else f"{share} %"
 
 
 register_results("basins", "basins of attraction", draw_basins)

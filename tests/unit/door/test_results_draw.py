@@ -110,7 +110,7 @@ def test_each_map_is_drawn(kind: str, scene: vi.Scene) -> None:
 
 def test_basins_are_drawn_and_bear_their_kind(scene: vi.Scene, tmp_path: Path) -> None:
     found = vi.basins(scene, (-1.0, 1.0), (-1.0, 1.0), (6, 6))
-    words = ("displacement start (m)", "velocity start (m/s)", "P(1,1): 100 %")
+    words = ("displacement start (m)", "velocity start (m/s)", "P(1,1): 100 % (90.3 to 100 %)")
     assert_shown(found, *words)
     vi.write_results(found, tmp_path / "basins.nc", kind=found.attrs["results_kind"])
     with vi.open_measured(tmp_path / "basins.nc") as opened:

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.orbits.basin_search import find_basins
 from vibroimpact.analysis.orbits.basins import (
     BEYOND_A_STOP,
     UNDECIDED,
     Basins,
     Ends,
     Floats,
-    border_dimension,
-    border_share,
-    find_basins,
+    Section,
 )
+from vibroimpact.analysis.orbits.borders import border_dimension, border_share
 from vibroimpact.analysis.orbits.chaotic_groups import Blocks, Feature
 from vibroimpact.analysis.orbits.classify import RunClass
 
@@ -60,6 +61,20 @@ class KnownMap:
         for _ in range(periods):
             logistic = np.clip(3.999 * logistic * (1.0 - logistic), 1e-9, 1.0 - 1e-9)
         return np.column_stack([4.0 + logistic, states[:, 1]])
+
+    decay = float("inf")
+    free_state = None
+
+    @staticmethod
+    def stays_free(states: Floats) -> NDArray[np.bool_]:
+        return np.zeros(len(states), np.bool_)
+
+    def section(self, states: Floats, periods: int) -> Section:
+        points = [states]
+        for _ in range(periods - 1):
+            points.append(self._after(points[-1], 1))
+        table = np.stack(points, axis=1)
+        return Section(table, np.column_stack([table[..., 0].min(axis=1), table[..., 0].max(axis=1)]))
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
         self.followed += len(states) * periods if len(states) > 1 else 0
