@@ -86,6 +86,7 @@ def follow(
     periods: int = 1,
     seed: Sequence[tuple[float, int]] | None = None,
     doublings: int = 1,
+    grazes: int = 1,
     step: float = 0.01,
     second: str | None = None,
     second_range: tuple[float, float] | None = None,
@@ -110,6 +111,8 @@ def follow(
         their stops, from 1. This orbit is followed in both directions.
     doublings : int
         Number of successive period doublings whose branches are followed.
+    grazes : int
+        Number of successive grazes at which other orbits, with more or fewer impacts, are followed.
     step : float
         Largest step along a branch. The parameter is scaled to a range of 1, the phases are in radians.
     second : str, optional
@@ -143,6 +146,7 @@ def follow(
     study = Following(
         *(alone, parameter, start, stop, impacts, periods, seed),
         doublings=doublings,
+        grazes=grazes,
         step=step,
         second=second,
         second_range=second_range,

@@ -58,6 +58,7 @@ class SpecialOrbit(IntEnum):
     graze = 4
     graze_between_impacts = 5
     stability_change = 6
+    branch_point = 7
 
 
 class OrbitClass(IntEnum):
@@ -250,6 +251,7 @@ _RULES = (
     VariableRule(
         "orbit_stable", ("run",), "1", "whether all its multipliers are within the unit circle", np.int8
     ),
+    VariableRule("orbit_symmetric", ("run",), "1", "whether it is its own mirror image", np.int8),
     VariableRule("orbit_special", ("run",), "1", "what happens to it here", np.int8, _flags(SpecialOrbit)),
     VariableRule("orbit_multiplier_real", ("run",), "1", "real part of its largest Floquet multiplier"),
     VariableRule(

@@ -15,6 +15,7 @@ from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
 from vibroimpact.analysis.orbits.loci import Locus
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SAMPLES = 256
@@ -128,6 +129,7 @@ def _dataset(
         "orbit_branch": np.array(numbers, dtype=np.int32),
         "orbit_periods": np.array([each.periods for each in orbits], dtype=np.int32),
         "orbit_stable": np.array([each.is_stable for each in orbits], dtype=np.int8),
+        "orbit_symmetric": np.array([is_symmetric(each) for each in orbits], dtype=np.int8),
         "orbit_special": np.array(special, dtype=np.int8),
         "orbit_multiplier_real": largest.real,
         "orbit_multiplier_imaginary": largest.imag,

@@ -1,4 +1,4 @@
-"""Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.7.
+"""Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.13.
 
 The unknowns are the phases of the impacts and the parameter. A step goes along the branch (pseudo-arclength), so that
 a fold is an ordinary point. Each event is the sign change of a function along the branch; steps of partial length
@@ -7,22 +7,16 @@ narrow it down to rounding.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.periodic import (
-    CLOSE,
-    TOUCHES,
-    TURN,
-    OrbitError,
-    PeriodicOrbit,
-    evaluated,
-)
-from vibroimpact.analysis.orbits.sign_changes import determinant, passes_doubling, turning, turns_round
+from vibroimpact.analysis.orbits.branch_points import LEVEL, NEAR, bordered_determinant, interpolated_zeros
+from vibroimpact.analysis.orbits.periodic import CLOSE, TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.sign_changes import determinant, is_explained, turning, turns_round
+from vibroimpact.analysis.orbits.symmetry import is_symmetric, phase_differences
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 MOST_NEWTON = 12
@@ -35,11 +29,15 @@ CORNER = 1e-3
 SHORTEST = 1e-9
 """Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
-"""Kind of a point where the stability changes for none of the known reasons, for example at a branch point."""
-MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2}
-"""Number of multipliers that pass the unit circle at a point of each kind."""
+"""Kind of a point where the stability changes for none of the known reasons."""
+BRANCH_POINT = "branch point"
+"""Kind of a point where another branch of orbits with the same impacts crosses."""
 CLOSED = "closed"
 """End of a branch that returns to its first orbit."""
+TOGETHER = 1e-3
+"""Difference of the phases of two impacts, rad, below which a branch that ends there ends because of it."""
+INTERPOLATED = 100.0
+"""Distance from the stops at an interpolated branch point, over that of orbits, above which it is none."""
 LOCATED = 1e-13
 """Width of a bracket, over the step along the branch, below which a point counts as found."""
 
@@ -83,11 +81,19 @@ class BranchOrbit:
         Its phases need not lie in the first period: they continue from orbit to orbit.
     tangent : array, shape (p + 1,)
         Direction of the branch: phases, then the parameter over its range.
+    border : float
+        Determinant of the equations and the tangent, which changes its sign at a branch point: equations.md 4.13.
     """
 
     value: float
     orbit: PeriodicOrbit
     tangent: Floats
+    border: float
+
+    @property
+    def turned(self) -> BranchOrbit:
+        """The orbit on the branch in the other direction."""
+        return BranchOrbit(self.value, self.orbit, -self.tangent, -self.border)
 
     @cached_property
     def tests(self) -> dict[str, float]:
@@ -97,6 +103,7 @@ class BranchOrbit:
         fast = float(np.prod(np.minimum(orbit.velocities, 1.0)))
         scale = orbit.body.scale
         tests = {
+            BRANCH_POINT: self.border,
             "fold": float(self.tangent[-1]),
             "period doubling": determinant(orbit.monodromy + np.eye(size)) * fast,
             "graze": float(orbit.velocities.min()),
@@ -114,8 +121,8 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        `fold`, `period doubling`, `torus`, `graze` (an impact without speed), `graze between impacts` (the orbit would
-        pass through a stop beyond it), or `stability change` without a known cause.
+        `fold`, `period doubling`, `torus`, `branch point` (another branch crosses), `graze` (an impact without speed),
+        `graze between impacts` (a maximum touches a stop), or `stability change` (no known cause).
     at : BranchOrbit
     place : int
         Index of the next orbit of the branch.
@@ -155,6 +162,12 @@ class Branch:
     def full_name(self) -> str:
         """P(p,q), with the stops of its impacts if the body has several."""
         return self.orbits[0].orbit.full_name
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether its orbits are their own mirror images; single ones of another branch may be, too."""
+        count = len(self.orbits)
+        return all(is_symmetric(self.orbits[k].orbit) for k in {count // 3, count // 2})
 
     @property
     def is_closed(self) -> bool:
@@ -206,54 +219,36 @@ class Follower:
 
     def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
         """Follow one way, at first towards higher (+1) or lower (-1) values; the branch grows with each orbit."""
-        start = self._first(orbit, value, sign)
-        yield from self._orbits(branch, start)
+        first = self.on_branch(orbit, value, None)
+        is_backward = first.tangent[-1] * sign < 0.0 or first.tangent[-1] == 0.0 > sign
+        yield from self._orbits(branch, first.turned if is_backward else first)
 
-    def leave(self, branch: Branch, doubling: SpecialPoint) -> Iterator[BranchOrbit]:
-        """Follow the orbits of twice the period that begin at a period doubling; the branch grows with each."""
-        once = doubling.at.orbit
-        phases = np.concatenate([once.phases, once.phases + TURN * once.periods])
-        twice = PeriodicOrbit(
-            once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)
-        )
-        slopes = evaluated(once.body, twice.contacts, phases, twice.periods).distance_slopes
-        away = np.linalg.svd(slopes)[2][-1]
-        # one half of the train comes earlier, the other later
-        half = 0.5 * (away[: once.phases.size] - away[once.phases.size :])
-        tangent = np.append(np.concatenate([half, -half]), 0.0)
-        start = BranchOrbit(doubling.at.value, twice, tangent / np.linalg.norm(tangent))
+    def leave(self, branch: Branch, start: BranchOrbit) -> Iterator[BranchOrbit]:
+        """Follow orbits that begin at a special point, in the direction of `start`; the branch grows with each."""
         yield from self._orbits(branch, start, born=True)
-
-    def _first(self, orbit: PeriodicOrbit, value: float, sign: float) -> BranchOrbit:
-        tangent = self._tangent(orbit, value, None)
-        if tangent[-1] * sign < 0.0 or (tangent[-1] == 0.0 and sign < 0.0):
-            tangent = -tangent
-        return BranchOrbit(value, orbit, tangent)
 
     def _orbits(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
         now, step, longest = start, 0.1 * self.settings.longest, self.settings.longest
-        if not born:
+        if not (born and now.orbit.turns > 1):
             branch.orbits.append(now)
             yield now
         while len(branch.orbits) < self.settings.most_orbits:
-            found = self._step(now, step)
-            if found is None:
+            found = self.step(now, step)
+            too_near = found is not None and abs(found[0].border) < NEAR * abs(now.border)
+            if found is None or too_near or (born and not found[0].orbit.is_physical):
                 step *= 0.5
                 if step < SHORTEST * longest:
-                    branch.ends.append(f"cannot be followed beyond {now.value:.11g}")
+                    branch.ends.append(f"cannot be followed beyond {now.value:.11g}{self._obstacle(now)}")
                     return
                 continue
             taken, newton = found
-            if born:  # an orbit next to the doubling has no special points of its own yet
-                born, now = False, taken
-                branch.orbits.append(taken)
-                yield taken
-                continue
-            closing = self._closing_step(branch.orbits[0], now, taken)
+            # an orbit next to its origin has no special points of its own yet
+            closing = None if born else self._closing_step(branch.orbits[0], now, taken)
             if closing is not None:
                 step, taken = closing
-            if (yield from self._passed(branch, now, taken, step)):
+            if not born and (yield from self._passed(branch, now, taken, step)):
                 return
+            born = False
             branch.orbits.append(taken)
             yield taken
             if closing is not None:
@@ -263,6 +258,17 @@ class Follower:
             step = min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
         branch.ends.append(f"{self.settings.most_orbits} orbits")
 
+    def _obstacle(self, now: BranchOrbit) -> str:
+        """Return the reason why no orbit is found beyond one, after a colon; an empty text if none is known."""
+        gaps = np.diff(now.orbit.phases, append=now.orbit.phases[0] + TURN * now.orbit.periods)
+        if gaps.min() < TOGETHER:
+            return ": two impacts come together"
+        try:
+            self.matrix(now.orbit, now.orbit.phases, now.value + 1e-6 * self.settings.span * now.tangent[-1])
+        except OrbitError as problem:
+            return f": {problem}"
+        return ""
+
     def _passed(
         self, branch: Branch, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> Generator[BranchOrbit, None, bool]:
@@ -270,6 +276,8 @@ class Follower:
         for _, kind, at in self._events_in_order(now, taken, step):
             if kind not in at.tests and kind != STABILITY_CHANGE:
                 branch.ends.append(kind)
+                if kind.startswith(BRANCH_POINT):
+                    branch.points.append(SpecialPoint(BRANCH_POINT, at, len(branch.orbits)))
                 if at is not now:
                     branch.orbits.append(at)
                     yield at
@@ -284,9 +292,10 @@ class Follower:
 
     # ---- one step ----
 
-    def _residual(
+    def residual(
         self, orbit: PeriodicOrbit, phases: Floats, value: float
     ) -> tuple[Floats, Floats, PeriodicOrbit]:
+        """Return distances from the stops, their slopes, and the orbit, for other phases and another parameter."""
         body = self._body_at(value)
         found = evaluated(body, orbit.contacts, phases, orbit.periods)
         made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
@@ -301,13 +310,20 @@ class Follower:
         ]
         return (ends[0] - ends[1]) * (self.settings.span / (2.0 * change))
 
-    def _tangent(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> Floats:
-        _, slopes, _ = self._residual(orbit, orbit.phases, value)
-        matrix = np.column_stack([slopes, self._over_value(orbit, orbit.phases, value)])
-        tangent: Floats = np.linalg.svd(matrix)[2][-1]
-        return -tangent if before is not None and tangent @ before < 0.0 else tangent
+    def matrix(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
+        """Return the derivatives of the distances by all unknowns, shape (p, p + 1)."""
+        slopes = evaluated(self._body_at(value), orbit.contacts, phases, orbit.periods).distance_slopes
+        return np.column_stack([slopes, self._over_value(orbit, phases, value)])
 
-    def _step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
+    def on_branch(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> BranchOrbit:
+        """Return an orbit with the direction of its branch, which is near to a direction if there is one."""
+        matrix = self.matrix(orbit, orbit.phases, value)
+        tangent: Floats = np.linalg.svd(matrix)[2][-1]
+        if before is not None and tangent @ before < 0.0:
+            tangent = -tangent
+        return BranchOrbit(value, orbit, tangent, bordered_determinant(matrix, tangent))
+
+    def step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
         """Return the orbit a step further, and the number of Newton steps; None without an orbit that near."""
         span = self.settings.span
         phases = now.orbit.phases + step * now.tangent[:-1]
@@ -316,7 +332,7 @@ class Follower:
         try:
             across = self._over_value(now.orbit, phases, value)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                distances, slopes, orbit = self._residual(now.orbit, phases, value)
+                distances, slopes, orbit = self.residual(now.orbit, phases, value)
                 error = float(np.abs(distances).max())
                 small = error <= CLOSE * orbit.body.scale
                 if small and error >= 0.5 * least:
@@ -332,12 +348,11 @@ class Follower:
             else:
                 if not least <= 1e3 * CLOSE * now.orbit.body.scale:
                     return None
-            tangent = self._tangent(orbit, value, now.tangent)
+            taken = self.on_branch(orbit, float(value), now.tangent)
         except (OrbitError, np.linalg.LinAlgError):
             return None
-        if tangent @ now.tangent < np.cos(self._most_turn(now.orbit, orbit, step)):
-            return None
-        return BranchOrbit(float(value), orbit, tangent), newton
+        turn = self._most_turn(now.orbit, orbit, step)
+        return (taken, newton) if taken.tangent @ now.tangent >= np.cos(turn) else None
 
     def _most_turn(self, before: PeriodicOrbit, after: PeriodicOrbit, step: float) -> float:
         """Return the largest turn of a step: up to a right angle at a yield velocity, where branches have corners."""
@@ -357,19 +372,14 @@ class Follower:
         if farther > 2.0 * float(np.linalg.norm(beyond - before)):
             return None  # another part of the branch passes the same plane
         step = float(now.tangent @ self._difference(now, first))
-        found = self._step(now, step) if step > 0.0 else None
+        found = self.step(now, step) if step > 0.0 else None
         return None if found is None else (step, found[0])
 
     def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
         """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
-        whole = TURN * one.orbit.periods
-        turned = [
-            np.append(other.orbit.phases[k:], other.orbit.phases[:k] + whole) for k in _shifts(one, other)
-        ]
-        differences = [each - one.orbit.phases for each in turned]
-        differences = [each - TURN * np.round(each.mean() / TURN) for each in differences]
-        nearest = min(differences, key=lambda each: float(np.abs(each).max()))
-        return np.append(nearest, (other.value - one.value) / self.settings.span)
+        apart = phase_differences(one.orbit, other.orbit)
+        assert apart is not None, "orbits of one branch hit their stops in one order"
+        return np.append(apart, (other.value - one.value) / self.settings.span)
 
     # ---- events of a step ----
 
@@ -389,7 +399,7 @@ class Follower:
         same, changed, at = 0.0, step, taken
         while changed - same > LOCATED * step:
             middle = 0.5 * (same + changed)
-            found = self._step(now, middle)
+            found = self.step(now, middle)
             if found is None:
                 break
             if found[0].orbit.is_stable == now.orbit.is_stable:
@@ -401,16 +411,20 @@ class Follower:
     def _events(
         self, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> Iterator[tuple[float, str, BranchOrbit]]:
-        settings = self.settings
+        settings, is_level = self.settings, False
         for kind in now.tests:
             sign, other = now.tests[kind], taken.tests[kind]
             if np.sign(sign) * np.sign(other) < 0.0 and np.isfinite(sign + other):
-                found = self._located(now, step, _test_of(kind))
-                if found is not None and (kind != "torus" or turns_round(found[1].orbit.multipliers)):
-                    yield found[0], kind, found[1]
-        if passes_doubling(now.orbit, taken.orbit):
-            once = f"P({now.orbit.phases.size // 2},{now.orbit.periods // 2})"
-            yield 0.0, f"period doubling of {once}", now
+                if kind == BRANCH_POINT:
+                    found = self._branch_point(now, step)
+                    is_level = found is not None and abs(found[1].tangent[-1]) < LEVEL
+                else:
+                    found = self._located(now, step, _test_of(kind))
+                if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
+                    continue
+                # a branch that is level at a branch point turns because of the other branch
+                if kind != "fold" or not is_level:
+                    yield found[0], _as_end(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
                 yield 0.0, "end of the range", now
@@ -418,6 +432,24 @@ class Follower:
                 found = self._located(now, step, _beyond(bound))
                 if found is not None:
                     yield found[0], "end of the range", found[1]
+
+    def _branch_point(self, now: BranchOrbit, step: float) -> tuple[float, BranchOrbit] | None:
+        """Return the place along a step where another branch crosses, and the orbit there: equations.md 4.13."""
+        span = self.settings.span
+
+        def at(place: float) -> tuple[Floats, float] | None:
+            found = (now, 0) if place == 0.0 else self.step(now, place)
+            if found is None:
+                return None
+            moved = found[0].orbit.phases - now.orbit.phases
+            return np.append(moved, (found[0].value - now.value) / span), found[0].border
+
+        for place, moved, slopes in interpolated_zeros(at, step):
+            value = now.value + float(moved[-1]) * span
+            distances, _, orbit = self.residual(now.orbit, now.orbit.phases + moved[:-1], value)
+            if np.abs(distances).max() <= INTERPOLATED * CLOSE * orbit.body.scale:
+                return place, BranchOrbit(value, orbit, slopes / np.linalg.norm(slopes), 0.0)
+        return None
 
     def _located(
         self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
@@ -428,7 +460,7 @@ class Follower:
         missing = []
 
         def at(part: float) -> float:
-            found = (now, 0) if part == 0.0 else self._step(now, part)
+            found = (now, 0) if part == 0.0 else self.step(now, part)
             if found is None:
                 missing.append(part)
                 return float(np.nan)
@@ -438,29 +470,24 @@ class Follower:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
         except (ValueError, RuntimeError):
             return None
-        found = self._step(now, part) if part > 0.0 and not missing else None
+        found = self.step(now, part) if part > 0.0 and not missing else None
         return None if found is None else (part, found[0])
-
-
-def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:
-    """Tell whether two orbits have the same stability, or points of these kinds between them explain the change.
-
-    Each point moves the number of multipliers of its kind across the unit circle, outwards or inwards. A graze explains
-    any change: multipliers are unbounded next to it.
-    """
-    if before.is_stable == after.is_stable or "graze" in kinds:
-        return True
-    moved = [MULTIPLIERS_OF[kind] for kind in kinds if kind in MULTIPLIERS_OF]
-    outside = [int((np.abs(each.multipliers) >= 1.0).sum()) for each in (before, after)]
-    change = outside[1] - outside[0]
-    return any(
-        change == sum(way * count for way, count in zip(ways, moved, strict=True))
-        for ways in itertools.product((-1, 1), repeat=len(moved))
-    )
 
 
 def _test_of(kind: str) -> Callable[[BranchOrbit], float]:
     return lambda orbit: orbit.tests[kind]
+
+
+def _as_end(kind: str, now: PeriodicOrbit, at: PeriodicOrbit) -> str:
+    """Return the kind of a point, or the end of a branch that would go on as a copy of itself.
+
+    Beyond an orbit of half the period both halves change places. Beyond a symmetric orbit its mirror image follows.
+    """
+    if kind == BRANCH_POINT and at.turns > 1:
+        return f"period doubling of {at.once.name}"
+    if kind == BRANCH_POINT and is_symmetric(at) and not is_symmetric(now):
+        return f"{BRANCH_POINT} of the symmetric {at.name}"
+    return kind
 
 
 def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
@@ -470,20 +497,10 @@ def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
 def joined(backward: Branch, forward: Branch) -> Branch:
     """Return both ways from one orbit as one branch, from the end of the first to the end of the second."""
     count = len(backward.orbits)
-    turned = [BranchOrbit(each.value, each.orbit, -each.tangent) for each in reversed(backward.orbits)]
+    turned = [each.turned for each in reversed(backward.orbits)]
     points = [
-        SpecialPoint(
-            point.kind,
-            BranchOrbit(point.at.value, point.at.orbit, -point.at.tangent),
-            count - 1 - point.place,
-        )
+        SpecialPoint(point.kind, point.at.turned, count - 1 - point.place)
         for point in reversed(backward.points)
     ]
     points += [SpecialPoint(point.kind, point.at, point.place + count - 1) for point in forward.points]
     return Branch(forward.origin, turned + forward.orbits[1:], points, backward.ends + forward.ends)
-
-
-def _shifts(one: BranchOrbit, other: BranchOrbit) -> list[int]:
-    """Return the shifts of an orbit's impacts for which its stops are in the order of another orbit."""
-    contacts = other.orbit.contacts
-    return [k for k in range(contacts.size) if (np.roll(contacts, -k) == one.orbit.contacts).all()]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
-OPPOSITE = 0.9
-"""Cosine of the angle between differences of the halves; below its negative the differences are opposite."""
+MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2, "branch point": 1}
+"""Number of multipliers that pass the unit circle at a point of each kind."""
 
 
 def determinant(matrix: Floats) -> float:
@@ -33,15 +36,18 @@ def turns_round(multipliers: NDArray[np.complex128]) -> bool:
     return bool(abs(nearest.imag) > 1e-6 and abs(abs(nearest) - 1.0) < 1e-6)
 
 
-def passes_doubling(before: PeriodicOrbit, after: PeriodicOrbit) -> bool:
-    """Tell whether a branch passes an orbit of half the period between two orbits: both halves change places there."""
-    one, other = _half_difference(before), _half_difference(after)
-    return bool(one @ other < -OPPOSITE * np.linalg.norm(one) * np.linalg.norm(other))
+def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:
+    """Tell whether two orbits have the same stability, or points of these kinds between them explain the change.
 
-
-def _half_difference(orbit: PeriodicOrbit) -> Floats:
-    """Return the difference of an orbit's second half from its first, rad of each impact; empty if stops differ."""
-    half, odd = divmod(orbit.phases.size, 2)
-    if odd or orbit.periods % 2 or (orbit.contacts[:half] != orbit.contacts[half:]).any():
-        return np.empty(0)
-    return np.asarray(orbit.phases[half:] - orbit.phases[:half] - 0.5 * TURN * orbit.periods)
+    Each point moves the number of multipliers of its kind across the unit circle, outwards or inwards. A graze explains
+    any change: multipliers are unbounded next to it.
+    """
+    if before.is_stable == after.is_stable or "graze" in kinds:
+        return True
+    moved = [MULTIPLIERS_OF[kind] for kind in kinds if kind in MULTIPLIERS_OF]
+    outside = [int((np.abs(each.multipliers) >= 1.0).sum()) for each in (before, after)]
+    change = outside[1] - outside[0]
+    return any(
+        change == sum(way * count for way, count in zip(ways, moved, strict=True))
+        for ways in itertools.product((-1, 1), repeat=len(moved))
+    )

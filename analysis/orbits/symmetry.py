@@ -1,14 +1,17 @@
-"""Mirror symmetry of bodies between equal stops."""
+"""Mirror symmetry of bodies between equal stops, and orbits that are compared, also with mirror images: 4.13."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, ordered
 from vibroimpact.fmus.bodies.impacting_body import Complexes, Contact, Floats, ImpactingBody
 
 EQUAL = 1e-12
 """Difference, over the larger size, up to which numbers of a body and of its mirror image are equal."""
+ALIKE = 1e-6
+"""Difference of phases, rad, up to which two orbits at one value of the parameter are the same."""
 
 
 def mirrored_contacts(body: ImpactingBody) -> NDArray[np.int32] | None:
@@ -31,7 +34,7 @@ def mirrored_contacts(body: ImpactingBody) -> NDArray[np.int32] | None:
 
 def _is_image(one: Contact, other: Contact) -> bool:
     """Tell whether the mirror image of a stop, half a period later, is another one."""
-    if abs(one.restitution - other.restitution) > EQUAL:
+    if abs(one.restitution - other.restitution) > EQUAL or one.yield_velocity != other.yield_velocity:
         return False
     orders = {*one.motion, *other.motion}
     here = np.array([one.position, *(one.motion.get(n, 0j) for n in sorted(orders))])
@@ -43,3 +46,40 @@ def _is_image(one: Contact, other: Contact) -> bool:
 
 def _equal(one: Floats | Complexes, other: Floats | Complexes) -> bool:
     return bool(np.abs(one - other).max() <= EQUAL * max(np.abs(one).max(), np.abs(other).max()))
+
+
+def mirror_image(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
+    """Return the mirror image of an orbit, half a period later; None if its body has no mirror symmetry."""
+    contacts = mirrored_contacts(orbit.body)
+    if contacts is None:
+        return None
+    later = orbit.phases + 0.5 * TURN
+    return ordered(
+        PeriodicOrbit(orbit.body, orbit.periods, later, contacts[orbit.contacts], orbit.velocities)
+    )
+
+
+def is_symmetric(orbit: PeriodicOrbit) -> bool:
+    """Tell whether an orbit is its own mirror image."""
+    image = None if orbit.periods % 2 == 0 else mirror_image(orbit)
+    return image is not None and are_alike(orbit, image)
+
+
+def phase_differences(one: PeriodicOrbit, other: PeriodicOrbit) -> Floats | None:
+    """Return the phases of an orbit less those of another, counted from the impact and period that fit best.
+
+    None if their stops are hit in another order.
+    """
+    if one.contacts.size != other.contacts.size or one.periods != other.periods:
+        return None
+    whole = TURN * one.periods
+    shifts = [k for k in range(one.contacts.size) if (np.roll(other.contacts, -k) == one.contacts).all()]
+    turned = [np.append(other.phases[k:], other.phases[:k] + whole) - one.phases for k in shifts]
+    differences = [each - TURN * np.round(each.mean() / TURN) for each in turned]
+    return min(differences, key=lambda each: float(np.abs(each).max()), default=None)
+
+
+def are_alike(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
+    """Tell whether two orbits of one body are the same, from whichever impact and period they are counted."""
+    apart = phase_differences(one, other)
+    return apart is not None and bool(np.abs(apart).max() < ALIKE)

@@ -12,10 +12,10 @@ from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, 
 class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
-    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid, the
-    force harmonic. First orbits are searched along the range. --seed gives one for the scene as it is, --from-dataset
-    one at the values of its run. With --second, folds, period doublings and grazes are curves over both numbers. The
-    curves are then written and drawn, and the branches are printed.
+    Folds, branch points, period doublings, tori and grazes are located and printed, and branches that begin there are
+    followed. The stops must be rigid, the force harmonic. First orbits are searched along the range. --seed gives one
+    for the scene as it is, --from-dataset one at the values of its run. With --second, folds, period doublings and
+    grazes are curves over both numbers. The curves are then written and drawn, and the branches are printed.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
@@ -34,6 +34,7 @@ class Follow(Operation):
     from_dataset: FromDataset = None
     run: Run = None
     doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
+    grazes: Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")] = 1
     step: Annotated[float, Option(help="Largest step along a branch, relative to the range.")] = 0.01
     second: Annotated[
         str | None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
+from vibroimpact.analysis.orbits.departures import Departure, departures, passes
 from vibroimpact.analysis.orbits.following import (
+    BRANCH_POINT,
     Branch,
     BranchOrbit,
     Follower,
@@ -22,6 +24,7 @@ from vibroimpact.analysis.orbits.following import (
     joined,
 )
 from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
+from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, Either, Message, message
@@ -38,9 +41,22 @@ from vibroimpact.orchestrator.scene.keys import coordinate_name
 HISTORY = "periodic orbits followed by vibroimpact"
 SAME_ORBIT = 0.02
 """Distance, in ranges of the parameter and radians, below which an orbit lies on a known branch."""
+MOST_BRANCHES = 256
+"""Number of branches from which on no more are begun at special points."""
+FOLLOWED_TURNS = 2
+"""Number of turns of a grazing orbit up to which the orbits that meet it are followed."""
 
 Followings = Iterator[tuple[Branch, BranchOrbit]]
 """Each new orbit, and the branch that it extends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """A graze of a branch, and the branches of other orbits that begin there."""
+
+    branch: Branch
+    point: SpecialPoint
+    departures: list[Departure]
 
 
 @dataclass(slots=True)
@@ -52,6 +68,10 @@ class Followed:
     """Key of the scene that is varied."""
     branches: list[Branch] = field(default_factory=list)
     """The branches so far."""
+    meetings: list[Meeting] = field(default_factory=list)
+    """The grazes of these branches, with the orbits that meet there."""
+    is_cut_short: bool = False
+    """Whether branches begin at special points that were not followed, since there are too many."""
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -188,10 +208,11 @@ def follow_branches(
     periods: int = 1,
     seed: Seed | None = None,
     doublings: int = 1,
+    grazes: int = 1,
     longest: float = 0.01,
     looking: Callable[[float], None] = lambda value: None,
 ) -> Followings:
-    """Follow orbits P(p,q), and branches that leave them at period doublings; yield each orbit with its branch.
+    """Follow orbits P(p,q), and branches that begin at their special points; yield each orbit with its branch.
 
     Branches go into `followed`, also unfinished branches. `longest` is the largest step: the range of the parameter
     counts as 1, a radian of all phases as 1. For the other arguments see `vibroimpact.follow`. `looking` is called
@@ -201,7 +222,7 @@ def follow_branches(
     begin with.
     """
     scene, parameter = followed.scene, followed.parameter
-    _refuse(start, stop, impacts, periods, doublings, longest)
+    _refuse(start, stop, impacts, periods, doublings, grazes, longest)
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
@@ -217,7 +238,7 @@ def follow_branches(
                 _other_orbits(scene, parameter, settings, (impacts or 1, periods)),
             )
         )
-    yield from _doubled(follower, followed, doublings)
+    yield from _departed(follower, followed, doublings, grazes)
 
 
 def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
@@ -288,36 +309,55 @@ def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: F
             result.branches.append(joined(backward, forward) if forward.orbits else backward)
 
 
-def _doubled(follower: Follower, result: Followed, doublings: int) -> Followings:
-    begin = 0
-    for _ in range(doublings):
-        parents, begin = result.branches[begin:], len(result.branches)
-        for parent in parents:
-            for point in parent.points:
-                if point.kind != "period doubling" or _leads_back(
-                    result.branches, point.at, follower.settings
-                ):
+def _departed(follower: Follower, result: Followed, doublings: int, grazes: int) -> Followings:
+    """Follow the branches that begin at the special points of others.
+
+    Doublings and grazes are followed one after the other up to their numbers, branch points always.
+    """
+    waiting = deque((branch, doublings, grazes) for branch in result.branches)
+    while waiting and not result.is_cut_short:
+        result.is_cut_short = len(result.branches) >= MOST_BRANCHES
+        parent, doublings, grazes = waiting.popleft()
+        for point in parent.points:
+            is_graze, is_doubling = point.kind.startswith("graze"), point.kind == "period doubling"
+            if is_doubling and not doublings:
+                continue
+            found = departures(follower, point)
+            if is_graze:
+                result.meetings.append(Meeting(parent, point, found))
+                longest = FOLLOWED_TURNS * point.at.orbit.periods if grazes else 0
+                found = [each for each in found if each.start.orbit.periods <= longest]
+            for departure in found:
+                others = [each for each in result.branches if each is not parent or is_graze or is_doubling]
+                if any(passes(each, departure.start, follower.settings.span) for each in others):
                     continue
-                child = Branch(f"{parent.full_name} at its period doubling {point.at.value:.11g}")
-                result.branches.append(child)
-                try:
-                    for each in follower.leave(child, point):
-                        yield child, each
-                finally:
-                    if not child.orbits:
-                        result.branches.pop()
+                count = len(result.branches)
+                yield from _leaving(follower, departure, parent, result)
+                waiting.extend(
+                    (each, doublings - is_doubling, grazes - is_graze) for each in result.branches[count:]
+                )
 
 
-def _leads_back(branches: list[Branch], doubling: BranchOrbit, settings: FollowSettings) -> bool:
-    """Return whether a branch of twice the period has reached this doubling from its other end."""
-    twice = 2 * doubling.orbit.periods
-    near = SAME_ORBIT * settings.span
-    return any(
-        branch.orbits
-        and branch.orbits[-1].orbit.periods == twice
-        and abs(branch.orbits[-1].value - doubling.value) < 0.01 * near
-        for branch in branches
-    )
+def _leaving(follower: Follower, departure: Departure, parent: Branch, result: Followed) -> Followings:
+    """Follow a branch from a special point of another one; an interruption keeps the orbits so far."""
+    start = departure.start
+    origin = f"{parent.full_name} at its {departure.cause} {start.value:.11g}"
+    ways = [Branch(origin) for _ in range(1 + departure.goes_both_ways)]
+    if not departure.goes_both_ways:
+        ways[0].ends.append(f"{departure.cause} of {parent.name}")
+    result.branches.append(ways[0])
+    try:
+        for branch, first in zip(ways, (start, start.turned), strict=False):
+            for each in follower.leave(branch, first):
+                yield branch, each
+    finally:
+        if len(ways) > 1 and ways[1].orbits:
+            whole = result.branches[-1] = joined(*ways)
+            place = len(ways[0].orbits) - 1
+            whole.points.append(SpecialPoint(BRANCH_POINT, whole.orbits[place], place))
+            whole.points.sort(key=lambda point: point.place)
+        elif not ways[0].orbits:
+            result.branches.pop()
 
 
 def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], ImpactingBody]:
@@ -349,6 +389,14 @@ def _body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
 
 
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:
+    """Return whether an orbit or its mirror image is on a branch."""
+    images = [each for each in (orbit, mirror_image(orbit)) if each is not None]
+    return any(_is_on_branch(branches, each, value, settings) for each in images)
+
+
+def _is_on_branch(
+    branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings
+) -> bool:
     """Return whether an orbit is on a branch, counted from any of its impacts and periods."""
     whole = 2.0 * np.pi * orbit.periods
     for branch in branches:
@@ -381,7 +429,7 @@ def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
 
 
 def _refuse(
-    start: float, stop: float, impacts: int | None, periods: int, doublings: int, longest: float
+    start: float, stop: float, impacts: int | None, periods: int, doublings: int, grazes: int, longest: float
 ) -> None:
     if not (np.isfinite(start) and np.isfinite(stop) and start != stop):
         raise UsageError(f"--from, --to: expected two different numbers, got {start:g} and {stop:g}.")
@@ -391,5 +439,7 @@ def _refuse(
         raise UsageError(f"--periods: expected 1 or more, got {periods}.")
     if not doublings >= 0:
         raise UsageError(f"--doublings: expected 0 or more, got {doublings}.")
+    if not grazes >= 0:
+        raise UsageError(f"--grazes: expected 0 or more, got {grazes}.")
     if not 1e-4 <= longest <= 0.2:
         raise UsageError(f"--step: expected 1e-4 to 0.2, got {longest:g}.")

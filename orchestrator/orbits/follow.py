@@ -14,7 +14,9 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits.branches import multiplier_text
+from vibroimpact.analysis.orbits.departures import grazes
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
+from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, typed
@@ -26,6 +28,7 @@ from vibroimpact.orchestrator.orbits.branches import (
     HISTORY,
     Followed,
     FollowedLoci,
+    Meeting,
     follow_branches,
     follow_loci,
     orbits_not_followed,
@@ -37,6 +40,8 @@ from vibroimpact.orchestrator.ssp import opened_scene
 
 EXACT_DIGITS, UNEXPLAINED_DIGITS = 11, 6
 """Digits of a special point's value: for a zero of a test function, and for a bracket without a test function."""
+MARGINAL = 1e-9
+"""Distance of a multiplier from the unit circle below which it is on it."""
 
 
 @dataclass(eq=False)
@@ -58,6 +63,7 @@ class Following(Study[str]):
     periods: int = 1
     seed: Seed | None = None
     doublings: int = 1
+    grazes: int = 1
     step: float = 0.01
     second: str | None = None
     second_range: tuple[float, float] | None = None
@@ -84,6 +90,7 @@ class Following(Study[str]):
             periods=1 if first.periods is None else first.periods,
             seed=first.seed,
             doublings=options.doublings,
+            grazes=options.grazes,
             step=options.step,
             second=options.second,
             second_range=second_range,
@@ -100,6 +107,7 @@ class Following(Study[str]):
             periods=self.periods,
             seed=self.seed,
             doublings=self.doublings,
+            grazes=self.grazes,
             longest=self.step,
             looking=lambda value: self.status(f"{self.begins}, {self.parameter} {value:.6g}"),
         )
@@ -130,7 +138,14 @@ class Following(Study[str]):
         """Print the special points of each branch, and each curve."""
         self._print_points()
         self._print_branches()
+        for meeting in self.followed.meetings:
+            say(self._meeting(meeting))
         self._print_unexplained()
+        if self.followed.is_cut_short:
+            many = len(self.followed.branches)
+            say(
+                f"After {many} branches no more are begun at special points. Ask for fewer doublings or grazes."
+            )
         if self.seed is None and self.impacts is None and not self.incomplete:
             for line in orbits_not_followed(self.followed, self.start, self.stop):
                 say(typed(line))
@@ -164,9 +179,25 @@ class Following(Study[str]):
             low, high = float(branch.values.min()), float(branch.values.max())
             say(
                 f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
-                f"{sum(each.orbit.is_stable for each in branch.orbits)} stable{_stable_ranges(branch)}; "
-                f"begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
+                f"{_stable_orbits(branch)}; "
+                f"{_symmetry(branch)}begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
             )
+
+    def _meeting(self, meeting: Meeting) -> str:
+        """Return a sentence on the orbits that meet at a graze."""
+        number = next(k for k, each in enumerate(self.followed.branches, 1) if each is meeting.branch)
+        orbit, value = meeting.point.at.orbit, f"{meeting.point.at.value:.{EXACT_DIGITS}g}"
+        others: dict[str, list[str]] = {}
+        for each in meeting.departures:
+            words = f"{'stable' if each.is_stable else 'unstable'} at {each.side} values"
+            others.setdefault(words, []).append(each.start.orbit.full_name)
+        parts = [f"{', '.join(names)} ({words})" for words, names in others.items()]
+        if grazes(orbit).all():
+            parts.insert(0, "motion without impacts")
+        return (
+            f"{number}  {orbit.full_name}: its {meeting.point.kind} at {value} meets "
+            f"{'; '.join(parts) or 'no other orbit'}."
+        )
 
     def _print_unexplained(self) -> None:
         for number, branch in enumerate(self.followed.branches, start=1):
@@ -177,8 +208,7 @@ class Following(Study[str]):
             ]
             if values:
                 say(
-                    f"{number}  {branch.full_name}: stability changes at {', '.join(values)}, and no cause was found. "
-                    "Another branch may cross there (a branch point): it is not followed."
+                    f"{number}  {branch.full_name}: stability changes at {', '.join(values)}, and no cause was found."
                 )
 
     def _print_loci(self) -> None:
@@ -196,11 +226,28 @@ class Following(Study[str]):
                 )
 
 
-def _stable_ranges(branch: Branch) -> str:
-    """Return the ranges of the followed number with stable orbits, in parentheses; no range: an empty text."""
-    groups = groupby(branch.orbits, attrgetter("orbit.is_stable"))
-    ranges = [sorted(map(attrgetter("value"), orbits)) for is_stable, orbits in groups if is_stable]
-    return f" ({', '.join(f'{each[0]:.6g} to {each[-1]:.6g}' for each in ranges)})" if ranges else ""
+def _symmetry(branch: Branch) -> str:
+    """Return the words on the mirror symmetry of a branch; an empty text if its body has none."""
+    if branch.is_symmetric:
+        return "symmetric; "
+    image = mirror_image(branch.orbits[len(branch.orbits) // 2].orbit)
+    return "" if image is None else f"its mirror image is {image.full_name}; "
+
+
+def _stable_orbits(branch: Branch) -> str:
+    """Return the number of stable orbits, and in parentheses their ranges of the followed number if there are any.
+
+    An orbit at a special point has a multiplier on the unit circle: alone it is no stable one.
+    """
+    groups = [
+        list(orbits)
+        for is_stable, orbits in groupby(branch.orbits, attrgetter("orbit.is_stable"))
+        if is_stable
+    ]
+    groups = [each for each in groups if len(each) > 1 or abs(each[0].orbit.multipliers[0]) < 1.0 - MARGINAL]
+    ranges = [sorted(each.value for each in group) for group in groups]
+    shown = ", ".join(f"{each[0]:.6g} to {each[-1]:.6g}" for each in ranges)
+    return f"{sum(map(len, groups))} stable{f' ({shown})' if shown else ''}"
 
 
 def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:

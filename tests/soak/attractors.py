@@ -17,7 +17,7 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.basins import Basins
-from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit
+from vibroimpact.analysis.orbits.following import BRANCH_POINT, STABILITY_CHANGE, Branch, BranchOrbit
 from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
@@ -156,13 +156,13 @@ def _branches(draw: random.Random, tables: Tables) -> str | None:
     ends = 0.85 * frequency, 1.15 * frequency
     try:
         if draw.random() < 0.4:
-            study = Following(scene, FREQUENCY, *ends, impacts=1, doublings=0)
+            study = Following(scene, FREQUENCY, *ends, impacts=1, doublings=0, grazes=0)
         else:
             # the orbit on which the scene's own run ends; it mostly hits both stops
             run = vi.run(scene.with_values({"record": {"transient_periods": 3000, "recorded_periods": 64}}))
             seed = vi.seed_of_run(run)
             study = Following(
-                scene, FREQUENCY, *ends, len(seed.impacts), seed.periods, seed.impacts, doublings=0
+                scene, FREQUENCY, *ends, len(seed.impacts), seed.periods, seed.impacts, doublings=0, grazes=0
             )
         branches = whole(study).followed.branches
     except (OrbitError, DatasetError):
@@ -182,7 +182,15 @@ def _unnamed_change(branch: Branch) -> str | None:
         if stable[k] != stable[k - 1] and not {k, k - 1} & places:
             between = f"{branch.orbits[k - 1].value:.12g} and {branch.orbits[k].value:.12g}"
             return f"its stability changes between {between}, which no point says"
-    kinds = {"fold", "period doubling", "torus", "graze", "graze between impacts", STABILITY_CHANGE}
+    kinds = {
+        "fold",
+        "period doubling",
+        "torus",
+        "graze",
+        "graze between impacts",
+        BRANCH_POINT,
+        STABILITY_CHANGE,
+    }
     strange = {point.kind for point in branch.points} - kinds
     return f"points of unknown kinds {strange}" if strange else None
 

@@ -47,6 +47,7 @@ _MARKS = {
     SpecialOrbit.graze: "o",
     SpecialOrbit.graze_between_impacts: "v",
     SpecialOrbit.stability_change: "X",
+    SpecialOrbit.branch_point: "P",
 }
 
 

@@ -42,10 +42,12 @@ def special(followed: object) -> list[tuple[str, float]]:
 
 def test_a_seed_is_followed_both_ways_to_the_grazes_that_it_shares_with_other_orbits() -> None:
     seed = [(0.67, 1), (6.75, 1), (8.67, 1)]
-    three = vi.follow(of_chain(0.855), PARAMETER, 0.3, 2.2, seed=seed, periods=2, doublings=0, step=0.05)
+    three = vi.follow(
+        of_chain(0.855), PARAMETER, 0.3, 2.2, seed=seed, periods=2, doublings=0, grazes=0, step=0.05
+    )
     kinds, values = zip(*special(three), strict=True)
     assert kinds == ("graze_between_impacts", "fold", "graze")
-    one = dict(special(vi.follow(CHAIN, PARAMETER, 0.84, 0.92, doublings=0, step=0.05)))
+    one = dict(special(vi.follow(CHAIN, PARAMETER, 0.84, 0.92, doublings=0, grazes=0, step=0.05)))
     two = vi.follow(of_chain(0.83), PARAMETER, 0.8, 0.84, seed=[(0.4, 1), (2.1, 1)], step=0.05)
     assert values[2] == pytest.approx(one["graze_between_impacts"], abs=1e-9)
     assert values[0] == pytest.approx(dict(special(two))["graze"], abs=1e-9)
@@ -70,7 +72,7 @@ def test_a_branch_that_lies_between_the_values_of_the_range_is_begun_at_the_own_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     few_starts(monkeypatch)
-    found = vi.follow(of_chain(0.857), PARAMETER, 0.5, 2.2, impacts=2, doublings=0, step=0.05)
+    found = vi.follow(of_chain(0.857), PARAMETER, 0.5, 2.2, impacts=2, doublings=0, grazes=0, step=0.05)
     assert dict(special(found))["fold"] == pytest.approx(0.85749282, abs=1e-8)
 
 
@@ -88,7 +90,7 @@ def test_a_branch_may_begin_at_the_end_of_its_range() -> None:
 def test_two_real_multipliers_of_product_one_are_no_torus() -> None:
     # at 1.67938513 the largest is 349, the smallest 1 / 349, and the two complex ones are small
     seed = [(1.9314, 1), (2.8647, 1), (12.2682, 1)]
-    found = vi.follow(of_chain(1.6795), PARAMETER, 1.67, 1.6797, seed=seed, periods=2, doublings=0)
+    found = vi.follow(of_chain(1.6795), PARAMETER, 1.67, 1.6797, seed=seed, periods=2, doublings=0, grazes=0)
     assert [kind for kind, _ in special(found)] == ["graze_between_impacts"]
 
 

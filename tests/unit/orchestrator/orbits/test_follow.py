@@ -30,7 +30,7 @@ PARAMETER = "forcing.angular_frequency"
 
 @pytest.fixture(scope="module")
 def branches() -> object:
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05)
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, grazes=0)
 
 
 def test_a_branch_of_a_ball_in_a_cavity_is_its_closed_form() -> None:
@@ -44,15 +44,23 @@ def test_a_branch_of_a_ball_in_a_cavity_is_its_closed_form() -> None:
         step=0.2,
         seed=[(phase, 1), (phase + np.pi, 2)],
         doublings=0,
+        grazes=0,
     )
     runs = found.vibroimpact.runs
-    assert runs.sizes["run"] >= 8
-    expected = [symmetric_orbit(mass, frequency, float(size))[1] for size in runs["amplitude"].values]
-    np.testing.assert_allclose(found["impact_velocity"].values.reshape(-1, 2).T, [expected] * 2, rtol=1e-12)
-    stable = runs["orbit_stable"].values > 0
-    last = runs.isel(run=np.flatnonzero(stable)[-1])
-    # the branch loses its symmetry where a multiplier passes 1
-    assert float(last["amplitude"]) < 0.3388 < float(runs["amplitude"].values[~stable].min())
+    symmetric = runs["orbit_branch"].values == 1
+    assert np.count_nonzero(symmetric) >= 8
+    expected = [
+        symmetric_orbit(mass, frequency, float(size))[1] for size in runs["amplitude"].values[symmetric]
+    ]
+    speeds = found["impact_velocity"].values.reshape(-1, 2)[symmetric]
+    np.testing.assert_allclose(speeds.T, [expected] * 2, rtol=1e-12)
+    assert (runs["orbit_symmetric"].values[symmetric] == 1).all()
+    # the branch loses its symmetry where a multiplier passes 1, and another branch begins there
+    stable, amplitude = runs["orbit_stable"].values[symmetric] > 0, runs["amplitude"].values[symmetric]
+    point = amplitude[runs["orbit_special"].values[symmetric] == SpecialOrbit.branch_point]
+    assert point == pytest.approx([0.3388], abs=1e-4)
+    assert amplitude[stable].max() <= point[0] + 1e-9
+    assert amplitude[~stable].min() >= point[0] - 1e-9
 
 
 def test_branches_are_a_dataset_whose_runs_are_orbits(branches: object) -> None:
@@ -114,7 +122,7 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def loci() -> xr.Dataset:
     both = {"second": "forcing.amplitude", "second_range": (0.3, 0.7)}
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, **both)
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, grazes=0, **both)
 
 
 def test_bifurcations_over_two_numbers_are_a_dataset_and_drawn(loci: xr.Dataset) -> None:
@@ -149,6 +157,7 @@ def test_curves_lie_on_the_map_of_both_numbers(loci: xr.Dataset) -> None:
         (["--parameter", "no.such"], "scene key: expected a numeric key"),
         (["--from", "2.5", "--to", "3"], "follow: expected a physical orbit P(1,1)"),
         (["--periods", "0"], "--periods: expected 1 or more, got 0."),
+        (["--grazes", "-1"], "--grazes: expected 0 or more, got -1."),
         (["--step", "0"], "--step: expected 1e-4 to 0.2, got 0."),
         (
             ["--second", "forcing.amplitude"],
@@ -186,29 +195,29 @@ recorded_periods = 8
 """
 
 
-def test_a_loss_of_symmetry_is_a_change_of_stability_whose_cause_is_not_found(tmp_path: Path) -> None:
+def test_a_loss_of_symmetry_is_a_branch_point_at_which_the_broken_branch_begins(tmp_path: Path) -> None:
     path, output, figure = tmp_path / "two.toml", tmp_path / "b.nc", tmp_path / "b.png"
     path.write_text(SYMMETRIC, encoding="utf-8")
-    span = [
-        "--parameter",
-        PARAMETER,
-        "--from",
-        "0.96",
-        "--to",
-        "1",
-        "--step",
-        "0.05",
-        "--seed",
-        "0.1:1,3.24:2",
-    ]
+    span = ["--parameter", PARAMETER, "--from", "0.96", "--to", "1", "--step", "0.05", "--doublings", "0"]
     code, out, err = in_this_process(["follow", str(path), *span, "-o", str(output), "--figure", str(figure)])
     assert (code, err) == (0, "")
-    assert "1  P(2,1), 1 at stop 1, 1 at stop 2: stability changes at 0.97282" in out
-    assert "no cause was found" in out
+    for said in (
+        "1  P(1,1) at stop 1: its graze between impacts at 0.97375271868 meets P(2,1)",
+        "its mirror image is P(1,1) at stop 2",
+        "ends: graze of P(1,1), branch point of the symmetric P(2,1).",
+        "symmetric; begun from P(2,1), 1 at stop 1, 1 at stop 2 at its pitchfork 0.97282429546",
+    ):
+        assert said in out
+    assert "no cause was found" not in out
     with vi.open_dataset(output) as written:
         runs = written.vibroimpact.runs
-        here = runs["orbit_special"].values == SpecialOrbit.stability_change
-        assert runs["angular_frequency"].values[here] == pytest.approx([0.9728243], abs=2e-6)
+        here = runs["orbit_special"].values == SpecialOrbit.branch_point
+        np.testing.assert_allclose(runs["angular_frequency"].values[here], 0.972824295465, atol=1e-11)
+        assert (runs["orbit_symmetric"].values[here] == 1).all()
+        broken = runs["orbit_branch"].values == 2
+        assert not runs["orbit_stable"].values[broken & ~here].any()
+        assert runs["orbit_symmetric"].values[broken & ~here].any() == 0
+        assert runs["angular_frequency"].values[broken].max() == pytest.approx(0.97375271868, abs=1e-10)
 
 
 def test_equal_orbits_at_two_stops_are_told_apart(tmp_path: Path) -> None:
@@ -424,6 +433,8 @@ def test_what_runs_end_on_and_no_branch_holds_is_said(tmp_path: Path) -> None:
         "1.3",
         "--step",
         "0.05",
+        "--grazes",
+        "0",
     ]
     code, out, err = in_this_process(command)
     assert code == 0, err
@@ -452,3 +463,39 @@ def test_branches_over_a_sweep_draw_the_variable_that_is_asked_for(branches: obj
     assert np.isfinite(drawn).sum() > 3 * below.get_ydata().size
     with pytest.raises(DatasetError, match="expected one that orbits recorded"):
         vi.draw(branches, over=sweep, variable="nothing")  # type: ignore[arg-type]
+
+
+def special_values(found: xr.Dataset, kind: SpecialOrbit, name: str) -> list[float]:
+    runs = found.vibroimpact.runs
+    return [float(each) for each in runs[name].values[runs["orbit_special"].values == kind]]
+
+
+def test_doublings_are_followed_one_after_the_other() -> None:
+    # Thompson and Ghaffari's cascade: no damping, restitution .8, the stop at the place of rest
+    scene = {
+        "scene": {"units": "nondimensional"},
+        "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.0},
+        "forcing": {"amplitude": 1.0, "angular_frequency": 2.65},
+        "stop": [{"position": 0.0, "restitution": 0.8}],
+        "record": {"recorded_periods": 1},
+    }
+    found = vi.follow(scene, PARAMETER, 2.64, 2.7316, doublings=3, grazes=0, step=0.1)
+    assert special_values(found, SpecialOrbit.period_doubling, "angular_frequency") == pytest.approx(
+        [2.65334773, 2.71598725, 2.72911792, 2.73136382], abs=5e-9
+    )
+    periods = found.vibroimpact.runs["orbit_periods"].values
+    assert sorted(set(periods)) == [1, 2, 4, 8]
+
+
+def test_a_branch_over_the_amplitude_turns_just_before_its_graze() -> None:
+    # example 15.2 of COCO: the graze is where the steady motion reaches the stop, at the amplitude .1
+    scene = {
+        "scene": {"units": "nondimensional"},
+        "body": {"mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+        "forcing": {"amplitude": 0.15, "angular_frequency": 1.0},
+        "stop": [{"position": 1.0, "restitution": 0.8}],
+        "record": {"recorded_periods": 1},
+    }
+    found = vi.follow(scene, "forcing.amplitude", 0.09, 0.2, grazes=0, step=0.2)
+    assert special_values(found, SpecialOrbit.fold, "amplitude") == pytest.approx([0.09997075], abs=5e-9)
+    assert special_values(found, SpecialOrbit.graze, "amplitude") == pytest.approx([0.1], abs=1e-12)

@@ -24,13 +24,23 @@ POSITION = "stop[1].position"
 
 def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings() -> None:
     loci = vi.follow(
-        CHAIN, PARAMETER, 0.8, 0.9, doublings=0, second=POSITION, second_range=(0.03, 0.2), step=0.05
+        CHAIN,
+        PARAMETER,
+        0.8,
+        0.9,
+        doublings=0,
+        grazes=0,
+        second=POSITION,
+        second_range=(0.03, 0.2),
+        step=0.05,
     ).vibroimpact.runs
     assert set(loci["orbit_special"].values) == {SpecialOrbit.graze_between_impacts}
     for place in (1, loci.sizes["run"] // 2, loci.sizes["run"] - 2):
         position, frequency = float(loci["position"][place]), float(loci["angular_frequency"][place])
         scene = vi.Scene.from_file(CHAIN).with_values({POSITION: position})
-        alone = vi.follow(scene, PARAMETER, frequency - 0.02, frequency + 0.05, doublings=0, step=0.1)
+        alone = vi.follow(
+            scene, PARAMETER, frequency - 0.02, frequency + 0.05, doublings=0, grazes=0, step=0.1
+        )
         runs = alone.vibroimpact.runs
         found = runs["angular_frequency"].values[
             runs["orbit_special"].values == SpecialOrbit.graze_between_impacts
@@ -39,7 +49,9 @@ def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings(
 
 
 def curves_of_grazes_between_impacts(scene: vi.Scene, impacts: int) -> FollowedLoci:
-    branches = whole(Following(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, step=0.05)).followed
+    branches = whole(
+        Following(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, grazes=0, step=0.05)
+    ).followed
     for branch in branches.branches:
         branch.points = [point for point in branch.points if point.kind == "graze between impacts"][:1]
     ranges = FollowSettings(0.4, 0.52, 0.03), FollowSettings(0.09, 0.6, 0.03)
@@ -65,14 +77,14 @@ def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_spee
 @pytest.mark.parametrize("longest", [0.01, 0.2])
 def test_a_branch_is_followed_once_however_far_its_orbits_lie_apart(longest: float) -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372})
-    found = whole(Following(scene, PARAMETER, 1.6, 2.2, step=longest, doublings=0)).followed
+    found = whole(Following(scene, PARAMETER, 1.6, 2.2, step=longest, doublings=0, grazes=0)).followed
     assert [branch.name for branch in found.branches] == ["P(1,1)"]
 
 
 @pytest.mark.long
 def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_of_these_grazes() -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372, PARAMETER: 1.75})
-    branches = whole(Following(scene, PARAMETER, 1.6, 2.2, step=0.05)).followed
+    branches = whole(Following(scene, PARAMETER, 1.6, 2.2, step=0.05, grazes=0)).followed
     for branch in branches.branches:
         branch.points = branch.points[-2:] if branch.name == "P(2,2)" else []
     ranges = FollowSettings(1.6, 2.2, 0.01), FollowSettings(0.03, 0.05, 0.01)
@@ -85,7 +97,9 @@ def test_a_doubling_whose_orbit_touches_a_stop_between_impacts_is_on_the_curve_o
         if kind == "graze between impacts"
     ]
     assert met == pytest.approx((1.7725763745, 0.037100299463), abs=1e-9)
-    alone = whole(Following(scene.with_values({POSITION: met[1]}), PARAMETER, 1.6, 2.2, step=0.05)).followed
+    alone = whole(
+        Following(scene.with_values({POSITION: met[1]}), PARAMETER, 1.6, 2.2, step=0.05, grazes=0)
+    ).followed
     last = [point for point in alone.branches[1].points if point.kind == "graze between impacts"]
     assert last[0].at.value == pytest.approx(met[0], abs=1e-9)
 
@@ -103,6 +117,6 @@ def test_the_file_says_where_its_branches_are(tmp_path: Path) -> None:
 
 def test_without_a_bifurcation_branches_are_what_there_is() -> None:
     found = vi.follow(
-        CHAIN, PARAMETER, 0.9, 1.0, doublings=0, step=0.1, second=POSITION, second_range=(0.1, 0.15)
+        CHAIN, PARAMETER, 0.9, 1.0, doublings=0, grazes=0, step=0.1, second=POSITION, second_range=(0.1, 0.15)
     )
     assert set(found["orbit_special"].values) == {SpecialOrbit.none}

@@ -168,7 +168,7 @@ def test_a_ball_on_a_shaken_table_has_its_known_orbits() -> None:
         impacts = runner.run({}, tuple(state_at_phase_0(stable).tolist())).impacts
     assert impacts is not None
     np.testing.assert_allclose(impacts[:, 2], stable.velocities[0], rtol=1e-12)
-    found = vi.follow(ball(1.2), "stop[1].motion_amplitude", 1.2, 1.6, doublings=0)
+    found = vi.follow(ball(1.2), "stop[1].motion_amplitude", 1.2, 1.6, doublings=0, grazes=0)
     doubling = found.motion_amplitude.values[found.orbit_special.values == SpecialOrbit.period_doubling]
     np.testing.assert_allclose(doubling, 1.526823700519061, rtol=1e-12)
 
@@ -176,7 +176,9 @@ def test_a_ball_on_a_shaken_table_has_its_known_orbits() -> None:
 def test_follow_takes_the_amplitude_of_a_further_sine_and_refuses_its_frequency() -> None:
     (start,) = vi.find_orbits(scene(), 3, 2)
     seed = [(float(phase), 1) for phase in start.phases]
-    found = vi.follow(scene(), "forcing[2].amplitude", 0.4, 0.402, periods=2, seed=seed, doublings=0)
+    found = vi.follow(
+        scene(), "forcing[2].amplitude", 0.4, 0.402, periods=2, seed=seed, doublings=0, grazes=0
+    )
     assert found.sizes["amplitude"] > 2
     with pytest.raises(
         VibroimpactError, match=r"forcing\[2\]\.angular_frequency: expected a number that the common"

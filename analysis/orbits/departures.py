@@ -1,0 +1,177 @@
+"""Orbits that begin at the special points of a branch: equations.md 4.13."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits.branch_points import LEVEL, crossing_direction
+from vibroimpact.analysis.orbits.following import BRANCH_POINT, Branch, BranchOrbit, Follower, SpecialPoint
+from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, ordered
+from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
+from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS
+
+SLOW = 1e-8
+"""Speed of an impact, over that of the force's motion, below which it grazes."""
+BESIDE = 1e-4
+"""Step away from a graze, over the longest, after which an orbit is judged."""
+SAME_VALUE = 1e-7
+"""Difference of two values, over the range, up to which they are one point."""
+MOST_TURNS = 3
+"""Number of turns of a grazing orbit, some with and some without an impact, up to which orbits are named."""
+MOST_TOUCHES = 4
+"""Number of touches of a stop, over all turns, up to which all choices of them are tried."""
+
+Impact = tuple[float, int]
+"""Phase, rad, and contact, from 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """A branch that begins at a special point of another one.
+
+    Attributes
+    ----------
+    start : BranchOrbit
+        First orbit, and the direction in which the branch leaves.
+    cause : str
+        `period doubling`, `pitchfork`, `transcritical branch point` or `graze`.
+    goes_both_ways : bool
+        Whether the branch also leaves in the other direction, with orbits that are not those of the first one.
+    is_stable : bool or None
+        Whether the orbits next to a graze are stable; None for other points.
+    """
+
+    start: BranchOrbit
+    cause: str
+    goes_both_ways: bool = False
+    is_stable: bool | None = None
+
+    @property
+    def side(self) -> str:
+        """`higher` or `lower`: the values of the parameter at which the orbits next to a graze are."""
+        return "higher" if self.start.tangent[-1] > 0.0 else "lower"
+
+
+def departures(follower: Follower, point: SpecialPoint) -> list[Departure]:
+    """Return the branches that begin at a special point, one of each pair of mirror images.
+
+    A fold and a torus have none.
+    """
+    if point.kind == "period doubling":
+        return [_crossing(follower, _twice(point.at), "period doubling")]
+    if point.kind == BRANCH_POINT:
+        return [_crossing(follower, point.at)]
+    return list(_grazing(follower, point.at)) if point.kind.startswith("graze") else []
+
+
+def _twice(at: BranchOrbit) -> BranchOrbit:
+    """Return an orbit that is counted twice, with the direction of its branch."""
+    once = at.orbit
+    phases = np.concatenate([once.phases, once.phases + TURN * once.periods])
+    orbit = PeriodicOrbit(
+        once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)
+    )
+    tangent = np.concatenate([at.tangent[:-1], at.tangent])
+    return BranchOrbit(at.value, orbit, tangent / np.linalg.norm(tangent), 0.0)
+
+
+def _crossing(follower: Follower, at: BranchOrbit, cause: str = "") -> Departure:
+    """Return the branch that crosses another one at an orbit."""
+    span, orbit = follower.settings.span, at.orbit
+
+    def matrix_at(unknowns: Floats) -> Floats:
+        return follower.matrix(orbit, unknowns[:-1], float(unknowns[-1]) * span)
+
+    direction = crossing_direction(matrix_at, np.append(orbit.phases, at.value / span), at.tangent)
+    is_level = abs(direction[-1]) < LEVEL
+    cause = cause or (
+        "pitchfork" if is_level or abs(at.tangent[-1]) < LEVEL else "transcritical branch point"
+    )
+    # orbits on both sides of a doubling, or of a symmetric orbit, are one orbit counted differently, or mirror images
+    is_copy = is_level and (orbit.turns > 1 or is_symmetric(orbit))
+    return Departure(BranchOrbit(at.value, orbit, direction, 0.0), cause, not is_copy)
+
+
+def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
+    """Yield the branches of orbits with some of the impacts and maxima that touch a stop, others than the own one.
+
+    Several turns of the orbit may each have others of them.
+    """
+    orbit = at.orbit
+    slow = grazes(orbit)
+    fast = _impacts(orbit, ~slow)
+    touching = _impacts(orbit, slow) or _touching_maxima(orbit)
+    found = [orbit]
+    for turns in range(1, MOST_TURNS + 1):
+        if turns * (len(fast) + len(touching)) > MOST_IMPACTS or turns * len(touching) > MOST_TOUCHES:
+            return
+        later = [TURN * orbit.periods * turn for turn in range(turns)]
+        always = [(phase + more, contact) for more in later for phase, contact in fast]
+        sometimes = [(phase + more, contact) for more in later for phase, contact in touching]
+        for chosen in _subsets(sometimes):
+            if not always and not chosen:
+                continue
+            other = _orbit_of(orbit.body, turns * orbit.periods, always + chosen)
+            images = [other, mirror_image(other)]
+            if other.turns > 1 or any(
+                are_alike(each, image) for each in found for image in images if image is not None
+            ):
+                continue
+            found.append(other)
+            yield from _beside(follower, other, at.value)
+
+
+def grazes(orbit: PeriodicOrbit) -> NDArray[np.bool_]:
+    """Return whether each impact of an orbit has no speed, shape (p,)."""
+    return np.asarray(orbit.velocities < SLOW * orbit.body.scale * orbit.body.angular_frequency)
+
+
+def _subsets(touching: list[Impact]) -> Iterator[list[Impact]]:
+    """Yield all choices of impacts, the smallest first."""
+    for count in range(len(touching) + 1):
+        yield from map(list, itertools.combinations(touching, count))
+
+
+def _impacts(orbit: PeriodicOrbit, which: NDArray[np.bool_]) -> list[Impact]:
+    return [(float(orbit.phases[k]), int(orbit.contacts[k])) for k in np.flatnonzero(which)]
+
+
+def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
+    """Return phase and contact of the maximum that touches a stop, and of its mirror image on a symmetric orbit."""
+    _, phase, contact = orbit.highest
+    contacts = mirrored_contacts(orbit.body)
+    if contacts is None or not is_symmetric(orbit):
+        return [(phase, contact)]
+    return [(phase, contact), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]))]
+
+
+def _orbit_of(body: ImpactingBody, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
+    """Return the orbit with these impacts."""
+    phases, contacts = (np.array(each) for each in zip(*impacts, strict=True))
+    made = ordered(PeriodicOrbit(body, periods, phases, contacts.astype(np.int32), np.zeros(phases.size)))
+    velocities = evaluated(body, made.contacts, made.phases, periods).velocities
+    return PeriodicOrbit(body, periods, made.phases, made.contacts, velocities)
+
+
+def _beside(follower: Follower, orbit: PeriodicOrbit, value: float) -> Iterator[Departure]:
+    """Yield the branch of an orbit at a graze in the direction of its physical orbits, if there are any."""
+    start = follower.on_branch(orbit, value, None)
+    for each in (start, start.turned):
+        found = follower.step(each, BESIDE * follower.settings.longest)
+        if found is not None and found[0].orbit.is_physical:
+            yield Departure(each, "graze", is_stable=found[0].orbit.is_stable)
+            return
+
+
+def passes(branch: Branch, start: BranchOrbit, span: float) -> bool:
+    """Tell whether a branch ends at an orbit, or has a special point there, or at its mirror image."""
+    ends = [*branch.orbits[:1], *branch.orbits[-1:], *(point.at for point in branch.points)]
+    near = [each for each in ends if abs(each.value - start.value) < SAME_VALUE * span]
+    images = [each for each in (start.orbit, mirror_image(start.orbit)) if each is not None] if near else []
+    return any(are_alike(each.orbit, image) for each in near for image in images)
