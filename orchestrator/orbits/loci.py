@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.orbits.branches import Followed, body_along
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
-SECOND_VALUES = 6
+SECOND_VALUES = 4
 """Number of further values of the second parameter at which branches are followed for bifurcations."""
 COARSE = 0.05
 """Largest step along these branches, over the range of the parameter."""

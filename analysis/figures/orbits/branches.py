@@ -123,7 +123,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    legend_outside(figure, panels[0], ncols=3)
+    legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
     return figure
 
 
