@@ -242,7 +242,11 @@ class LocusFollower:
             apart[:, :-2] -= TURN * np.round(apart[:, :1] / TURN)
             shares = -(apart[:-1] * steps).sum(axis=1) / np.maximum(lengths**2, np.finfo(np.float64).tiny)
             off = apart[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * steps
-            if (np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths).any():
+            near = np.flatnonzero(np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths)
+            alike = start.kind != BETWEEN or any(
+                not _is_other_maximum(locus.points[each].orbit, orbit, first) for each in near
+            )
+            if near.size and alike:
                 return True
         return False
 
@@ -336,7 +340,8 @@ class LocusFollower:
             last = events[ends[0]]
             events = [each for each in events if each is last or each.part < last.part - ZERO * step]
         if start.kind == "torus" and not ends and not turns_round(taken.orbit.multipliers):
-            return [_Event(0.0, now, end="two real multipliers")]
+            double = taken.orbit.multipliers[np.argmin(np.abs(np.abs(taken.orbit.multipliers) - 1.0))].real
+            return [_Event(0.0, now, "fold" if double > 0.0 else "period doubling")]
         return events
 
     def _other_kinds(
@@ -378,8 +383,8 @@ class LocusFollower:
             part, at = self._last(start, now, step, lambda each: each.orbit.velocities[slowest] > 0.0)
             yield _Event(part, at, GRAZE, GRAZE, Bifurcation(GRAZE, at.orbit, at.values, slowest))
         elif start.kind == BETWEEN:
-            if _is_other_maximum(now, taken):
-                part, at = self._last(start, now, step, lambda each: not _is_other_maximum(now, each))
+            if _is_other_maximum(now.orbit, taken.orbit):
+                part, at = self._last(start, now, step, lambda each: not _is_other_maximum(now.orbit, each.orbit))
                 other = Bifurcation(BETWEEN, taken.orbit, taken.values)
                 yield _Event(part, at, "another graze between impacts", "another", other)
         elif beyond_stop(taken.orbit) > 0.0:
@@ -401,7 +406,7 @@ class LocusFollower:
             locus.starts.append(Bifurcation(GRAZE, at.orbit, at.values, slowest))
             return GRAZE
         found = self._step(start, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
-        if found is not None and _is_other_maximum(now, found[0]):
+        if found is not None and _is_other_maximum(now.orbit, found[0].orbit):
             locus.special.append(("another", now))
             locus.starts.append(Bifurcation(BETWEEN, found[0].orbit, found[0].values))
             return "another graze between impacts"
@@ -487,9 +492,9 @@ def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
     return lambda point: point.values[place] - bound
 
 
-def _is_other_maximum(one: LocusPoint, other: LocusPoint) -> bool:
-    """Tell whether the highest maxima between impacts of two orbits are different maxima."""
-    (_, at, contact), (_, at_other, contact_other) = one.orbit.highest, other.orbit.highest
-    whole = TURN * one.orbit.periods
-    moved = (at_other - other.orbit.phases[0]) - (at - one.orbit.phases[0])
+def _is_other_maximum(one: PeriodicOrbit, other: PeriodicOrbit, first: int = 0) -> bool:
+    """Tell whether the highest maxima of two orbits differ; the other orbit is counted from one of its impacts."""
+    (_, at, contact), (_, at_other, contact_other) = one.highest, other.highest
+    whole = TURN * one.periods
+    moved = (at_other - other.phases[first]) - (at - one.phases[0])
     return contact != contact_other or abs(np.mod(moved + 0.5 * whole, whole) - 0.5 * whole) > JUMP

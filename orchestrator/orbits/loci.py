@@ -23,11 +23,12 @@ from vibroimpact.analysis.orbits.loci import (
 )
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.branches import Followed, body_along
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
-SECOND_VALUES = 4
-"""Number of further values of the second parameter at which branches are followed for bifurcations."""
+SECOND_VALUES = 5
+"""Number of further values of the second parameter, ends of its range included, at which branches are followed."""
 COARSE = 0.05
 """Largest step along these branches, over the range of the parameter."""
 
@@ -117,10 +118,15 @@ def follow_loci(
 
 
 def at_other_values(result: FollowedLoci, second: FollowSettings) -> Iterator[Followed]:
-    """Yield the scene at further values of the second parameter, without branches."""
+    """Yield the scene at further values of the second parameter at which it has a body, without branches."""
     scene, parameter = result.followed.scene, result.followed.parameter
-    for value in np.linspace(second.lowest, second.highest, SECOND_VALUES + 2)[1:-1]:
-        yield Followed(scene.at({result.second: float(value)}), parameter)
+    for value in np.linspace(second.lowest, second.highest, SECOND_VALUES):
+        other = scene.at({result.second: float(value)})
+        try:
+            impacting_body(other)
+        except UsageError:
+            continue  # such as a force of 0
+        yield Followed(other, parameter)
 
 
 def _starts(branches: list[Branch], value: float, second: str) -> list[_Start]:

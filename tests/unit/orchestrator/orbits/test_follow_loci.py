@@ -14,8 +14,8 @@ from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.analysis.study import whole
-from vibroimpact.orchestrator.orbits.branches import FollowedLoci, follow_loci
 from vibroimpact.orchestrator.orbits.follow import Following
+from vibroimpact.orchestrator.orbits.loci import FollowedLoci, follow_loci
 
 CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
 PARAMETER = "forcing.angular_frequency"
