@@ -1,17 +1,27 @@
 """Bifurcations followed over two parameters, equations.md 4.5 to 4.7: folds, period doublings, tori and grazes.
 
 The unknowns are the phases of the impacts and both parameters. The equations of the orbit are joined by one more: the
-function with the sign change at the bifurcation. Where the function of another bifurcation changes its sign, too, a
-locus has a point of codimension 2, and loci of the other kind leave it.
+function with the sign change at the bifurcation. At points of codimension 2 the function of another bifurcation
+changes its sign, too. Loci of the other kind leave them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from vibroimpact.analysis.orbits.bifurcations import (
+    BETWEEN,
+    FOLLOWED_KINDS,
+    GRAZE,
+    SMOOTH,
+    Bifurcation,
+    Locus,
+    LocusPoint,
+    joined_loci,
+)
 from vibroimpact.analysis.orbits.following import (
     CLOSED,
     EASY_NEWTON,
@@ -23,11 +33,9 @@ from vibroimpact.analysis.orbits.following import (
     SpecialPoint,
 )
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, evaluated
-from vibroimpact.analysis.orbits.sign_changes import alternating, beyond_stop, folding, meets_torus, turning, turns_round
+from vibroimpact.analysis.orbits.sign_changes import beyond_stop, meets_torus, turns_round
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
-GRAZE, BETWEEN = "graze", "graze between impacts"
-FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
 JUMP = 0.5
 """Change of the phase of the highest maximum, rad, above which it is another maximum."""
 CHANGE = 1e-6
@@ -45,97 +53,6 @@ SAME_POINT = 1e-7
 END_OF_RANGE = "end of the range"
 
 BodyAt2 = Callable[[float, float], ImpactingBody]
-SMOOTH: dict[str, Callable[[PeriodicOrbit], float]] = {
-    "fold": folding,
-    "period doubling": alternating,
-    "torus": lambda orbit: turning(orbit.multipliers),
-}
-"""Functions with a zero at the bifurcations that a locus of another kind passes without an end."""
-
-
-@dataclass(frozen=True, eq=False)
-class Bifurcation:
-    """An orbit at a bifurcation, at which a locus can begin.
-
-    Attributes
-    ----------
-    kind : str
-        One of `FOLLOWED_KINDS`.
-    orbit : PeriodicOrbit
-    values : tuple of float
-        Values of both parameters.
-    impact : int
-        Index of the impact without speed; -1 unless the kind is a graze.
-    """
-
-    kind: str
-    orbit: PeriodicOrbit
-    values: tuple[float, float]
-    impact: int = -1
-
-    @classmethod
-    def of(cls, point: SpecialPoint, values: tuple[float, float]) -> Bifurcation:
-        """Return the bifurcation at a special point of a branch, with the values of both parameters."""
-        orbit = point.at.orbit
-        return cls(point.kind, orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1)
-
-    def test(self, orbit: PeriodicOrbit) -> float:
-        """Return the function that is 0 along the locus, for an orbit next to it."""
-        if self.kind == GRAZE:
-            return float(orbit.velocities[self.impact])
-        if self.kind == BETWEEN:
-            beyond, _, contact = orbit.highest
-            return beyond / orbit.body.scale if contact >= 0 else float(np.nan)
-        return SMOOTH[self.kind](orbit)
-
-    def other_speeds(self, orbit: PeriodicOrbit) -> Floats:
-        """Return the speeds of the impacts of an orbit next to it; unbounded for the impact without speed."""
-        speeds = orbit.velocities.copy()
-        if self.kind == GRAZE:
-            speeds[self.impact] = np.inf
-        return speeds
-
-
-@dataclass(frozen=True, eq=False)
-class LocusPoint:
-    """An orbit at its bifurcation."""
-
-    values: tuple[float, float]
-    """Values of both parameters."""
-    orbit: PeriodicOrbit
-    tangent: Floats
-    """Direction of the locus, shape (p + 2,)."""
-
-
-@dataclass(slots=True)
-class Locus:
-    """Locus of a bifurcation over two parameters.
-
-    Attributes
-    ----------
-    kind : str
-        One of `FOLLOWED_KINDS`.
-    points : list of LocusPoint
-    special : list of tuple of (str, LocusPoint)
-        Points of codimension 2, each with the kind of the other bifurcation; `another`: a second graze between impacts.
-    starts : list of Bifurcation
-        Bifurcations at which the loci begin that leave these points.
-    ends : list of str
-    origin : str
-        Branch or locus, and its point, from which it starts.
-    """
-
-    kind: str
-    points: list[LocusPoint] = field(default_factory=list)
-    special: list[tuple[str, LocusPoint]] = field(default_factory=list)
-    starts: list[Bifurcation] = field(default_factory=list)
-    ends: list[str] = field(default_factory=list)
-    origin: str = ""
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether its last point is its first again."""
-        return CLOSED in self.ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +245,7 @@ class LocusFollower:
     def _events(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
     ) -> list[_Event]:
-        """Return what a step meets, in order, up to the end of the locus; the first point may be a zero itself."""
+        """Return the events of a step, in order, up to the end of the locus; the first point may be a zero itself."""
         events = [
             *self._other_kinds(start, now, taken, step, is_first=is_first),
             *self._ends_of_range(start, now, taken, step),
@@ -349,7 +266,9 @@ class LocusFollower:
     ) -> Iterator[_Event]:
         """Yield the bifurcations of other kinds that the locus passes; a torus may end there."""
         for kind, test in SMOOTH.items():
-            if kind == start.kind or (kind == "torus" and (len(now.tangent) < 3 or start.kind == GRAZE)):
+            if kind == start.kind or (
+                kind == "torus" and (now.orbit.body.frequencies.size < 2 or start.kind == GRAZE)
+            ):
                 continue
             found = self._zero(start, now, taken, step, lambda each, of=test: of(each.orbit), is_first)  # type: ignore[misc]
             if found is None or (kind == "torus" and not meets_torus(found[1].orbit.multipliers)):
@@ -384,7 +303,9 @@ class LocusFollower:
             yield _Event(part, at, GRAZE, GRAZE, Bifurcation(GRAZE, at.orbit, at.values, slowest))
         elif start.kind == BETWEEN:
             if _is_other_maximum(now.orbit, taken.orbit):
-                part, at = self._last(start, now, step, lambda each: not _is_other_maximum(now.orbit, each.orbit))
+                part, at = self._last(
+                    start, now, step, lambda each: not _is_other_maximum(now.orbit, each.orbit)
+                )
                 other = Bifurcation(BETWEEN, taken.orbit, taken.values)
                 yield _Event(part, at, "another graze between impacts", "another", other)
         elif beyond_stop(taken.orbit) > 0.0:
@@ -425,7 +346,9 @@ class LocusFollower:
         part = slowest / (before.orbit.velocities.min() - slowest)
         unknowns = rows[1] + part * (rows[1] - rows[0])
         values = unknowns[-2:] * self._spans
-        return LocusPoint((float(values[0]), float(values[1])), self._made(now.orbit, unknowns)[0], now.tangent)
+        return LocusPoint(
+            (float(values[0]), float(values[1])), self._made(now.orbit, unknowns)[0], now.tangent
+        )
 
     def _zero(
         self,
@@ -474,18 +397,6 @@ class LocusFollower:
             return None
         found = self._step(start, now, part)
         return None if found is None else (part, found[0])
-
-
-def joined_loci(backward: Locus, forward: Locus) -> Locus:
-    """Return both ways from one point as one locus."""
-    return Locus(
-        backward.kind,
-        backward.points[::-1] + forward.points[1:],
-        backward.special[::-1] + forward.special,
-        backward.starts[::-1] + forward.starts,
-        backward.ends + forward.ends,
-        backward.origin,
-    )
 
 
 def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:

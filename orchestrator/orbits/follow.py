@@ -28,7 +28,13 @@ from vibroimpact.orchestrator.orbits.branches import (
     follow_branches,
     orbits_not_followed,
 )
-from vibroimpact.orchestrator.orbits.loci import COARSE, FollowedLoci, at_other_values, follow_loci, refuse_second
+from vibroimpact.orchestrator.orbits.loci import (
+    COARSE,
+    FollowedLoci,
+    at_other_values,
+    follow_loci,
+    refuse_second,
+)
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
@@ -100,7 +106,9 @@ class Following(Study[str]):
                     yield from self._branches(at_other_value, max(self.step, COARSE), required=False)
                     yield from self._loci(first, each, at_other_value)
 
-    def _branches(self, followed: Followed, step: float, *, required: bool = True) -> Generator[str, None, None]:
+    def _branches(
+        self, followed: Followed, step: float, *, required: bool = True
+    ) -> Generator[str, None, None]:
         orbits = follow_branches(
             *(followed, self.start, self.stop),
             impacts=self.impacts,
@@ -117,7 +125,9 @@ class Following(Study[str]):
                 self.status(f"{branch.name}: {many}, {self.parameter} {orbit.value:.6g}")
             yield branch.name
 
-    def _loci(self, first: FollowSettings, second: FollowSettings, followed: Followed) -> Generator[str, None, None]:
+    def _loci(
+        self, first: FollowSettings, second: FollowSettings, followed: Followed
+    ) -> Generator[str, None, None]:
         for locus in follow_loci(self.loci, first, second, followed):
             self.status(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")
             yield locus.kind

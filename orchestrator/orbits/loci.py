@@ -12,18 +12,13 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits import OrbitError
+from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import Branch, FollowSettings
-from vibroimpact.analysis.orbits.loci import (
-    FOLLOWED_KINDS,
-    Bifurcation,
-    Locus,
-    LocusFollower,
-    joined_loci,
-)
+from vibroimpact.analysis.orbits.loci import LocusFollower
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.orbits.branches import Followed, body_along
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.branches import Followed, body_along
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
@@ -121,6 +116,8 @@ def at_other_values(result: FollowedLoci, second: FollowSettings) -> Iterator[Fo
     """Yield the scene at further values of the second parameter at which it has a body, without branches."""
     scene, parameter = result.followed.scene, result.followed.parameter
     for value in np.linspace(second.lowest, second.highest, SECOND_VALUES):
+        if value in result.values:
+            continue
         other = scene.at({result.second: float(value)})
         try:
             impacting_body(other)

@@ -37,6 +37,7 @@ _BELOW: dict[str, Any] = {
 _LOCI: dict[SpecialOrbit, dict[str, Any]] = {
     SpecialOrbit.fold: {"color": "#0F4C81", "linestyle": "-"},
     SpecialOrbit.period_doubling: {"color": "#B5410B", "linestyle": (0, (4, 1.5))},
+    SpecialOrbit.torus: {"color": "#A8327D", "linestyle": (0, (6, 1.2))},
     SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
     SpecialOrbit.graze_between_impacts: {"color": "#6F4E9C", "linestyle": (0, (5, 1.2, 1.2, 1.2))},
 }

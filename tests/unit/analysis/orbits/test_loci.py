@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, closed_form
+from vibroimpact.analysis.orbits.bifurcations import Locus
 from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings, SpecialPoint
-from vibroimpact.analysis.orbits.loci import Locus, LocusFollower
+from vibroimpact.analysis.orbits.loci import LocusFollower
 
 RATIO = 0.04
 DAMPED = np.sqrt(1.0 - RATIO**2)

@@ -45,7 +45,7 @@ def counted(body: ImpactingBody) -> tuple[int, int]:
 
 
 def crossings(one: Floats, other: Floats, path: Floats) -> NDArray[np.int_]:
-    """Return how often a path crosses each line from one point to the other, shape (lines,)."""
+    """Return the number of crossings of a path with each line from one point to the other, shape (lines,)."""
 
     def side(a: Floats, b: Floats, c: Floats) -> Floats:
         ab, ac = b - a, c - a
