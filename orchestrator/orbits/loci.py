@@ -40,6 +40,8 @@ class FollowedLoci:
     """The curves so far."""
     values: list[float] = field(default_factory=list)
     """Values of the second parameter at which branches were followed, the scene's own first."""
+    not_begun: list[Bifurcation] = field(default_factory=list)
+    """Bifurcations at which no curve could begin: the orbits next to them are not defined."""
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -78,9 +80,10 @@ class FollowedLoci:
         )
         points = [point for each in self.followed.branches for point in each.points]
         others = [point for point in points if point.kind not in FOLLOWED_KINDS]
-        if others:
-            where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
-            text += f" Not followed: {where}."
+        where = [f"{point.kind} at {point.at.value:.8g}" for point in others]
+        where += [f"{each.kind} at {each.values[0]:.8g}, {each.values[1]:.8g}" for each in self.not_begun]
+        if where:
+            text += f" Not followed: {'; '.join(where)}."
         return text
 
 
@@ -149,8 +152,8 @@ def _from_starts(result: FollowedLoci, follower: LocusFollower, starts: list[_St
         ways = Locus(start.at.kind, origin=start.origin), Locus(start.at.kind, origin=start.origin)
         try:
             yield from follower.both_ways(*ways, start.at)
-        except OrbitError:
-            continue  # no derivatives at the very start, such as a mode in resonance
+        except OrbitError:  # no derivatives at the very start, such as a mode in resonance
+            result.not_begun.append(start.at)
         finally:
             if len(ways[0].points) + len(ways[1].points) > 2:
                 found = joined_loci(*ways)
