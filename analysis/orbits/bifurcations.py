@@ -6,14 +6,49 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.following import CLOSED, SpecialPoint
-from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
-from vibroimpact.analysis.orbits.sign_changes import alternating, folding, turning
+from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.sign_changes import turning
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 GRAZE, BETWEEN = "graze", "graze between impacts"
 FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
+DOUBLE = 1e-4
+"""Distance from 1 or -1 below which a multiplier is that double one: rounding moves double multipliers by its root."""
+
+
+def folding(orbit: PeriodicOrbit) -> float:
+    """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the distances' slopes."""
+    slopes = evaluated(orbit.body, orbit.contacts, orbit.phases, orbit.periods).distance_slopes
+    return float(np.linalg.det(slopes / orbit.body.scale))
+
+
+def alternating(orbit: PeriodicOrbit) -> float:
+    """Return a function that is 0 at a period doubling, and smooth through a graze: equations.md 4.7.
+
+    It is the determinant of the distances' slopes for changes of the phases that alternate from round to round.
+    """
+    count = orbit.phases.size
+    phases = np.concatenate([orbit.phases, orbit.phases + TURN * orbit.periods])
+    slopes = evaluated(orbit.body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
+    return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / orbit.body.scale))
+
+
+def beyond_stop(orbit: PeriodicOrbit) -> float:
+    """Return the distance of the highest maximum beyond its stop, over the size of the motion; at least -1."""
+    return max(orbit.highest[0] / orbit.body.scale, -1.0) - TOUCHES
+
+
+def meets_torus(multipliers: NDArray[np.complex128]) -> bool:
+    """Tell whether two multipliers with the product 1 are complex, or both 1 or both -1: a torus begins there."""
+    i, j = np.triu_indices(multipliers.size, 1)
+    pair = int(np.argmin(np.abs(1.0 - multipliers[i] * multipliers[j])))
+    one = multipliers[i[pair]]
+    return bool(abs(one.imag) > DOUBLE or abs(abs(one.real) - 1.0) < DOUBLE)
+
+
 SMOOTH: dict[str, Callable[[PeriodicOrbit], float]] = {
     "fold": folding,
     "period doubling": alternating,

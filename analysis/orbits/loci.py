@@ -20,7 +20,9 @@ from vibroimpact.analysis.orbits.bifurcations import (
     Bifurcation,
     Locus,
     LocusPoint,
+    beyond_stop,
     joined_loci,
+    meets_torus,
 )
 from vibroimpact.analysis.orbits.following import (
     CLOSED,
@@ -33,7 +35,7 @@ from vibroimpact.analysis.orbits.following import (
     SpecialPoint,
 )
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, evaluated
-from vibroimpact.analysis.orbits.sign_changes import beyond_stop, meets_torus, turns_round
+from vibroimpact.analysis.orbits.sign_changes import turns_round
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 JUMP = 0.5
