@@ -116,7 +116,8 @@ def follow(
     step : float
         Largest step along a branch. The parameter is scaled to a range of 1, the phases are in radians.
     second : str, optional
-        Key of a second parameter. Folds, period doublings and grazes are followed over both parameters.
+        Key of a second parameter. Folds, period doublings, tori and grazes are followed over both parameters, and so
+        are the loci that leave points of codimension 2. Branches at five further values of it are starts, too.
     second_range : tuple of float, optional
         Ends of the second parameter's range.
 
@@ -124,8 +125,8 @@ def follow(
     -------
     xarray.Dataset
         Each run is an orbit, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier. With
-        `second`, each run is an orbit at a bifurcation, if any was found. The attribute `curves` names the branch of
-        each bifurcation curve; `not_looked_for` lists bifurcations that were not searched.
+        `second`, each run is an orbit at a bifurcation, if any was found. The attribute `curves` names where each
+        bifurcation curve begins; `not_looked_for` tells where curves were not searched.
 
     Raises
     ------

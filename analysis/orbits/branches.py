@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
+from vibroimpact.analysis.orbits.bifurcations import Locus
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
-from vibroimpact.analysis.orbits.loci import Locus
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
 from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.bodies.impacting_body import Floats

@@ -1,76 +1,72 @@
-"""Bifurcations followed over two parameters: loci of folds, period doublings and grazes, equations.md 4.5 and 4.6.
+"""Bifurcations followed over two parameters, equations.md 4.5 to 4.7: folds, period doublings, tori and grazes.
 
 The unknowns are the phases of the impacts and both parameters. The equations of the orbit are joined by one more: the
-function with the sign change at the bifurcation. Where an impact of a locus loses its speed, the locus meets a graze:
-a point of codimension 2. So is a graze between impacts at which a second maximum touches a stop.
+function with the sign change at the bifurcation. At points of codimension 2 the function of another bifurcation
+changes its sign, too. Loci of the other kind leave them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from vibroimpact.analysis.orbits.bifurcations import (
+    BETWEEN,
+    FOLLOWED_KINDS,
+    GRAZE,
+    SMOOTH,
+    Bifurcation,
+    Locus,
+    LocusPoint,
+    beyond_stop,
+    joined_loci,
+    meets_torus,
+)
 from vibroimpact.analysis.orbits.following import (
+    CLOSED,
     EASY_NEWTON,
     LOCATED,
     MOST_NEWTON,
     MOST_TURN,
     SHORTEST,
-    BranchOrbit,
     FollowSettings,
     SpecialPoint,
 )
-from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.sign_changes import turns_round
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
-FOLLOWED_KINDS = ("fold", "period doubling", "graze", "graze between impacts")
 JUMP = 0.5
 """Change of the phase of the highest maximum, rad, above which it is another maximum."""
 CHANGE = 1e-6
 """Change of an unknown for derivatives by differences; their error costs a Newton step, but no digit."""
 SLOW = 1e-5
 """Speed of an impact, over the fastest, below which a locus of another kind ends at a graze."""
-CLOSED = 1e-13
+FOUND = 1e-13
 """Change of the unknowns below which they count as found."""
+ZERO = 1e-6
+"""Value of a function at the first point, over its value a step further, below which the locus begins at its zero."""
+OFF_CHORD = 0.05
+"""Distance from the line between two points of a locus, over their distance, below which an orbit is on the locus."""
+SAME_POINT = 1e-7
+"""Distance from a locus, in ranges of the parameters and radians, below which an orbit is on it."""
+END_OF_RANGE = "end of the range"
 
 BodyAt2 = Callable[[float, float], ImpactingBody]
 
 
-@dataclass(frozen=True, eq=False)
-class LocusPoint:
-    """An orbit at its bifurcation."""
+@dataclass(frozen=True, slots=True)
+class _Event:
+    """Part of a step at which the locus meets another bifurcation or ends, and the point there."""
 
-    values: tuple[float, float]
-    """Values of both parameters."""
-    orbit: PeriodicOrbit
-    tangent: Floats
-    """Direction of the locus, shape (p + 2,)."""
-
-
-@dataclass(slots=True)
-class Locus:
-    """Locus of a bifurcation over two parameters.
-
-    Attributes
-    ----------
-    kind : str
-        `fold`, `period doubling`, `graze` or `graze between impacts`.
-    points : list of LocusPoint
-    special : list of tuple of (str, LocusPoint)
-        Points of codimension 2: `graze` or `graze between impacts` on a locus of another kind; `another`, a second
-        graze between impacts.
-    ends : list of str
-    origin : str
-        Branch and point from which it starts.
-    """
-
-    kind: str
-    points: list[LocusPoint] = field(default_factory=list)
-    special: list[tuple[str, LocusPoint]] = field(default_factory=list)
-    ends: list[str] = field(default_factory=list)
-    origin: str = ""
+    part: float
+    at: LocusPoint
+    end: str = ""
+    """Reason why the locus ends there, if it does."""
+    special: str = ""
+    start: Bifurcation | None = None
 
 
 class LocusFollower:
@@ -97,113 +93,137 @@ class LocusFollower:
         OrbitError
             The bifurcation is of a kind that cannot be followed.
         """
-        sides = []
-        for sign in (-1.0, 1.0):
-            side = Locus(point.kind)
-            for _ in self.walk(side, point.at, values, sign):
-                pass
-            sides.append(side)
-        return joined_loci(*sides)
+        ways = Locus(point.kind), Locus(point.kind)
+        for _ in self.both_ways(*ways, Bifurcation.of(point, values)):
+            pass
+        return joined_loci(*ways)
 
-    def walk(
-        self, locus: Locus, at: BranchOrbit, values: tuple[float, float], sign: float
-    ) -> Iterator[LocusPoint]:
+    def both_ways(self, backward: Locus, forward: Locus, start: Bifurcation) -> Iterator[Locus]:
+        """Follow to lower values of the second parameter, then to higher ones; a closed locus is passed once."""
+        for way, sign in ((backward, -1.0), (forward, 1.0)):
+            if backward.is_closed:
+                return
+            for _ in self.walk(way, start, sign):
+                yield way
+
+    def walk(self, locus: Locus, start: Bifurcation, sign: float) -> Iterator[LocusPoint]:
         """Follow one way, at first towards higher (+1) or lower (-1) values of the second parameter."""
         if locus.kind not in FOLLOWED_KINDS:
             raise OrbitError(f"loci: expected a {', a '.join(FOLLOWED_KINDS)}, got a {locus.kind}.")
-        unknowns = np.concatenate([at.orbit.phases, np.array(values) / self._spans])
-        tangent = self._tangent(locus.kind, at.orbit, unknowns)
-        if tangent[-1] * sign < 0.0:
-            tangent = -tangent
-        now = LocusPoint(values, at.orbit, tangent)
+        tangent = self._tangent(start, start.orbit, self._unknowns(start.orbit, start.values))
+        now = LocusPoint(start.values, start.orbit, -tangent if tangent[-1] * sign < 0.0 else tangent)
         longest = self._ranges[0].longest
         step = 0.1 * longest
         locus.points.append(now)
         yield now
         while len(locus.points) < self._ranges[0].most_orbits:
-            found = self._step(locus.kind, now, step)
+            found = self._step(start, now, step)
             if found is None:
                 step *= 0.5
                 if step < SHORTEST * longest:
-                    locus.ends.append(self._reason_for_end(locus, now, 1e-3 * longest))
+                    locus.ends.append(self._reason_for_end(locus, start, now, 1e-3 * longest))
                     return
                 continue
             taken, newton = found
-            end = self._end(locus, now, taken, step)
-            if end is not None:
-                reason, last = end
-                if last is not None:
-                    locus.points.append(last)
-                    yield last
-                locus.ends.append(reason)
+            for event in self._events(start, now, taken, step, is_first=now is locus.points[0]):
+                if event.at is not now:
+                    locus.points.append(event.at)
+                    yield event.at
+                locus.special += [(event.special, event.at)] if event.special else []
+                locus.starts += [event.start] if event.start is not None else []
+                if event.end:
+                    locus.ends.append(event.end)
+                    return
+            if len(locus.points) > 2 and self._closes(locus.points[0], now, taken):
+                locus.points.append(locus.points[0])
+                locus.ends.append(CLOSED)
+                yield locus.points[0]
                 return
             locus.points.append(taken)
             yield taken
             now, step = taken, min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
         locus.ends.append(f"{self._ranges[0].most_orbits} orbits")
 
+    def goes_through(self, locus: Locus, start: Bifurcation) -> bool:
+        """Tell whether a locus goes through a bifurcation, from whichever impact and period its orbit is counted."""
+        like, orbit = locus.points[0].orbit, start.orbit
+        if (locus.kind, like.periods, like.phases.size) != (start.kind, orbit.periods, orbit.phases.size):
+            return False
+        path = np.array([self._unknowns(each.orbit, each.values) for each in locus.points])
+        steps = np.diff(path, axis=0)
+        lengths = np.sqrt((steps**2).sum(axis=1))
+        whole = TURN * orbit.periods
+        for first in range(orbit.phases.size):
+            if (np.roll(orbit.contacts, -first) != like.contacts).any():
+                continue
+            phases = np.append(orbit.phases[first:], orbit.phases[:first] + whole)
+            apart = path - np.concatenate([phases, np.array(start.values) / self._spans])
+            apart[:, :-2] -= TURN * np.round(apart[:, :1] / TURN)
+            shares = -(apart[:-1] * steps).sum(axis=1) / np.maximum(lengths**2, np.finfo(np.float64).tiny)
+            off = apart[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * steps
+            near = np.flatnonzero(np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths)
+            alike = start.kind != BETWEEN or any(
+                not _is_other_maximum(locus.points[each].orbit, orbit, first) for each in near
+            )
+            if near.size and alike:
+                return True
+        return False
+
     # ---- equations ----
 
-    def _made(self, orbit: PeriodicOrbit, unknowns: Floats) -> tuple[PeriodicOrbit, Floats, Floats]:
-        phases = unknowns[:-2]
-        body = self._body_at(*(unknowns[-2:] * self._spans))
+    def _unknowns(self, orbit: PeriodicOrbit, values: tuple[float, float]) -> Floats:
+        return np.concatenate([orbit.phases, np.array(values) / self._spans])
+
+    def _made(self, orbit: PeriodicOrbit, unknowns: Floats) -> tuple[PeriodicOrbit, Floats]:
+        """Return the orbit of some unknowns, with its distances from the stops over the size of the motion."""
+        phases, values = unknowns[:-2], unknowns[-2:] * self._spans
+        body = self._body_at(float(values[0]), float(values[1]))
         found = evaluated(body, orbit.contacts, phases, orbit.periods)
         made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
-        return made, found.distances, found.distance_slopes
+        return made, found.distances / body.scale
 
-    def _equations(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        made, distances, slopes = self._made(orbit, unknowns)
-        if kind == "graze":
-            test = float(made.velocities.min())
-        elif kind == "graze between impacts":
-            beyond, _, contact = made.highest
-            test = beyond / made.body.scale if contact >= 0 else np.nan
-        elif kind == "fold":
-            test = float(np.linalg.det(slopes / made.body.scale))
-        else:
-            size = made.monodromy.shape[0]
-            fast = float(np.prod(made.velocities))
-            known = np.isfinite(made.monodromy).all()
-            test = float(np.linalg.det(made.monodromy + np.eye(size))) * fast if known else np.nan
+    def _equations(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+        made, distances = self._made(orbit, unknowns)
+        test = start.test(made)
         if not np.isfinite(test):
             raise OrbitError("loci: expected impacts with a speed, and a maximum between them; got none.")
-        return np.append(distances / made.body.scale, test)
+        return np.append(distances, test)
 
-    def _slopes(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+    def _slopes(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
         columns = []
         for k in range(unknowns.size):
             ends = []
             for side in (1.0, -1.0):
                 moved = unknowns.copy()
                 moved[k] += side * CHANGE
-                ends.append(self._equations(kind, orbit, moved))
+                ends.append(self._equations(start, orbit, moved))
             columns.append((ends[0] - ends[1]) / (2.0 * CHANGE))
         return np.column_stack(columns)
 
-    def _tangent(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        return np.asarray(np.linalg.svd(self._slopes(kind, orbit, unknowns))[2][-1], dtype=np.float64)
+    def _tangent(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+        return np.asarray(np.linalg.svd(self._slopes(start, orbit, unknowns))[2][-1], dtype=np.float64)
 
     def _step(
-        self, kind: str, now: LocusPoint, step: float, most_turn: float = MOST_TURN
+        self, start: Bifurcation, now: LocusPoint, step: float, most_turn: float = MOST_TURN
     ) -> tuple[LocusPoint, int] | None:
-        start = np.concatenate([now.orbit.phases, np.array(now.values) / self._spans])
-        unknowns = start + step * now.tangent
+        begin = self._unknowns(now.orbit, now.values)
+        unknowns = begin + step * now.tangent
         try:
-            slopes = self._slopes(kind, now.orbit, unknowns)
+            slopes = self._slopes(start, now.orbit, unknowns)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                residual = self._equations(kind, now.orbit, unknowns)
+                residual = self._equations(start, now.orbit, unknowns)
                 matrix = np.vstack([slopes, now.tangent])
-                off = step - now.tangent @ (unknowns - start)
+                off = step - now.tangent @ (unknowns - begin)
                 change = np.linalg.solve(matrix, np.append(-residual, off))
                 if not np.abs(change).max() < 0.5:
                     return None
                 unknowns = unknowns + change
-                if np.abs(change).max() < CLOSED * (1.0 + np.abs(unknowns).max()):
+                if np.abs(change).max() < FOUND * (1.0 + np.abs(unknowns).max()):
                     break
             else:
                 return None
             orbit = self._made(now.orbit, unknowns)[0]
-            tangent = self._tangent(kind, orbit, unknowns)
+            tangent = self._tangent(start, orbit, unknowns)
         except (OrbitError, np.linalg.LinAlgError):
             return None
         if tangent @ now.tangent < 0.0:
@@ -213,46 +233,105 @@ class LocusFollower:
         values = unknowns[-2:] * self._spans
         return LocusPoint((float(values[0]), float(values[1])), orbit, tangent), newton
 
-    # ---- ends ----
+    def _closes(self, first: LocusPoint, now: LocusPoint, taken: LocusPoint) -> bool:
+        """Tell whether a step passes the first point of the locus, in the direction of the first step."""
+        here, ahead, goal = (self._unknowns(each.orbit, each.values) for each in (now, taken, first))
+        step, left = ahead - here, goal - here
+        length = float(np.linalg.norm(step))
+        part = float(left @ step) / length**2
+        off = float(np.linalg.norm(left - part * step))
+        return 0.0 < part <= 1.0 and off < OFF_CHORD * length and bool(first.tangent @ step > 0.0)
 
-    def _end(
-        self, locus: Locus, now: LocusPoint, taken: LocusPoint, step: float
-    ) -> tuple[str, LocusPoint | None] | None:
-        """Return the reason why a locus ends between two points, and the last point; None if it continues."""
-        if locus.kind != "graze" and taken.orbit.velocities.min() <= 0.0 < now.orbit.velocities.min():
-            found = self._last(locus.kind, now, step, lambda each: each.orbit.velocities.min() > 0.0)
-            locus.special.append(("graze", found))
-            return "graze", found
-        between = locus.kind == "graze between impacts"
-        if between and _is_other_maximum(now, taken):
-            found = self._last(locus.kind, now, step, lambda each: not _is_other_maximum(now, each))
-            locus.special.append(("another", found))
-            return "another graze between impacts", found
+    # ---- events of a step ----
+
+    def _events(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
+    ) -> list[_Event]:
+        """Return the events of a step, in order, up to the end of the locus; the first point may be a zero itself."""
+        events = [
+            *self._other_kinds(start, now, taken, step, is_first=is_first),
+            *self._ends_of_range(start, now, taken, step),
+            *self._grazes(start, now, taken, step, is_first=is_first),
+        ]
+        events.sort(key=lambda event: event.part)
+        ends = [place for place, event in enumerate(events) if event.end]
+        if ends:  # a zero at the end itself belongs to the locus that leaves the end
+            last = events[ends[0]]
+            events = [each for each in events if each is last or each.part < last.part - ZERO * step]
+        if start.kind == "torus" and not ends and not turns_round(taken.orbit.multipliers):
+            double = taken.orbit.multipliers[np.argmin(np.abs(np.abs(taken.orbit.multipliers) - 1.0))].real
+            return [_Event(0.0, now, "fold" if double > 0.0 else "period doubling")]
+        return events
+
+    def _other_kinds(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
+    ) -> Iterator[_Event]:
+        """Yield the bifurcations of other kinds that the locus passes; a torus may end there."""
+        for kind, test in SMOOTH.items():
+            if kind == start.kind or (
+                kind == "torus" and (now.orbit.body.frequencies.size < 2 or start.kind == GRAZE)
+            ):
+                continue
+            found = self._zero(start, now, taken, step, lambda each, of=test: of(each.orbit), is_first)  # type: ignore[misc]
+            if found is None or (kind == "torus" and not meets_torus(found[1].orbit.multipliers)):
+                continue
+            part, at = found
+            is_last = start.kind == "torus" and not turns_round(taken.orbit.multipliers)
+            yield _Event(part, at, kind if is_last else "", kind, Bifurcation(kind, at.orbit, at.values))
+
+    def _ends_of_range(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float
+    ) -> Iterator[_Event]:
         for place, settings in enumerate(self._ranges):
             for bound in (settings.lowest, settings.highest):
                 before, after = now.values[place], taken.values[place]
                 if before == bound and not settings.lowest <= after <= settings.highest:
-                    return "end of the range", None
-                if (before - bound) * (after - bound) < 0.0:
-                    return "end of the range", self._located(locus.kind, now, step, _beyond(place, bound))
-        if not between and taken.orbit.highest[0] > TOUCHES * taken.orbit.body.scale >= now.orbit.highest[0]:
-            touch = self._located(locus.kind, now, step, _beyond_stop)
-            if touch is not None:
-                locus.special.append(("graze between impacts", touch))
-            return "graze between impacts", touch
-        return None
+                    yield _Event(0.0, now, END_OF_RANGE)
+                elif (before - bound) * (after - bound) < 0.0:
+                    found = self._located(start, now, step, _beyond(place, bound))
+                    yield _Event(step, taken, END_OF_RANGE) if found is None else _Event(*found, END_OF_RANGE)
 
-    def _reason_for_end(self, locus: Locus, now: LocusPoint, step: float) -> str:
+    def _grazes(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
+    ) -> Iterator[_Event]:
+        """Yield the graze of a step, after which the orbit is none: of an impact, or of a maximum between impacts."""
+        speeds = start.other_speeds(taken.orbit)
+        slowest = int(speeds.argmin())
+        if speeds[slowest] <= 0.0:
+            if is_first and abs(now.orbit.velocities[slowest]) < ZERO * abs(speeds[slowest]):
+                yield _Event(0.0, now, GRAZE)
+                return
+            part, at = self._last(start, now, step, lambda each: each.orbit.velocities[slowest] > 0.0)
+            yield _Event(part, at, GRAZE, GRAZE, Bifurcation(GRAZE, at.orbit, at.values, slowest))
+        elif start.kind == BETWEEN:
+            if _is_other_maximum(now.orbit, taken.orbit):
+                part, at = self._last(
+                    start, now, step, lambda each: not _is_other_maximum(now.orbit, each.orbit)
+                )
+                other = Bifurcation(BETWEEN, taken.orbit, taken.values)
+                yield _Event(part, at, "another graze between impacts", "another", other)
+        elif beyond_stop(taken.orbit) > 0.0:
+            if is_first and abs(beyond_stop(now.orbit)) < ZERO * beyond_stop(taken.orbit):
+                yield _Event(0.0, now, BETWEEN)
+                return
+            found = self._located(start, now, step, lambda each: beyond_stop(each.orbit))
+            part, at = found or self._last(start, now, step, lambda each: beyond_stop(each.orbit) <= 0.0)
+            yield _Event(part, at, BETWEEN, BETWEEN, Bifurcation(BETWEEN, at.orbit, at.values))
+
+    def _reason_for_end(self, locus: Locus, start: Bifurcation, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
-        if locus.kind != "graze between impacts":
+        if locus.kind != BETWEEN:
             return "cannot be followed further"
-        slow = now.orbit.velocities.min() / now.orbit.velocities.max()
-        if slow < SLOW:
-            locus.special.append(("graze", self._without_speed(locus)))
-            return "graze"
-        found = self._step(locus.kind, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
-        if found is not None and _is_other_maximum(now, found[0]):
+        slowest = int(now.orbit.velocities.argmin())
+        if now.orbit.velocities[slowest] / now.orbit.velocities.max() < SLOW:
+            at = self._without_speed(locus)
+            locus.special.append((GRAZE, at))
+            locus.starts.append(Bifurcation(GRAZE, at.orbit, at.values, slowest))
+            return GRAZE
+        found = self._step(start, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
+        if found is not None and _is_other_maximum(now.orbit, found[0].orbit):
             locus.special.append(("another", now))
+            locus.starts.append(Bifurcation(BETWEEN, found[0].orbit, found[0].values))
             return "another graze between impacts"
         return "cannot be followed further"
 
@@ -265,69 +344,70 @@ class LocusFollower:
         slowest = now.orbit.velocities.min()
         faster = [each for each in locus.points if each.orbit.velocities.min() > 10.0 * slowest]
         before = faster[-1] if faster else locus.points[0]
-        rows = [
-            np.concatenate([each.orbit.phases, np.array(each.values) / self._spans]) for each in (before, now)
-        ]
+        rows = [self._unknowns(each.orbit, each.values) for each in (before, now)]
         part = slowest / (before.orbit.velocities.min() - slowest)
         unknowns = rows[1] + part * (rows[1] - rows[0])
         values = unknowns[-2:] * self._spans
-        orbit = self._made(now.orbit, unknowns)[0]
-        return LocusPoint((float(values[0]), float(values[1])), orbit, now.tangent)
+        return LocusPoint(
+            (float(values[0]), float(values[1])), self._made(now.orbit, unknowns)[0], now.tangent
+        )
+
+    def _zero(
+        self,
+        start: Bifurcation,
+        now: LocusPoint,
+        taken: LocusPoint,
+        step: float,
+        test: Callable[[LocusPoint], float],
+        is_first: bool,
+    ) -> tuple[float, LocusPoint] | None:
+        """Return the part of a step at which a function changes its sign, and the point there; None without one."""
+        before, after = test(now), test(taken)
+        if not before * after < 0.0 or (is_first and abs(before) < ZERO * abs(after)):
+            return None
+        return self._located(start, now, step, test)
 
     def _last(
-        self, kind: str, now: LocusPoint, step: float, holds: Callable[[LocusPoint], bool]
-    ) -> LocusPoint:
-        """Return the last point of a step for which a condition holds: beyond it there may be no points."""
+        self, start: Bifurcation, now: LocusPoint, step: float, holds: Callable[[LocusPoint], bool]
+    ) -> tuple[float, LocusPoint]:
+        """Return the last point of a step for which a condition holds, after its part of the step.
+
+        Beyond it there may be no points.
+        """
         part, beyond, last = 0.0, step, now
         while beyond - part > LOCATED * step:
             middle = 0.5 * (part + beyond)
-            found = self._step(kind, now, middle)
+            found = self._step(start, now, middle)
             if found is None or not holds(found[0]):
                 beyond = middle
             else:
                 part, last = middle, found[0]
-        return last
+        return part, last
 
     def _located(
-        self, kind: str, now: LocusPoint, step: float, test: Callable[[LocusPoint], float]
-    ) -> LocusPoint | None:
+        self, start: Bifurcation, now: LocusPoint, step: float, test: Callable[[LocusPoint], float]
+    ) -> tuple[float, LocusPoint] | None:
         from scipy.optimize import brentq
 
         def at(part: float) -> float:
-            found = (now, 0) if part == 0.0 else self._step(kind, now, part)
+            found = (now, 0) if part == 0.0 else self._step(start, now, part)
             return float(np.nan) if found is None else test(found[0])
 
         try:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
         except (ValueError, RuntimeError):
             return None
-        found = self._step(kind, now, part)
-        return None if found is None else found[0]
-
-
-def joined_loci(backward: Locus, forward: Locus) -> Locus:
-    """Return both ways from one point as one locus."""
-    return Locus(
-        forward.kind,
-        backward.points[::-1] + forward.points[1:],
-        backward.special[::-1] + forward.special,
-        backward.ends + forward.ends,
-        forward.origin,
-    )
+        found = self._step(start, now, part)
+        return None if found is None else (part, found[0])
 
 
 def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
     return lambda point: point.values[place] - bound
 
 
-def _beyond_stop(point: LocusPoint) -> float:
-    """Return the distance of the highest maximum beyond its stop, over the size of the motion; at least -1."""
-    return max(point.orbit.highest[0] / point.orbit.body.scale, -1.0) - TOUCHES
-
-
-def _is_other_maximum(one: LocusPoint, other: LocusPoint) -> bool:
-    """Tell whether the highest maxima between impacts of two orbits are different maxima."""
-    (_, at, contact), (_, at_other, contact_other) = one.orbit.highest, other.orbit.highest
-    whole = TURN * one.orbit.periods
-    moved = (at_other - other.orbit.phases[0]) - (at - one.orbit.phases[0])
+def _is_other_maximum(one: PeriodicOrbit, other: PeriodicOrbit, first: int = 0) -> bool:
+    """Tell whether the highest maxima of two orbits differ; the other orbit is counted from one of its impacts."""
+    (_, at, contact), (_, at_other, contact_other) = one.highest, other.highest
+    whole = TURN * one.periods
+    moved = (at_other - other.phases[first]) - (at - one.phases[0])
     return contact != contact_other or abs(np.mod(moved + 0.5 * whole, whole) - 0.5 * whole) > JUMP

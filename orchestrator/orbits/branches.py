@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
+from vibroimpact.analysis.orbits.branches import dataset_of_branches
 from vibroimpact.analysis.orbits.departures import Departure, departures, passes
 from vibroimpact.analysis.orbits.following import (
     BRANCH_POINT,
@@ -23,7 +23,6 @@ from vibroimpact.analysis.orbits.following import (
     SpecialPoint,
     joined,
 )
-from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError
@@ -90,115 +89,6 @@ class Followed:
         )
 
 
-@dataclass(slots=True)
-class FollowedLoci:
-    """Bifurcations that were followed over two parameters."""
-
-    followed: Followed
-    """The branches with the bifurcations."""
-    second: str
-    """Key of the second parameter."""
-    loci: list[Locus] = field(default_factory=list)
-    """The curves so far."""
-
-    @property
-    def dataset(self) -> xr.Dataset:
-        """Their orbits as runs."""
-        scene, keys = self.followed.scene, [self.followed.parameter, self.second]
-        names = coordinate_name(keys[0], keys), coordinate_name(keys[1], keys)
-        return dataset_of_loci(
-            self.loci,
-            coordinates=names,
-            unit_of={name: cf_unit(scene, key) or "1" for name, key in zip(names, keys, strict=True)},
-            units=scene.units,
-            attrs=self.followed.attributes
-            | {
-                "second_parameter": self.second,
-                "curves": "\n".join(self.names),
-                "not_looked_for": self.left_out,
-            },
-        )
-
-    @property
-    def names(self) -> list[str]:
-        """Kind and orbit of each curve, and the branch on which it was found."""
-        return [
-            f"{number}  {locus.kind} of {locus.points[0].orbit.full_name}; begun from {locus.origin}"
-            for number, locus in enumerate(self.loci, start=1)
-        ]
-
-    @property
-    def left_out(self) -> str:
-        """A sentence on the bifurcations that were not searched."""
-        scene, points = (
-            self.followed.scene,
-            [point for each in self.followed.branches for point in each.points],
-        )
-        text = (
-            f"Curves were begun only where a branch has a {', '.join(FOLLOWED_KINDS[:-1])} or {FOLLOWED_KINDS[-1]} at "
-            f"{self.second} = {scene.value(self.second):g}: others, and those that leave points of codimension 2, were "
-            f"not looked for. Begin at other values of {self.second} to find more."
-        )
-        others = [point for point in points if point.kind not in FOLLOWED_KINDS]
-        if others:
-            where = ", ".join(f"{point.kind} at {point.at.value:.8g}" for point in others)
-            text += f" Not followed: {where}."
-        return text
-
-
-def follow_loci(result: FollowedLoci, first: FollowSettings, second: FollowSettings) -> Iterator[Locus]:
-    """Follow folds, period doublings and grazes of the branches over a second parameter; yield each locus as it grows.
-
-    The settings have the ranges of both parameters. The loci go into `result`. UsageError: the second parameter is no
-    number of the scene.
-    """
-    scene, keys = result.followed.scene, (result.followed.parameter, result.second)
-    value = float(scene.value(result.second))
-    follower = LocusFollower(
-        lambda *both: _body_along(scene, dict(zip(keys, both, strict=True))), first, second
-    )
-    for number, branch in enumerate(result.followed.branches, start=1):
-        for point in branch.points:
-            if point.kind not in FOLLOWED_KINDS or _is_on(result.loci, point, value, first, second):
-                continue
-            origin = f"branch {number}, {branch.full_name}, at {point.at.value:.8g}"
-            ways = Locus(point.kind, origin=origin), Locus(point.kind, origin=origin)
-            try:
-                for way, sign in zip(ways, (-1.0, 1.0), strict=True):
-                    for _ in follower.walk(way, point.at, (point.at.value, value), sign):
-                        yield way
-            finally:
-                if ways[0].points:
-                    result.loci.append(joined_loci(*ways))
-
-
-def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
-    """Raise UsageError unless the second parameter differs from the first, and its range holds the scene's value."""
-    if result.followed.parameter == result.second:
-        raise UsageError(
-            f"--second: expected another number of the scene than {result.second}, got the same."
-        )
-    value = float(result.followed.scene.value(result.second))
-    if not second.lowest <= value <= second.highest:
-        raise UsageError(
-            f"--second-from, --second-to: expected a range around {result.second} = {value:g} of the scene, "
-            f"got {second.lowest:g} to {second.highest:g}."
-        )
-
-
-def _is_on(
-    loci: list[Locus], point: SpecialPoint, value: float, first: FollowSettings, second: FollowSettings
-) -> bool:
-    """Return whether a known locus goes through a point."""
-    for locus in loci:
-        if locus.kind == point.kind and locus.points[0].orbit.name == point.at.orbit.name:
-            rows = np.array([each.values for each in locus.points])
-            apart = (rows - (point.at.value, value)) / (first.span, second.span)
-            if _off_path(apart, np.diff(apart, axis=0)) < SAME_ORBIT:
-                return True
-    return False
-
-
 def follow_branches(
     followed: Followed,
     start: float,
@@ -211,6 +101,7 @@ def follow_branches(
     grazes: int = 1,
     longest: float = 0.01,
     looking: Callable[[float], None] = lambda value: None,
+    required: bool = True,
 ) -> Followings:
     """Follow orbits P(p,q), and branches that begin at their special points; yield each orbit with its branch.
 
@@ -219,7 +110,7 @@ def follow_branches(
     with each value at which orbits of several impacts are searched.
 
     UsageError: the scene has no such orbits, or the parameter is no number of it. OrbitError: there is no orbit to
-    begin with.
+    begin with, and one is `required`.
     """
     scene, parameter = followed.scene, followed.parameter
     _refuse(start, stop, impacts, periods, doublings, grazes, longest)
@@ -230,7 +121,7 @@ def follow_branches(
     for value, orbit in starts:
         if not _is_known(followed.branches, orbit, value, settings):
             yield from _both_ways(follower, orbit, value, followed)
-    if not followed.branches:
+    if required and not followed.branches:
         raise OrbitError(
             message(
                 f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
@@ -368,7 +259,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
         if value not in kept:
             if len(kept) > 8:
                 kept.clear()
-            kept[value] = _body_along(scene, {parameter: value})
+            kept[value] = body_along(scene, {parameter: value})
         return kept[value]
 
     impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
@@ -380,7 +271,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
     return body_at
 
 
-def _body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
+def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
         return impacting_body(scene.at(values))

@@ -27,11 +27,15 @@ from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, ref
 from vibroimpact.orchestrator.orbits.branches import (
     HISTORY,
     Followed,
-    FollowedLoci,
     Meeting,
     follow_branches,
-    follow_loci,
     orbits_not_followed,
+)
+from vibroimpact.orchestrator.orbits.loci import (
+    COARSE,
+    FollowedLoci,
+    at_other_values,
+    follow_loci,
     refuse_second,
 )
 from vibroimpact.orchestrator.orbits.seeds import Seed
@@ -97,29 +101,44 @@ class Following(Study[str]):
         )
 
     def rows(self) -> Generator[str, None, None]:
-        """Follow branches, then their bifurcations."""
+        """Follow branches, then their bifurcations, also those of branches at other values of the second number."""
         first, *others = self._settings()
         for each in others:
             refuse_second(self.loci, each)
+        yield from self._branches(self.followed, self.step)
+        for each in others:
+            yield from self._loci(first, each, self.followed)
+            if self.seed is None and self.impacts in (None, 1):
+                for at_other_value in at_other_values(self.loci, each):
+                    yield from self._branches(at_other_value, max(self.step, COARSE), required=False)
+                    yield from self._loci(first, each, at_other_value)
+
+    def _branches(
+        self, followed: Followed, step: float, *, required: bool = True
+    ) -> Generator[str, None, None]:
         orbits = follow_branches(
-            *(self.followed, self.start, self.stop),
+            *(followed, self.start, self.stop),
             impacts=self.impacts,
             periods=self.periods,
             seed=self.seed,
             doublings=self.doublings,
             grazes=self.grazes,
-            longest=self.step,
+            longest=step,
             looking=lambda value: self.status(f"{self.begins}, {self.parameter} {value:.6g}"),
+            required=required,
         )
         for branch, orbit in orbits:
             if len(branch.orbits) % 20 == 1:
                 many = counted(len(branch.orbits), "orbit")
                 self.status(f"{branch.name}: {many}, {self.parameter} {orbit.value:.6g}")
             yield branch.name
-        for each in others:
-            for locus in follow_loci(self.loci, first, each):
-                self.status(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")
-                yield locus.kind
+
+    def _loci(
+        self, first: FollowSettings, second: FollowSettings, followed: Followed
+    ) -> Generator[str, None, None]:
+        for locus in follow_loci(self.loci, first, second, followed):
+            self.status(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")
+            yield locus.kind
 
     def _settings(self) -> list[FollowSettings]:
         ranges = [(self.start, self.stop), *([self.second_range] if self.second_range else [])]

@@ -51,8 +51,22 @@ COMMANDS = {
     f'orbit {BIFURCATION} --set "sweep={{}}" --set forcing.angular_frequency=0.93': Shown(
         ("P(1,1)   unstable", "P(1,2)   stable", "2 physical orbits.")
     ),
-    f"follow {BIFURCATION} --set forcing.amplitude=0.65 {FREQUENCY} --from 0.3 --to 2.2 {SECOND}": Shown(
-        ("fold and graze: 0.66583281185, 0.56063456", "fold and graze: 0.49937460889, 0.752284281"),
+    f"follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second forcing.amplitude --second-from 0.02 "
+    "--second-to 0.8 --doublings 0 --figure figure_3_5a.png": Shown(
+        ("fold: 0.66583281185, 0.56063456", "fold and graze: 0.49937460889, 0.752284281"),
+        (424, 222, 164, 111),
+        is_long=True,
+    ),
+    f'follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second "stop[1].position" --second-from 0.5 '
+    "--second-to 5.5 --doublings 0 --figure figure_3_5b.png": Shown(
+        ("fold: 0.66583281185, 0.89184655", "fold: 0.49937460889, 0.66464235"),
+        (400, 219, 165, 131, 120),
+        is_long=True,
+    ),
+    f"follow {BIFURCATION} --set forcing.amplitude=0.55 {FREQUENCY} --from 0.6 --to 0.75 --second forcing.amplitude "
+    "--second-from 0.5 --second-to 0.65 --doublings 0 --figure figure_3_10.png": Shown(
+        ("graze and period doubling: 0.66583281185, 0.56063456", "graze and fold: 0.66583281185, 0.56063456"),
+        (133, 81, 79),
         is_long=True,
     ),
     "energies examples/thesis/figure_6_15.toml": Shown(("0.630961", "0.859039", "0.760263")),
@@ -71,9 +85,9 @@ COMMANDS = {
     f"campaign {BIFURCATION} -o sweep": Shown(("802 points computed",)),
     "plot branches.nc --over sweep -o both.png": Shown((), (16_040, 9688, 253)),
     f"follow {BIFURCATION} {FREQUENCY} --from 0.3 --to 2.2 {SECOND} -o loci.nc --figure loci.png": Shown(
-        ("0.99874921777, 0.0999062060", "0.66583281185, 0.56063456"), (414, 214, 131), is_long=True
+        ("0.99874921777, 0.0999062060", "0.66583281185, 0.56063456"), (424, 402, 212), is_long=True
     ),
-    "plot loci.nc --over map -o loci_map.png": Shown((), (414, 414, 214), is_long=True),
+    "plot loci.nc --over map -o loci_map.png": Shown((), (424, 424, 402), is_long=True),
     "classify campaign -o classes.nc --figure classes.png": Shown(("P(1,1)", "P(1,2)"), (6840, 5500)),
     "lyapunov campaign -o exponents.nc --figure exponents.png": Shown(
         ("508 runs have exponents",), (314, 194)

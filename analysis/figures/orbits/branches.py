@@ -37,6 +37,7 @@ _BELOW: dict[str, Any] = {
 _LOCI: dict[SpecialOrbit, dict[str, Any]] = {
     SpecialOrbit.fold: {"color": "#0F4C81", "linestyle": "-"},
     SpecialOrbit.period_doubling: {"color": "#B5410B", "linestyle": (0, (4, 1.5))},
+    SpecialOrbit.torus: {"color": "#A8327D", "linestyle": (0, (6, 1.2))},
     SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
     SpecialOrbit.graze_between_impacts: {"color": "#6F4E9C", "linestyle": (0, (5, 1.2, 1.2, 1.2))},
 }
@@ -124,7 +125,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    legend_outside(figure, panels[0], ncols=3)
+    legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
     return figure
 
 

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from vibroimpact.analysis.orbits import Contact, ImpactingBody, closed_form
+from vibroimpact.analysis.orbits import Contact, ImpactingBody, PeriodicOrbit, closed_form
+from vibroimpact.analysis.orbits.bifurcations import Bifurcation, Locus, joined_loci
 from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings, SpecialPoint
-from vibroimpact.analysis.orbits.loci import Locus, LocusFollower
+from vibroimpact.analysis.orbits.loci import LocusFollower
 
 RATIO = 0.04
 DAMPED = np.sqrt(1.0 - RATIO**2)
 
 
-def oscillator(frequency: float, force: float) -> ImpactingBody:
+def oscillator(
+    frequency: float, force: float, ratio: float = RATIO, restitution: float = 0.75
+) -> ImpactingBody:
     one = np.ones(1)
     return ImpactingBody(
-        one, RATIO * one, force * one, 0.0 * one, frequency, 0.0, (Contact(one, 1.0, 0.8, 0.75),), one
+        one, ratio * one, force * one, 0.0 * one, frequency, 0.0, (Contact(one, 1.0, 0.8, restitution),), one
     )
 
 
@@ -65,3 +70,57 @@ def test_folds_and_doublings_end_at_the_points_of_codimension_two(points: dict[s
     assert fold.special[0][1].values == pytest.approx(
         next(point.values for _, point in doubling.special if point.values[0] > 0.9), abs=1e-9
     )
+
+
+@settings(max_examples=3, deadline=None)
+@given(ratio=st.floats(0.005, 0.3), restitution=st.floats(0.1, 0.95), frequency=st.floats(1.05, 1.2))
+def test_one_fold_and_one_doubling_leave_each_point_of_codimension_two_of_a_curve_of_grazes(
+    ratio: float, restitution: float, frequency: float
+) -> None:
+    """Equations.md 4.6: the frequencies are 2 w_d / n; the loci that leave have the multipliers 1 and -1."""
+    force = 0.8 * np.hypot(1.0 - frequency**2, 2.0 * ratio * frequency)
+    lag = np.arctan2(2.0 * ratio * frequency, 1.0 - frequency**2)
+    body = oscillator(frequency, force, ratio, restitution)
+    graze = PeriodicOrbit(body, 1, np.array([lag]), np.zeros(1, np.int32), np.zeros(1))
+    follower = LocusFollower(
+        lambda w, f: oscillator(w, f, ratio, restitution),
+        FollowSettings(0.6, 1.3, 0.05),
+        FollowSettings(1e-3, 3.0),
+    )
+    ways = Locus("graze"), Locus("graze")
+    assert list(follower.both_ways(*ways, Bifurcation("graze", graze, (frequency, force), 0)))
+    grazes = joined_loci(*ways)
+    expected = 2.0 * np.sqrt(1.0 - ratio**2) / np.arange(1, 10)
+    expected = expected[(expected > 0.6) & (expected < 1.3)]
+    for kind, multiplier in (("fold", 1.0), ("period doubling", -1.0)):
+        met = sorted((each for each in grazes.starts if each.kind == kind), key=lambda each: -each.values[0])
+        np.testing.assert_allclose([each.values[0] for each in met], expected, atol=1e-9)
+        leaving = Locus(kind), Locus(kind)
+        assert list(follower.both_ways(*leaving, met[0]))
+        locus = joined_loci(*leaving)
+        assert follower.goes_through(locus, met[0])
+        assert not follower.goes_through(grazes, met[0])
+        middle = locus.points[len(locus.points) // 2].orbit
+        assert middle.velocities[0] > 0.0
+        assert np.abs(middle.multipliers - multiplier).min() < 1e-6
+
+
+def test_a_closed_locus_ends_where_it_began() -> None:
+    """At a fixed frequency the fold has one force, which this body has on a circle of both parameters."""
+    force = 0.180607698844102
+    follower = LocusFollower(
+        lambda x, y: oscillator(1.35, force + x**2 + y**2 - 0.01),
+        FollowSettings(-1.0, 1.0, 0.02),
+        FollowSettings(-1.0, 1.0),
+    )
+    orbit = closed_form(oscillator(1.35, force + 1e-15))[0]
+    ways = Locus("fold"), Locus("fold")
+    assert list(follower.both_ways(*ways, Bifurcation("fold", orbit, (0.1, 0.0))))
+    assert ways[0].ends == ["closed"]
+    assert ways[1].points == []
+    path = np.array([each.values for each in ways[0].points])
+    np.testing.assert_allclose(np.hypot(*path.T), 0.1, atol=1e-9)
+    assert (path[0] == path[-1]).all()
+    turned = np.unwrap(np.arctan2(path[:, 1], path[:, 0]))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2.0 * np.pi)
+    assert follower.goes_through(ways[0], Bifurcation("fold", orbit, (0.0, 0.1)))

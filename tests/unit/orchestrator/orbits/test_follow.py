@@ -122,12 +122,14 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def loci() -> xr.Dataset:
     both = {"second": "forcing.amplitude", "second_range": (0.3, 0.7)}
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, grazes=0, **both)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vibroimpact.orchestrator.orbits.loci.SECOND_VALUES", 3)
+        return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, grazes=0, **both)
 
 
 def test_bifurcations_over_two_numbers_are_a_dataset_and_drawn(loci: xr.Dataset) -> None:
     assert {"angular_frequency", "amplitude"} <= set(loci.coords)
-    assert set(np.unique(loci["orbit_special"].values)) == {1, 2, 4}
+    assert set(np.unique(loci["orbit_special"].values)) == {1, 2, 4, 5}
     vi.draw(loci)
 
 
@@ -235,9 +237,12 @@ def test_curves_over_two_numbers_say_on_which_branch_they_begin_and_what_is_left
 ) -> None:
     curves = loci.attrs["curves"].splitlines()
     assert len(curves) == len(np.unique(loci.vibroimpact.runs["orbit_branch"].values))
-    assert all("begun from branch 1, P(1,1), at " in each for each in curves)
+    begun = [each.partition("begun from ")[2] for each in curves]
+    assert begun[0].startswith("branch 1 at forcing.amplitude = 0.5, P(1,1), at 0.71")
+    assert any(each.startswith("curve 1, where its graze is a fold, at 0.665") for each in begun)
+    assert all(each.startswith(("branch 1 at forcing.amplitude = ", "curve ")) for each in begun)
     assert "were not looked for" in loci.attrs["not_looked_for"]
-    assert "forcing.amplitude = 0.5" in loci.attrs["not_looked_for"]
+    assert "forcing.amplitude = 0.5, 0.3, 0.7," in loci.attrs["not_looked_for"]
 
 
 def test_what_was_followed_before_ctrl_c_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,8 @@ from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.analysis.study import whole
-from vibroimpact.orchestrator.orbits.branches import FollowedLoci, follow_loci
 from vibroimpact.orchestrator.orbits.follow import Following
+from vibroimpact.orchestrator.orbits.loci import FollowedLoci, follow_loci
 
 CHAIN = ROOT / "examples" / "thesis" / "figure_6_13.toml"
 PARAMETER = "forcing.angular_frequency"
@@ -69,9 +69,31 @@ def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_spee
     one = curves_of_grazes_between_impacts(scene.with_values({POSITION: 0.4}), 1)
     two = curves_of_grazes_between_impacts(scene, 2)
     corners = [point.values for locus in one.loci for kind, point in locus.special if kind == "another"]
-    (slow,) = [point.values for locus in two.loci for kind, point in locus.special if kind == "graze"]
+    (slow,) = [point.values for kind, point in two.loci[0].special if kind == "graze"]
     assert min(np.abs(np.subtract(each, slow)).max() for each in corners) < 1e-10
     assert slow == pytest.approx((0.47955763624, 0.31956742827), abs=1e-10)
+    _the_other_maximum_touches_where_the_slow_impact_grazes(one, two)
+    _tori_have_multipliers_on_the_unit_circle(two)
+
+
+def _the_other_maximum_touches_where_the_slow_impact_grazes(one: FollowedLoci, two: FollowedLoci) -> None:
+    assert [locus.kind for locus in one.loci] == ["graze between impacts"] * 2
+    grazes = [locus for locus in two.loci if locus.kind == "graze"]
+    ends = [[each.points[place].values for place in (0, -1)] for each in (one.loci[1], *grazes)]
+    ahead = [max(each) for each in ends]
+    assert ahead[0][0] == pytest.approx(0.52, abs=1e-12)
+    assert ahead[1] == pytest.approx(ahead[0], abs=1e-11)
+
+
+def _tori_have_multipliers_on_the_unit_circle(two: FollowedLoci) -> None:
+    """Both multipliers are 1 where the curve leaves that of the folds, and complex beyond."""
+    (tori,) = [locus for locus in two.loci if locus.kind == "torus"]
+    folds = [locus for locus in two.loci if locus.kind == "fold"]
+    met = [point.values for locus in folds for kind, point in locus.special if kind == "torus"]
+    assert min(np.abs(np.subtract(each.values, met[0])).max() for each in tori.points) < 1e-8
+    for point in tori.points[1:-1]:
+        turning = point.orbit.multipliers[point.orbit.multipliers.imag > 0.0]
+        assert np.abs(np.abs(turning) - 1.0).min() < 1e-8
 
 
 @pytest.mark.parametrize("longest", [0.01, 0.2])

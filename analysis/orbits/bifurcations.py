@@ -1,0 +1,154 @@
+"""Bifurcations of periodic orbits, the functions that are 0 there, and their loci over two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits.following import CLOSED, SpecialPoint
+from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.sign_changes import turning
+from vibroimpact.fmus.bodies.impacting_body import Floats
+
+GRAZE, BETWEEN = "graze", "graze between impacts"
+FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
+DOUBLE = 1e-4
+"""Distance from 1 or -1 below which a multiplier is that double one: rounding moves double multipliers by its root."""
+
+
+def folding(orbit: PeriodicOrbit) -> float:
+    """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the distances' slopes."""
+    slopes = evaluated(orbit.body, orbit.contacts, orbit.phases, orbit.periods).distance_slopes
+    return float(np.linalg.det(slopes / orbit.body.scale))
+
+
+def alternating(orbit: PeriodicOrbit) -> float:
+    """Return a function that is 0 at a period doubling, and smooth through a graze: equations.md 4.7.
+
+    It is the determinant of the distances' slopes for changes of the phases that alternate from round to round.
+    """
+    count = orbit.phases.size
+    phases = np.concatenate([orbit.phases, orbit.phases + TURN * orbit.periods])
+    slopes = evaluated(orbit.body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
+    return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / orbit.body.scale))
+
+
+def beyond_stop(orbit: PeriodicOrbit) -> float:
+    """Return the distance of the highest maximum beyond its stop, over the size of the motion; at least -1."""
+    return max(orbit.highest[0] / orbit.body.scale, -1.0) - TOUCHES
+
+
+def meets_torus(multipliers: NDArray[np.complex128]) -> bool:
+    """Tell whether two multipliers with the product 1 are complex, or both 1 or both -1: a torus begins there."""
+    i, j = np.triu_indices(multipliers.size, 1)
+    pair = int(np.argmin(np.abs(1.0 - multipliers[i] * multipliers[j])))
+    one = multipliers[i[pair]]
+    return bool(abs(one.imag) > DOUBLE or abs(abs(one.real) - 1.0) < DOUBLE)
+
+
+SMOOTH: dict[str, Callable[[PeriodicOrbit], float]] = {
+    "fold": folding,
+    "period doubling": alternating,
+    "torus": lambda orbit: turning(orbit.multipliers),
+}
+"""Functions with a zero at the bifurcations that a locus of another kind passes without an end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """An orbit at a bifurcation, at which a locus can begin.
+
+    Attributes
+    ----------
+    kind : str
+        One of `FOLLOWED_KINDS`.
+    orbit : PeriodicOrbit
+    values : tuple of float
+        Values of both parameters.
+    impact : int
+        Index of the impact without speed; -1 unless the kind is a graze.
+    """
+
+    kind: str
+    orbit: PeriodicOrbit
+    values: tuple[float, float]
+    impact: int = -1
+
+    @classmethod
+    def of(cls, point: SpecialPoint, values: tuple[float, float]) -> Bifurcation:
+        """Return the bifurcation at a special point of a branch, with the values of both parameters."""
+        orbit = point.at.orbit
+        return cls(point.kind, orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1)
+
+    def test(self, orbit: PeriodicOrbit) -> float:
+        """Return the function that is 0 along the locus, for an orbit next to it."""
+        if self.kind == GRAZE:
+            return float(orbit.velocities[self.impact])
+        if self.kind == BETWEEN:
+            beyond, _, contact = orbit.highest
+            return beyond / orbit.body.scale if contact >= 0 else float(np.nan)
+        return SMOOTH[self.kind](orbit)
+
+    def other_speeds(self, orbit: PeriodicOrbit) -> Floats:
+        """Return the speeds of the impacts of an orbit next to it; unbounded for the impact without speed."""
+        speeds = orbit.velocities.copy()
+        if self.kind == GRAZE:
+            speeds[self.impact] = np.inf
+        return speeds
+
+
+@dataclass(frozen=True, eq=False)
+class LocusPoint:
+    """An orbit at its bifurcation."""
+
+    values: tuple[float, float]
+    """Values of both parameters."""
+    orbit: PeriodicOrbit
+    tangent: Floats
+    """Direction of the locus, shape (p + 2,)."""
+
+
+@dataclass(slots=True)
+class Locus:
+    """Locus of a bifurcation over two parameters.
+
+    Attributes
+    ----------
+    kind : str
+        One of `FOLLOWED_KINDS`.
+    points : list of LocusPoint
+    special : list of tuple of (str, LocusPoint)
+        Points of codimension 2, each with the kind of the other bifurcation; `another`: a second graze between impacts.
+    starts : list of Bifurcation
+        Bifurcations at which the loci begin that leave these points.
+    ends : list of str
+    origin : str
+        Branch or locus, and its point, from which it starts.
+    """
+
+    kind: str
+    points: list[LocusPoint] = field(default_factory=list)
+    special: list[tuple[str, LocusPoint]] = field(default_factory=list)
+    starts: list[Bifurcation] = field(default_factory=list)
+    ends: list[str] = field(default_factory=list)
+    origin: str = ""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether its last point is its first again."""
+        return CLOSED in self.ends
+
+
+def joined_loci(backward: Locus, forward: Locus) -> Locus:
+    """Return both ways from one point as one locus."""
+    return Locus(
+        backward.kind,
+        backward.points[::-1] + forward.points[1:],
+        backward.special[::-1] + forward.special,
+        backward.starts[::-1] + forward.starts,
+        backward.ends + forward.ends,
+        backward.origin,
+    )
