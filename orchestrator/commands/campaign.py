@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import typer
@@ -37,7 +38,7 @@ def run_to_folder(options: Campaign) -> None:
 def _scene_of(options: Campaign) -> Scene:
     """Return the scene of a file, or the one that the folder of a campaign keeps, whose bodies need no files."""
     changes = options.changes or ()
-    if options.scene.is_dir():
+    if os.path.isdir(options.scene):  # no error for a name that is too long
         return kept_scene(options.scene, changes)
     try:
         return opened_scene(options.scene, changes, strict=options.strict)
