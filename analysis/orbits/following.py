@@ -197,10 +197,7 @@ class Follower:
     def branch(self, orbit: PeriodicOrbit, value: float, origin: str = "") -> Branch:
         """Follow the branch of an orbit both ways, within its physical part and within the range.
 
-        Raises
-        ------
-        OrbitError
-            The orbit does not lie on a branch.
+        OrbitError: the orbit does not lie on a branch.
         """
         ways = [Branch(origin), Branch(origin)]
         for _ in self.both_ways(ways[0], ways[1], orbit, value):
@@ -351,13 +348,10 @@ class Follower:
             taken = self.on_branch(orbit, float(value), now.tangent)
         except (OrbitError, np.linalg.LinAlgError):
             return None
-        turn = self._most_turn(now.orbit, orbit, step)
+        # at a yield velocity branches have corners, of up to a right angle
+        has_corner = step < CORNER * self.settings.longest and (now.orbit.falling != orbit.falling).any()
+        turn = 0.5 * np.pi if has_corner else MOST_TURN
         return (taken, newton) if taken.tangent @ now.tangent >= np.cos(turn) else None
-
-    def _most_turn(self, before: PeriodicOrbit, after: PeriodicOrbit, step: float) -> float:
-        """Return the largest turn of a step: up to a right angle at a yield velocity, where branches have corners."""
-        has_corner = step < CORNER * self.settings.longest and (before.falling != after.falling).any()
-        return 0.5 * np.pi if has_corner else MOST_TURN
 
     def _closing_step(
         self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit

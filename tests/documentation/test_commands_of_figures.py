@@ -17,7 +17,7 @@ from support.places import EXAMPLES, ROOT
 PAGES = ("thesis_figures", "orbits")
 BIFURCATION, CHAIN = "examples/bifurcation.toml", "examples/thesis/figure_6_13.toml"
 FREQUENCY = "--parameter forcing.angular_frequency"
-SECOND = "--second forcing.amplitude --second-from 0.02 --second-to 1.2 --doublings 0"
+SECOND = "--second forcing.amplitude --second-from 0.02 --second-to 1.2 --doublings 0 --grazes 0"
 
 
 class Shown(NamedTuple):
@@ -52,19 +52,19 @@ COMMANDS = {
         ("P(1,1)   unstable", "P(1,2)   stable", "2 physical orbits.")
     ),
     f"follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second forcing.amplitude --second-from 0.02 "
-    "--second-to 0.8 --doublings 0 --figure figure_3_5a.png": Shown(
+    "--second-to 0.8 --doublings 0 --grazes 0 --figure figure_3_5a.png": Shown(
         ("fold: 0.66583281185, 0.56063456", "fold and graze: 0.49937460889, 0.752284281"),
         (424, 222, 164, 111),
         is_long=True,
     ),
     f'follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second "stop[1].position" --second-from 0.5 '
-    "--second-to 5.5 --doublings 0 --figure figure_3_5b.png": Shown(
+    "--second-to 5.5 --doublings 0 --grazes 0 --figure figure_3_5b.png": Shown(
         ("fold: 0.66583281185, 0.89184655", "fold: 0.49937460889, 0.66464235"),
         (400, 219, 165, 131, 120),
         is_long=True,
     ),
     f"follow {BIFURCATION} --set forcing.amplitude=0.55 {FREQUENCY} --from 0.6 --to 0.75 --second forcing.amplitude "
-    "--second-from 0.5 --second-to 0.65 --doublings 0 --figure figure_3_10.png": Shown(
+    "--second-from 0.5 --second-to 0.65 --doublings 0 --grazes 0 --figure figure_3_10.png": Shown(
         ("graze and period doubling: 0.66583281185, 0.56063456", "graze and fold: 0.66583281185, 0.56063456"),
         (133, 81, 79),
         is_long=True,
@@ -108,7 +108,7 @@ COMMANDS = {
     "resonances examples/thesis/figure_6_4.toml -o peaks.nc --figure resonances.png": Shown(
         ("Natural frequencies: 0.618034, 1.61803.",), (461, 461), is_long=True
     ),
-    f"follow {CHAIN} {FREQUENCY} --from 0.3 --to 2.2 --doublings 2": Shown(
+    f"follow {CHAIN} {FREQUENCY} --from 0.3 --to 2.2 --doublings 2 --grazes 0": Shown(
         ("0.85643437", "1.6130454", "1.724739", "1.716343"), is_long=True
     ),
 }

@@ -20,10 +20,13 @@ from support.operations import OPERATIONS
 
 from vibroimpact.analysis.study import INCOMPLETE, Study
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 
 STUDIES: dict[str, type[Study[Any]]] = {
     words: pkgutil.resolve_name(f"vibroimpact.{one.study}") for words, one in OPERATIONS.items() if one.study
 }
+PREPARED: dict[str, type[Study[Any]]] = {"basins": BasinsOfScene}
+"""Studies that take the place of those of the operations for the datasets here."""
 CASES = {
     "accuracy": ("accuracy", 3),
     "basins": ("basins", 2),
@@ -53,7 +56,7 @@ def ends_after(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int, BaseExcep
     """Return a function that ends a study by an exception after some rows."""
 
     def ends(words: str, many: int, end: BaseException) -> None:
-        kind = STUDIES[words]
+        kind = PREPARED.get(words, STUDIES[words])
         rows = kind.rows
 
         def few(self: Study[Any]) -> Generator[Any, None, None]:

@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, ModesBody, StructureBody
+from vibroimpact.orchestrator.scene.body_models import ModesBody, StructureBody
 from vibroimpact.orchestrator.scene.file import parse_scene_toml, read_scene_text
 from vibroimpact.orchestrator.scene.laws import any_rigid
 from vibroimpact.orchestrator.scene.own_structures import START, points_named, request_of
@@ -167,7 +167,7 @@ class _Ladder:
         for place, part in enumerate(body.parts):
             if isinstance(part, ModesBody):
                 self._given[place] = finest.get(place) or part.given_modes()
-            elif isinstance(part, BeamBody):
+            elif part.kind == "beam":
                 self._beams[place] = part.size * (1 if rigid else FINER_BEAM)
         room = MOST_MODES - sum(len(each.natural) for each in self._given.values())
         room -= sum(part.size for place, part in enumerate(body.parts) if not self._has_modes(place))

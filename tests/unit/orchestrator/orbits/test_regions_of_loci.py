@@ -103,7 +103,15 @@ def test_the_curves_around_a_point_of_codimension_two_bound_the_regions_of_figur
     """Regions: no impacts, stable P(1,1), unstable P(1,1), and both orbits of the hysteresis."""
     scene = vi.Scene.from_file(SCENE).with_values({"sweep": {}, FREQUENCY: 0.7, AMPLITUDE: 0.55})
     loci = vi.follow(
-        scene, FREQUENCY, 0.6, 0.75, doublings=0, step=0.03, second=AMPLITUDE, second_range=(0.5, 0.62)
+        scene,
+        FREQUENCY,
+        0.6,
+        0.75,
+        doublings=0,
+        grazes=0,
+        step=0.03,
+        second=AMPLITUDE,
+        second_range=(0.5, 0.62),
     )
     grid = np.linspace(0.601, 0.749, 40), np.linspace(0.501, 0.619, 25)
     wrong, counts = unexplained(
@@ -125,7 +133,9 @@ def test_the_curves_around_a_point_of_codimension_two_bound_the_regions_of_figur
 def test_the_curves_of_figure_3_5_bound_its_regions(
     second: str, name: str, bounds: tuple[float, float], body: Callable[..., ImpactingBody]
 ) -> None:
-    loci = vi.follow(SCENE, FREQUENCY, 0.3, 2.2, doublings=0, step=0.02, second=second, second_range=bounds)
+    loci = vi.follow(
+        SCENE, FREQUENCY, 0.3, 2.2, doublings=0, grazes=0, step=0.02, second=second, second_range=bounds
+    )
     grid = np.linspace(0.301, 2.199, 90), np.linspace(bounds[0] + 0.003, bounds[1] - 0.003, 60)
     wrong, counts = unexplained(loci, ("angular_frequency", name), grid, body)
     assert wrong == []

@@ -124,7 +124,7 @@ def test_a_wrong_motion_is_named(lines: tuple[str, ...], without: tuple[str, ...
 )
 def test_studies_name_a_moving_stop_that_they_do_not_take(study: Any, lines: tuple[str, ...]) -> None:
     forced = ("[forcing]", "amplitude = 0.1", "angular_frequency = 2.0")
-    with pytest.raises(UsageError, match=r"stop\[1\]"):
+    with pytest.raises(UsageError, match=r"stop\[1\]|stops that move"):
         study(scene(*lines, *forced, without=("forcing =",)))
 
 
