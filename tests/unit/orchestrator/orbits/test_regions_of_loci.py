@@ -99,6 +99,7 @@ def unexplained(
     return wrong, {tuple(each) for each in found.reshape(-1, 2).tolist()}
 
 
+@pytest.mark.long
 def test_the_curves_around_a_point_of_codimension_two_bound_the_regions_of_figure_3_10() -> None:
     """Regions: no impacts, stable P(1,1), unstable P(1,1), and both orbits of the hysteresis."""
     scene = vi.Scene.from_file(SCENE).with_values({"sweep": {}, FREQUENCY: 0.7, AMPLITUDE: 0.55})
