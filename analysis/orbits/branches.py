@@ -160,8 +160,11 @@ def extrema(orbit: PeriodicOrbit) -> Floats:
         before_impact = np.append(phases[:-1], np.nextafter(phases[-1], 0.0))
         x, v = orbit.at(before_impact)
         tops, at = _turns(before_impact, x, v / orbit.body.angular_frequency)
-        places = (np.floor(np.append(at, phases) / TURN) % orbit.periods).astype(int)
-        values = np.append(tops, x)
+        # an instant between two forcing periods belongs to both
+        edges = np.arange(np.ceil(phases[0] / TURN), np.floor(phases[-1] / TURN) + 1.0)
+        turns = np.concatenate([np.floor(np.append(at, phases) / TURN), edges - 1.0, edges])
+        places = (turns % orbit.periods).astype(int)
+        values = np.concatenate([tops, x, *[orbit.at(TURN * edges)[0]] * 2])
         np.fmax.at(found[:, 0], places, values)
         np.fmin.at(found[:, 1], places, values)
     return found
