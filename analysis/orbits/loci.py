@@ -272,7 +272,7 @@ class LocusFollower:
                 kind == "torus" and (now.orbit.body.frequencies.size < 2 or start.kind == GRAZE)
             ):
                 continue
-            found = self._zero(start, now, taken, step, lambda each, of=test: of(each.orbit), is_first)  # type: ignore[misc]
+            found = self._zero(start, now, taken, step, lambda each, of=test: of(each.orbit), is_first)  # type: ignore[misc]  # of a lambda with a default
             if found is None or (kind == "torus" and not meets_torus(found[1].orbit.multipliers)):
                 continue
             part, at = found
