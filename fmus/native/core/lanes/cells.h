@@ -151,7 +151,7 @@ LANES_INLINE vector half_of(const vi_lane_group *g, int at, int further, const s
 {
     vector half = linear(g->one.taylor[2], at, s);
     if (further) {
-        add_sines(g->sines->taylor + 2, 1, 1, at, further, of, &half);
+        add_sines(g->sines->taylor[2], at, further, of, &half);
     }
     return 4.0 * half;
 }
@@ -165,16 +165,12 @@ LANES_INLINE int order_with(int further)
 /* Taylor coefficients of q about the middle of the pair that begins in a state, in its share less MIDDLE. */
 LANES_INLINE void expand(const vi_lane_group *g, int at, int further, const state *s, const phases *of, vector term[])
 {
-#pragma GCC unroll 16
-    for (int n = 0; n <= VI_LANE_ORDER; ++n) {
-        term[n] = linear(g->one.middle[n], at, s);
-    }
-    if (further) {
-#pragma GCC unroll 4
-        for (int n = VI_LANE_ORDER + 1; n <= VI_SINE_ORDER; ++n) {
-            term[n] = all(0.0);
+#pragma GCC unroll 20
+    for (int n = 0; n <= order_with(further); ++n) {
+        term[n] = n <= VI_LANE_ORDER ? linear(g->one.middle[n], at, s) : all(0.0);
+        if (further) {
+            add_sines(g->sines->middle[n], at, further, of, term + n);
         }
-        add_sines(g->sines->middle, 1, VI_SINE_ORDER + 1, at, further, of, term);
     }
 }
 

@@ -57,9 +57,9 @@ LANES_INLINE void ends_of_pairs(const vi_lane_group *g, int at, int further, con
 #pragma GCC unroll 9
     for (int i = 1; i <= VI_PAIRS; ++i) {
         q[i] = linear(g->one.end_q[2 * i], at, &f->now);
-    }
-    if (further) {
-        add_sines(g->sines->end_q + 2, 2, VI_PAIRS, at, further, of, q + 1);
+        if (further) {
+            add_sines(g->sines->end_q[2 * i], at, further, of, q + i);
+        }
     }
 }
 
@@ -132,6 +132,7 @@ LANES_INLINE candidate choose_pair(const vi_lane_group *g, int at, int contacts,
     candidate pair;
     vector count[VI_LANES_CONTACTS], cleared, q[VI_PAIRS + 1];
     for (int i = 0;; ++i) {
+        READ_HERE();
         ends_of_pairs(g, at, further, f, of, q);
         const vector bend = 2.0 * half_of(g, at, further, &f->now, of);
         for (int c = 0; c < contacts; ++c) {

@@ -208,6 +208,7 @@ LANES_INLINE phase_cell choose_phase_cell(const vi_lane_group *g, int at, int co
     vector count[VI_LANES_CONTACTS], cleared, length;
     mask jumps;
     for (int i = 0;; ++i) {
+        READ_HERE();
         scan_phase(g, at, contacts, s, count);
         cleared = all((double)VI_CELLS);
         for (int c = 0; c < contacts; ++c) {

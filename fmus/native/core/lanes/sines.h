@@ -109,21 +109,16 @@ LANES_INLINE void set_sines(vi_lane_group *g, int at, int own, int further)
     }
 }
 
-/* Add the shares of the further sines to values of some rows of a table, `stride` rows apart. */
-LANES_INLINE void add_sines(const vi_lane_array table[][VI_FURTHER_SINES][VI_SINE_PARTS], int stride, int count, int at,
-                            int further, const phases *of, vector value[])
+/* Add the shares of the further sines to the value of a row of a table. */
+LANES_INLINE void add_sines(const vi_lane_array row[VI_FURTHER_SINES][VI_SINE_PARTS], int at, int further,
+                            const phases *of, vector *value)
 {
     for (int k = 0; k < further; ++k) {
-        const vector c = of->cosine[k], n = of->sine[k];
-#pragma GCC unroll 16
-        for (int i = 0; i < count; ++i) {
-            const vi_lane_array *row = table[i * stride][k];
-            value[i] += load(row[VI_OF_ITS_COSINE] + at) * c + load(row[VI_OF_ITS_SINE] + at) * n;
-        }
+        *value += load(row[k][VI_OF_ITS_COSINE] + at) * of->cosine[k] + load(row[k][VI_OF_ITS_SINE] + at) * of->sine[k];
     }
 }
 
-/* The same for one lane. */
+/* The same for several rows and one lane. */
 LANES_INLINE void add_sines_of_lane(const vi_lane_array table[][VI_FURTHER_SINES][VI_SINE_PARTS], int count, int lane,
                                     int further, const phases *of, vector value[])
 {

@@ -23,6 +23,12 @@ typedef int64_t mask __attribute__((vector_size(8 * VI_WIDTH), may_alias));
 #define LANES_INLINE static inline __attribute__((always_inline))
 #endif
 
+/* Tables are read again after this. A compiler that read them all before a loop would only write them to its stack. */
+#define READ_HERE() __asm__ volatile("" ::: "memory")
+
+/* A function of its own: it has a small frame, and compilers do better on small functions. */
+#define LANES_APART static __attribute__((noinline)) void
+
 LANES_INLINE vector load(const double *from)
 {
     return *(const vector *)from;
