@@ -40,6 +40,7 @@ DIGITS = (".sti", ".pch")
 """Formats whose numbers have 10 to 14 digits: their rigid-body modes are those of rounded numbers."""
 ERROR, UNBOUNDED = 3, 6
 REFUSALS = {
+    "negative": r"expected stiffness that is positive semi-definite",
     "few": r"expected at least (\d+) modes",
     "tolerance": r"expected a tolerance that 64 modes meet",
     "many": r"expected at most 64 rigid-body modes",
@@ -48,8 +49,12 @@ REFUSALS = {
     "still": r"expected a point that a mode moves",
 }
 """Refusals of structures that are none of a fault of the program, or of its input."""
-PERIODS_LOW, PERIODS_HIGH, SAMPLES = 8.0, 150.0, 60.0
-"""Periods of the lowest and of the highest mode in a run at most, and samples of a run."""
+PERIODS_LOW, PERIODS_HIGH, PERIODS_PRESSED, SAMPLES = 8.0, 150.0, 3000.0, 60.0
+"""Periods of the lowest mode, of the highest one and of the stiffest contact in a run at most; samples of a run."""
+EXTREME = 1e15
+"""Rate, 1/s, from which powers of a series may be beyond the largest number: the run says so."""
+DEEPEST = 100.0
+"""Depth of a contact for its stiffness, in clearances."""
 SQUARES, REFERENCE, FLEXIBILITY = 1e-8, 1e-12, 1e-7
 """Differences from a dense solution: of squares of frequencies, its own rounding, and of flexibilities at points."""
 
@@ -178,6 +183,7 @@ def _refusal_problem(said: str, drawn: DrawnMatrices, keys: Tables, points: int)
         "few": needed is not None and not keys["modes"] < int(needed[1]) <= max(drawn.rigid, 1) + points,
         "many": drawn.rigid <= 64,
         "loose": not drawn.is_loose,
+        "negative": True,
         "still": keys.get("residual", True) and drawn.mass.diagonal()[drawn.used].all(),
     }
     return f"refused with {drawn.rigid} rigid-body modes: {said}" if wrong.get(reason) else None
@@ -192,15 +198,32 @@ def _run_problem(tables: Tables, scene: Scene, drawn: DrawnMatrices, length: flo
     lowest, highest = (elastic.min(), elastic.max()) if len(elastic) else (drawn.natural, drawn.natural)
     # a dashpot at a light unknown is much faster than any period, and coupled damping is followed by series
     highest = max(highest, float(np.linalg.eigvalsh(body.assembly.damping).max()))
-    time = 2.0 * np.pi * min(PERIODS_LOW / lowest, PERIODS_HIGH / highest)
+    pressed = _pressed_rate(scene, length)
+    time = 2.0 * np.pi * min(PERIODS_LOW / lowest, PERIODS_HIGH / highest, PERIODS_PRESSED / pressed)
     timed = {"record.recorded_time": time, "record.time_series.rate": SAMPLES / time}
     scene = scene.with_values(timed)
     found = vi.run(scene)
     outcome = int(found.outcome)
+    if highest > EXTREME and "parameters of extreme size" in found.message.item():
+        return None
     if outcome >= ERROR and outcome != UNBOUNDED:
         return f"outcome {outcome}: {found.message.item()}"
     least = 1e-14 * drawn.unit[0] * length**2
     return energy_problem(tables, found, least) or room_problem(tables, scene, found, length)
+
+
+def _pressed_rate(scene: Scene, length: float) -> float:
+    """Return the fastest rate of a point on its yielding stop, 1/s: its series go in steps of about a radian of it."""
+    floats, found = scene.body.fmu_floats(None, scene.stops, None), [1e-300]
+    for place, stop in enumerate(scene.stops, start=1):
+        shape = [value for name, value in floats.items() if name.startswith(f"mode.contact_shape[{place},")]
+        mobility, deepest = float(np.dot(shape, shape)), DEEPEST * length
+        if stop.law == "kelvin_voigt":
+            found += [np.sqrt(mobility * stop.stiffness), mobility * stop.damping]
+        elif stop.law != "restitution":
+            found.append(np.sqrt(mobility * stop.stiffness * 1.5 * np.sqrt(deepest)))
+            found.append(mobility * stop.stiffness * deepest**1.5 * getattr(stop, "damping", 0.0))
+    return float(max(found))
 
 
 def _modes_problem(random: np.random.Generator, drawn: DrawnMatrices) -> str | None:
