@@ -51,7 +51,7 @@ REFUSALS = {
 """Refusals of structures that are none of a fault of the program, or of its input."""
 PERIODS_LOW, PERIODS_HIGH, PERIODS_PRESSED, SAMPLES = 8.0, 150.0, 3000.0, 60.0
 """Periods of the lowest mode, of the highest one and of the stiffest contact in a run at most; samples of a run."""
-EXTREME = 1e15
+EXTREME = 1e13
 """Rate, 1/s, from which powers of a series may be beyond the largest number: the run says so."""
 DEEPEST = 100.0
 """Depth of a contact for its stiffness, in clearances."""
