@@ -257,6 +257,13 @@ _RULES = (
     VariableRule(
         "orbit_multiplier_imaginary", ("run",), "1", "imaginary part of its largest Floquet multiplier"
     ),
+    VariableRule(
+        "orbit_index",
+        ("run",),
+        "1",
+        "sign of det(I - M) over its own periods; 0 where it is not defined",
+        np.int8,
+    ),
     VariableRule("class_kind", ("run",), "1", "class of the motion", np.int8, _flags(OrbitClass)),
     VariableRule("class_impacts", ("run",), "1", "impacts of what repeats; -1: without number", np.int32),
     VariableRule("class_periods", ("run",), "1", "forcing periods after which the motion repeats", np.int32),

@@ -78,6 +78,7 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     for axis, panel in zip(axes, panels, strict=True):
         if over is not None:
             draw_below(axis, over, name, panel)
+        _shade_missing(axis, dataset)
         _draw(axis, dataset, name, panel)
         axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
@@ -85,6 +86,13 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     words = axes[0].get_legend_handles_labels()[1]
     legend_outside(figure, axes[0], ncols=3 if max(map(len, words)) < _LONG else 2)
     return figure
+
+
+def _shade_missing(axis: Axes, dataset: xr.Dataset) -> None:
+    """Shade the ranges in which index sums show that orbits are missing."""
+    for number, line in enumerate(str(dataset.attrs.get("missing_orbits", "")).splitlines()):
+        low, high = map(float, line.split())
+        axis.axvspan(low, high, color="0.92", zorder=0.0, label="" if number else "orbits missing")
 
 
 def _label(dataset: xr.Dataset, panel: str) -> str:
