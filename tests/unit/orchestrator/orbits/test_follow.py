@@ -28,7 +28,7 @@ PARAMETER = "forcing.angular_frequency"
 
 @pytest.fixture(scope="module")
 def branches() -> object:
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, grazes=0)
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, impacts=1, grazes=0)
 
 
 def test_a_branch_of_a_ball_in_a_cavity_is_its_closed_form() -> None:
@@ -107,6 +107,8 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
         "1.6",
         "--step",
         "0.05",
+        "--impacts",
+        "1",
     ]
     code, out, err = in_this_process([*arguments, "-o", str(output), "--figure", str(figure)])
     assert (code, err) == (0, "")
@@ -122,7 +124,7 @@ def loci() -> xr.Dataset:
     both = {"second": "forcing.amplitude", "second_range": (0.3, 0.7)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vibroimpact.orchestrator.orbits.loci.SECOND_VALUES", 3)
-        return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, grazes=0, **both)
+        return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, impacts=1, grazes=0, **both)
 
 
 def test_bifurcations_over_two_numbers_are_a_dataset_and_drawn(loci: xr.Dataset) -> None:
@@ -228,9 +230,8 @@ def test_what_was_followed_before_an_error_is_written(
 
     monkeypatch.setattr(Follower, "leave", fails)
     output = tmp_path / "b.nc"
-    code, out, err = in_this_process(
-        ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6", "-o", str(output)]
-    )
+    command = ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6"]
+    code, out, err = in_this_process([*command, "--impacts", "1", "-o", str(output)])
     assert code in (1, 2)
     assert err == "orbit: expected something else.\n"
     assert "0.93649312074" in out

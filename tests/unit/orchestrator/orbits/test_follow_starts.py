@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +36,9 @@ def swept_scene(**forcing: float) -> dict[str, object]:
 
 def test_a_key_that_the_scene_leaves_to_its_sweep_is_followed() -> None:
     left, given = swept_scene(), swept_scene(angular_frequency=1.1)
-    found = [vi.follow(scene, PARAMETER, 0.95, 1.0, step=0.2, doublings=0) for scene in (left, given)]
+    found = [
+        vi.follow(scene, PARAMETER, 0.95, 1.0, impacts=1, step=0.2, doublings=0) for scene in (left, given)
+    ]
     np.testing.assert_array_equal(*(each.impact_velocity.values for each in found))
     assert "sweep" not in vi.Scene.from_text(found[0].attrs["scene"]).to_toml()
 
@@ -101,35 +102,21 @@ def test_without_an_orbit_of_one_impact_the_number_of_impacts_is_named() -> None
     scene |= {"stop": [{**stop, "position": 0.5 * stop["position"]} for stop in scene["stop"]]}  # type: ignore[attr-defined]
     with pytest.raises(
         OrbitError,
-        match=r"got none\. Try impacts=2, periods=1: runs at \d+ of these values end on P\(2,1\)\.",
+        match=r"got none\. \d+ of 50 runs over the range end on P\(2,1\): impacts=2, periods=1\.",
     ):
-        vi.follow(scene, PARAMETER, 1.0, 2.0)
+        vi.follow(scene, PARAMETER, 1.0, 2.0, impacts=1)
 
 
-def test_what_runs_end_on_and_no_branch_holds_is_said(tmp_path: Path) -> None:
+def test_the_orbits_on_which_runs_end_are_followed_unless_others_are_wanted(tmp_path: Path) -> None:
     file = tmp_path / "two_stops.toml"
     file.write_text(vi.Scene.from_dict(swept_scene()).to_toml(), encoding="utf-8")
-    command = [
-        "follow",
-        str(file),
-        "--parameter",
-        PARAMETER,
-        "--from",
-        "0.9",
-        "--to",
-        "1.3",
-        "--step",
-        "0.05",
-        "--grazes",
-        "0",
-    ]
+    ends = ["--from", "1.0", "--to", "1.3", "--step", "0.1", "--doublings", "0", "--grazes", "0"]
+    command = ["follow", str(file), "--parameter", PARAMETER, *ends]
     code, out, err = in_this_process(command)
-    assert code == 0, err
-    said = [line for line in out.splitlines() if "not followed here" in line]
-    assert re.fullmatch(
-        r"Runs at \d+ of 25 values of the range end on P\(2,1\), which is not followed here: "
-        r"--impacts 2 --periods 1\.",
-        said[0],
-    )
-    _, out, _ = in_this_process([*command, "--impacts", "1"])
-    assert "not followed here" not in out  # only this kind was requested
+    assert (code, err) == (0, "")
+    assert "1  P(2,1), 1 at stop 1, 1 at stop 2" in out
+    assert "50 runs over the range, up and down, end on P(2,1) (50)." in out
+    assert "Index sums over 1 and 2 periods are 1 in 1 of 1 range between special points." in out
+    code, _, err = in_this_process([*command, "--impacts", "1"])
+    assert code == 1
+    assert err.endswith("50 of 50 runs over the range end on P(2,1): --impacts 2 --periods 1.\n")
