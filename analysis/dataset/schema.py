@@ -59,6 +59,7 @@ class SpecialOrbit(IntEnum):
     graze_between_impacts = 5
     stability_change = 6
     branch_point = 7
+    impact_at_the_yield_velocity = 8
 
 
 class OrbitClass(IntEnum):

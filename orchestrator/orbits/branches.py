@@ -12,10 +12,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import MISSING_ORBITS, dataset_of_branches, mirror_images
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.departures import Departure, departures, passes
 from vibroimpact.analysis.orbits.following import (
-    BRANCH_POINT,
     Branch,
     BranchOrbit,
     Follower,
@@ -229,7 +230,8 @@ def _departed(
         result.is_cut_short = len(result.branches) >= MOST_BRANCHES
         parent, doublings, grazes = waiting.popleft()
         for point in parent.points:
-            is_graze, is_doubling = point.kind.startswith("graze"), point.kind == "period doubling"
+            is_graze = point.kind.startswith("graze")
+            is_doubling = point.kind in ("period doubling", AT_YIELD_VELOCITY)
             if is_doubling and not doublings:
                 continue
             found = departures(follower, point)

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.departures import grazes
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
 from vibroimpact.analysis.orbits.search import STARTS
@@ -191,7 +192,7 @@ class Following(Study[str]):
         for number, branch in enumerate(self.followed.branches, start=1):
             name = f"{number}  {branch.full_name}"
             for point in branch.points:
-                rows.add_row(name, *_cells(point))
+                rows.add_row(name, *_cells(branch, point))
             if not branch.points:
                 rows.add_row(name, "nothing", "", "", "")
         wide_terminal().print(rows)
@@ -269,12 +270,18 @@ def _stable_orbits(branch: Branch) -> str:
     return f"{sum(map(len, groups))} stable{f' ({shown})' if shown else ''}"
 
 
-def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:
-    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts."""
+def _cells(branch: Branch, point: SpecialPoint) -> tuple[str, str, str, str]:
+    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts.
+
+    At a corner the largest multiplier of either side is shown.
+    """
     orbit = point.at.orbit
     largest = (
         "" if point.kind == "graze" else ", ".join(multiplier_text(each) for each in orbit.multipliers[:2])
     )
+    if point.kind == AT_YIELD_VELOCITY:
+        sides = (branch.orbits[point.place + k].orbit.multipliers[0] for k in (0, 1))
+        largest = " to ".join(map(multiplier_text, sides))
     speeds = ", ".join(f"{speed:.8g}" if speed > 1e-12 else "0" for speed in orbit.velocities)
     digits = UNEXPLAINED_DIGITS if point.kind == STABILITY_CHANGE else EXACT_DIGITS
     return point.kind, f"{point.at.value:.{digits}g}", speeds, largest
