@@ -62,8 +62,11 @@ class Departure:
 def departures(follower: Follower, point: SpecialPoint) -> list[Departure]:
     """Return the branches that begin at a special point, one of each pair of mirror images.
 
-    A fold and a torus have none.
+    A fold and a torus have none. Orbits of more than MOST_IMPACTS impacts are none, too.
     """
+    is_doubled = point.kind in ("period doubling", AT_YIELD_VELOCITY)
+    if is_doubled and 2 * point.at.orbit.phases.size > MOST_IMPACTS:
+        return []
     if point.kind == "period doubling":
         return [_crossing(follower, _twice(point.at), "period doubling")]
     if point.kind == AT_YIELD_VELOCITY:

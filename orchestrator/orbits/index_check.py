@@ -27,6 +27,8 @@ STEADY_VALUES = 65
 """Values of the range between which the motion without impacts is watched for meeting a stop."""
 LOST = "cannot be followed"
 """Beginning of the reason of a branch's end that is no special point."""
+MOST_SEARCHES = {True: 64, False: 8}
+"""Number of searches for missing orbits of a body of one mode, and of several modes, whose searches take longer."""
 MOST_IMPACTS_A_PERIOD = 3
 """Impacts in a forcing period up to which a body of several modes is searched."""
 
@@ -78,6 +80,8 @@ class IndexCheck:
         Number of starts of these searches.
     found : int
         Number of orbits that they found.
+    is_cut_short : bool
+        Whether sums that are not 1 were left without a search, since there were too many searches.
     """
 
     scene: Scene
@@ -90,6 +94,8 @@ class IndexCheck:
     searched: int = 0
     started: int = 0
     found: int = 0
+    is_cut_short: bool = False
+    _places: set[tuple[float, int]] = field(default_factory=set)
 
     def missing(self, branches: Sequence[Branch]) -> Iterator[tuple[float, PeriodicOrbit]]:
         """Yield values and orbits that no branch holds there, found where a sum is not 1; keep the sums.
@@ -109,16 +115,27 @@ class IndexCheck:
                 if self.reason:
                     self.values = []
                     return
+                resting = {periods: strobe.resting(value, periods) for periods in PERIODS}
                 for periods in PERIODS:
-                    known = orbits_at(branches, body, value)
-                    resting = strobe.resting(value, periods)
-                    if not index_sum(body, known, periods, resting).is_complete:
-                        yield from (
-                            (value, each) for each in self._search(strobe, body, value, periods, branches)
-                        )
+                    if self._is_complete(body, value, branches, periods, resting[periods]):
+                        continue
+                    for orbit in self._search(strobe, body, value, periods, branches):
+                        yield value, orbit
+                    if not self._is_complete(body, value, branches, periods, resting[periods]):
+                        break  # the same orbits are missing in the sums of more periods
                 known = orbits_at(branches, body, value)
-                sums = (index_sum(body, known, each, strobe.resting(value, each)) for each in PERIODS)
+                sums = (index_sum(body, known, each, resting[each]) for each in PERIODS)
                 self.values.append(CheckedValue(value, (low, high), tuple(sums)))
+
+    def _is_complete(
+        self,
+        body: ImpactingBody,
+        value: float,
+        branches: Sequence[Branch],
+        periods: int,
+        resting: Sequence[int],
+    ) -> bool:
+        return index_sum(body, orbits_at(branches, body, value), periods, resting).is_complete
 
     def _steady_grazes(self, strobe: StrobeMap) -> Iterator[float]:
         """Yield the values at which the motion without impacts begins or ends to meet a stop."""
@@ -144,7 +161,16 @@ class IndexCheck:
     def _search(
         self, strobe: StrobeMap, body: ImpactingBody, value: float, periods: int, branches: Sequence[Branch]
     ) -> Iterator[PeriodicOrbit]:
-        """Yield orbits that are not known, found from many starts."""
+        """Yield orbits that are not known, found from many starts; nothing where a search was before.
+
+        After `MOST_SEARCHES` there are no more.
+        """
+        if (value, periods) in self._places:
+            return
+        if self.searched == MOST_SEARCHES[body.frequencies.size == 1]:
+            self.is_cut_short = True
+            return
+        self._places.add((value, periods))
         self.searched += 1
         if body.frequencies.size == 1:
             candidates = strobe.orbits(value, periods)
@@ -186,7 +212,9 @@ class IndexCheck:
                 f"{self.searched} times a search began where a sum was not 1: {counted(self.started, 'start')}, "
                 f"{counted(self.found, 'further orbit')} found."
             )
-        return [*rows, *self._sums(), *(line for each in self.incomplete for line in _lines(each))]
+        if self.is_cut_short:
+            rows.append("There were no more searches: a smaller range has more for each part of it.")
+        return [*rows, *self._sums()]
 
     def _sums(self) -> Iterator[str]:
         """Yield the terms of the sums; neighbouring ranges with the same terms are one."""
@@ -198,22 +226,13 @@ class IndexCheck:
                 for each in first.sums
             }
             parts = (f"{text} over {_all(periods)}" for text, periods in texts.items())
-            yield f"Indices from {low:.8g} to {high:.8g}: {'; '.join(parts)}."
+            words = "Indices" if first.is_complete else "Orbits are missing"
+            yield f"{words} from {low:.8g} to {high:.8g}: {'; '.join(parts)}."
 
 
 def _all(periods: Sequence[int]) -> str:
     """Return numbers of periods in words: `1 period`, `1 and 2 periods`."""
     return f"{' and '.join(map(str, periods))} period{'s' * (list(periods) != [1])}"
-
-
-def _lines(checked: CheckedValue) -> list[str]:
-    low, high = (f"{each:.8g}" for each in checked.between)
-    return [
-        f"Orbits are missing from {low} to {high}: the indices over {counted(each.periods, 'period')} at "
-        f"{checked.value:.8g} are {each}, not 1."
-        for each in checked.sums
-        if not each.is_complete
-    ]
 
 
 def between_special_points(

@@ -85,8 +85,7 @@ def test_a_missing_branch_makes_another_sum_which_the_lines_say(
     assert not list(check.missing(left))
     assert [each.sums[0].total for each in check.values] == [2, 0]
     said = "\n".join(check.lines)
-    assert "Orbits are missing from 0.965 to 0.97375272" in said
-    assert "are P(1,1) +2, sum 2, not 1." in said
+    assert "Orbits are missing from 0.965 to 0.97375272: P(1,1) +2, sum 2 over 1 and 2 periods." in said
 
 
 def test_ranges_lie_between_special_points_of_all_branches(followed: Followed) -> None:
