@@ -88,6 +88,7 @@ def follow(
     doublings: int = 1,
     grazes: int = 1,
     step: float = 0.01,
+    starts: int = 256,
     second: str | None = None,
     second_range: tuple[float, float] | None = None,
 ) -> xr.Dataset:
@@ -105,7 +106,9 @@ def follow(
     path : path, optional
         Dataset file to write as well (.nc).
     impacts, periods : int, optional
-        p and q of the orbits that the branches start from; they are searched along the range. The default is P(1,1).
+        p and q of the orbits that the branches start from; they are searched along the range. Without them, branches
+        start from P(1,1) and from the orbits on which runs over the range end. Index sums then show whether orbits
+        with a period of one or two forcing periods are missing; missing ones are searched.
     seed : sequence of (phase, stop), optional
         Approximate impacts of one orbit at the scene's own parameter: their forcing phases (rad) and the numbers of
         their stops, from 1. This orbit is followed in both directions.
@@ -115,6 +118,8 @@ def follow(
         Number of successive grazes at which other orbits, with more or fewer impacts, are followed.
     step : float
         Largest step along a branch. The parameter is scaled to a range of 1, the phases are in radians.
+    starts : int
+        Number of trains of impacts from which each search for orbits of several impacts starts.
     second : str, optional
         Key of a second parameter. Folds, period doublings, tori and grazes are followed over both parameters, and so
         are the loci that leave points of codimension 2. Branches at five further values of it are starts, too.
@@ -124,7 +129,8 @@ def follow(
     Returns
     -------
     xarray.Dataset
-        Each run is an orbit, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier. With
+        Each run is an orbit, with `orbit_branch`, `orbit_stable`, `orbit_special`, `orbit_index` and its largest
+        multiplier. The attributes `first_orbits` and `index_sums` say where branches start and what is missing. With
         `second`, each run is an orbit at a bifurcation, if any was found. The attribute `curves` names where each
         bifurcation curve begins; `not_looked_for` tells where curves were not searched.
 
@@ -149,6 +155,7 @@ def follow(
         doublings=doublings,
         grazes=grazes,
         step=step,
+        starts=starts,
         second=second,
         second_range=second_range,
     )

@@ -59,6 +59,7 @@ class SpecialOrbit(IntEnum):
     graze_between_impacts = 5
     stability_change = 6
     branch_point = 7
+    impact_at_the_yield_velocity = 8
 
 
 class OrbitClass(IntEnum):
@@ -256,6 +257,13 @@ _RULES = (
     VariableRule("orbit_multiplier_real", ("run",), "1", "real part of its largest Floquet multiplier"),
     VariableRule(
         "orbit_multiplier_imaginary", ("run",), "1", "imaginary part of its largest Floquet multiplier"
+    ),
+    VariableRule(
+        "orbit_index",
+        ("run",),
+        "1",
+        "sign of det(I - M) over its own periods; 0 where it is not defined",
+        np.int8,
     ),
     VariableRule("class_kind", ("run",), "1", "class of the motion", np.int8, _flags(OrbitClass)),
     VariableRule("class_impacts", ("run",), "1", "impacts of what repeats; -1: without number", np.int32),

@@ -11,8 +11,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
+from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
+BRANCH_POINT = "branch point"
+"""Kind of a point where another branch of orbits with the same impacts crosses."""
 NODES = 8
 """Number of orbits between which a branch point is interpolated."""
 WIDTH = 0.25
@@ -27,6 +31,18 @@ HALVINGS = 7
 """Number of halvings of a step around a branch point, and then of the piece that is interpolated."""
 
 OrbitAt = Callable[[float], tuple[Floats, float] | None]
+
+
+def end_of(kind: str, now: PeriodicOrbit, at: PeriodicOrbit) -> str:
+    """Return the kind of a point, or the end of a branch that would go on as a copy of itself.
+
+    Beyond an orbit of half the period both halves change places. Beyond a symmetric orbit its mirror image follows.
+    """
+    if kind == BRANCH_POINT and at.turns > 1:
+        return f"period doubling of {at.once.name}"
+    if kind == BRANCH_POINT and is_symmetric(at) and not is_symmetric(now):
+        return f"{BRANCH_POINT} of the symmetric {at.name}"
+    return kind
 
 
 def bordered_determinant(matrix: Floats, tangent: Floats) -> float:

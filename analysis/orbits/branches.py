@@ -13,13 +13,43 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
 from vibroimpact.analysis.orbits.bifurcations import Locus
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
+from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, SpecialPoint
+from vibroimpact.analysis.orbits.index_sum import index
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
-from vibroimpact.analysis.orbits.symmetry import is_symmetric
+from vibroimpact.analysis.orbits.symmetry import is_symmetric, mirror_image
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SAMPLES = 256
 """Samples of a forcing period; a cubic between two samples gives an extremum to 1e-8 of the displacement."""
+
+MISSING_ORBITS = "missing_orbits"
+"""Attribute with the ranges in which orbits are missing: a line with two values of the parameter for each."""
+
+
+def mirror_images(branches: Sequence[Branch]) -> dict[int, Branch]:
+    """Return the branch of mirror images for the place of each branch whose orbits are not their own images.
+
+    A body that has the mirror symmetry at single values of the parameter only has no such branch.
+    """
+    pairs = ((place, _mirrored(branch)) for place, branch in enumerate(branches))
+    return {place: image for place, image in pairs if image is not None}
+
+
+def _mirrored(branch: Branch) -> Branch | None:
+    if not branch.orbits or mirror_image(branch.orbits[0].orbit) is None or branch.is_symmetric:
+        return None
+    images: dict[int, BranchOrbit] = {}
+    for each in (*branch.orbits, *(point.at for point in branch.points)):
+        image = mirror_image(each.orbit)
+        if image is None:
+            return None
+        images[id(each)] = BranchOrbit(each.value, image, each.tangent, each.border)
+    return Branch(
+        f"mirror images of {branch.full_name}",
+        [images[id(each)] for each in branch.orbits],
+        [SpecialPoint(point.kind, images[id(point.at)], point.place) for point in branch.points],
+        branch.ends,
+    )
 
 
 def dataset_of_branches(
@@ -133,6 +163,7 @@ def _dataset(
         "orbit_special": np.array(special, dtype=np.int8),
         "orbit_multiplier_real": largest.real,
         "orbit_multiplier_imaginary": largest.imag,
+        "orbit_index": np.array([index(each, each.periods) for each in orbits], dtype=np.int8),
     }
     most = max(each.periods for each in orbits)
     return build_dataset(

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.branch_points import LEVEL, crossing_direction
-from vibroimpact.analysis.orbits.following import BRANCH_POINT, Branch, BranchOrbit, Follower, SpecialPoint
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT, LEVEL, crossing_direction
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, split_orbit
+from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, Follower, SpecialPoint
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, ordered
 from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
@@ -40,7 +41,7 @@ class Departure:
     start : BranchOrbit
         First orbit, and the direction in which the branch leaves.
     cause : str
-        `period doubling`, `pitchfork`, `transcritical branch point` or `graze`.
+        `period doubling`, `pitchfork`, `transcritical branch point`, `graze`, or `impact at the yield velocity`.
     goes_both_ways : bool
         Whether the branch also leaves in the other direction, with orbits that are not those of the first one.
     is_stable : bool or None
@@ -61,13 +62,25 @@ class Departure:
 def departures(follower: Follower, point: SpecialPoint) -> list[Departure]:
     """Return the branches that begin at a special point, one of each pair of mirror images.
 
-    A fold and a torus have none.
+    A fold and a torus have none. Orbits of more than MOST_IMPACTS impacts are none, too.
     """
+    is_doubled = point.kind in ("period doubling", AT_YIELD_VELOCITY)
+    if is_doubled and 2 * point.at.orbit.phases.size > MOST_IMPACTS:
+        return []
     if point.kind == "period doubling":
         return [_crossing(follower, _twice(point.at), "period doubling")]
+    if point.kind == AT_YIELD_VELOCITY:
+        return list(_split(follower, point.at))
     if point.kind == BRANCH_POINT:
         return [_crossing(follower, point.at)]
     return list(_grazing(follower, point.at)) if point.kind.startswith("graze") else []
+
+
+def _split(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
+    """Yield the branch of twice the period that begins at an impact at its yield velocity, if there is one."""
+    start = split_orbit(follower, at, _twice(at))
+    if start is not None:
+        yield Departure(start, AT_YIELD_VELOCITY)
 
 
 def _twice(at: BranchOrbit) -> BranchOrbit:

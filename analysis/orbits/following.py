@@ -13,7 +13,15 @@ from functools import cached_property
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.branch_points import LEVEL, NEAR, bordered_determinant, interpolated_zeros
+from vibroimpact.analysis.orbits.branch_points import (
+    BRANCH_POINT,
+    LEVEL,
+    NEAR,
+    bordered_determinant,
+    end_of,
+    interpolated_zeros,
+)
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, Corner, next_corner
 from vibroimpact.analysis.orbits.periodic import CLOSE, TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
 from vibroimpact.analysis.orbits.sign_changes import determinant, is_explained, turning, turns_round
 from vibroimpact.analysis.orbits.symmetry import is_symmetric, phase_differences
@@ -24,14 +32,10 @@ EASY_NEWTON = 3
 """Number of Newton steps up to which the next step along the branch is made longer."""
 MOST_TURN = 0.1
 """Change of the branch's direction between points, rad, above which a step is repeated with half its length."""
-CORNER = 1e-3
-"""Step along the branch, over the longest, below which it may turn by a corner at a yield velocity."""
 SHORTEST = 1e-9
 """Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
 """Kind of a point where the stability changes for none of the known reasons."""
-BRANCH_POINT = "branch point"
-"""Kind of a point where another branch of orbits with the same impacts crosses."""
 CLOSED = "closed"
 """End of a branch that returns to its first orbit."""
 TOGETHER = 1e-3
@@ -231,6 +235,12 @@ class Follower:
             yield now
         while len(branch.orbits) < self.settings.most_orbits:
             found = self.step(now, step)
+            corner = None if born else next_corner(self, now, step, found[0] if found else None)
+            if corner is not None:
+                if (yield from self._to_corner(branch, now, corner)):
+                    return
+                now, step = corner.beyond, 0.1 * longest
+                continue
             too_near = found is not None and abs(found[0].border) < NEAR * abs(now.border)
             if found is None or too_near or (born and not found[0].orbit.is_physical):
                 step *= 0.5
@@ -254,6 +264,21 @@ class Follower:
             now = taken
             step = min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
         branch.ends.append(f"{self.settings.most_orbits} orbits")
+
+    def _to_corner(
+        self, branch: Branch, now: BranchOrbit, corner: Corner
+    ) -> Generator[BranchOrbit, None, bool]:
+        """Add the events before a corner, and its orbit, to the branch; return whether the branch ends there."""
+        if (yield from self._passed(branch, now, corner.before, corner.place)):
+            return True
+        orbit = corner.before.orbit
+        if orbit.turns > 1:
+            branch.ends.append(f"{AT_YIELD_VELOCITY} of {orbit.once.name}")
+        else:
+            branch.points.append(SpecialPoint(AT_YIELD_VELOCITY, corner.before, len(branch.orbits)))
+        branch.orbits += [corner.before, corner.beyond][: 1 if orbit.turns > 1 else 2]
+        yield branch.orbits[-1]
+        return orbit.turns > 1
 
     def _obstacle(self, now: BranchOrbit) -> str:
         """Return the reason why no orbit is found beyond one, after a colon; an empty text if none is known."""
@@ -348,10 +373,7 @@ class Follower:
             taken = self.on_branch(orbit, float(value), now.tangent)
         except (OrbitError, np.linalg.LinAlgError):
             return None
-        # at a yield velocity branches have corners, of up to a right angle
-        has_corner = step < CORNER * self.settings.longest and (now.orbit.falling != orbit.falling).any()
-        turn = 0.5 * np.pi if has_corner else MOST_TURN
-        return (taken, newton) if taken.tangent @ now.tangent >= np.cos(turn) else None
+        return (taken, newton) if taken.tangent @ now.tangent >= np.cos(MOST_TURN) else None
 
     def _closing_step(
         self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit
@@ -370,7 +392,7 @@ class Follower:
         return None if found is None else (step, found[0])
 
     def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
-        """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
+        """Return the difference of two orbits in the unknowns of the branch."""
         apart = phase_differences(one.orbit, other.orbit)
         assert apart is not None, "orbits of one branch hit their stops in one order"
         return np.append(apart, (other.value - one.value) / self.settings.span)
@@ -413,17 +435,17 @@ class Follower:
                     found = self._branch_point(now, step)
                     is_level = found is not None and abs(found[1].tangent[-1]) < LEVEL
                 else:
-                    found = self._located(now, step, _test_of(kind))
+                    found = self._located(now, step, kind)
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch
                 if kind != "fold" or not is_level:
-                    yield found[0], _as_end(kind, now.orbit, found[1].orbit), found[1]
+                    yield found[0], end_of(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
                 yield 0.0, "end of the range", now
             elif (now.value - bound) * (taken.value - bound) < 0.0:
-                found = self._located(now, step, _beyond(bound))
+                found = self._located(now, step, bound)
                 if found is not None:
                     yield found[0], "end of the range", found[1]
 
@@ -445,10 +467,8 @@ class Follower:
                 return place, BranchOrbit(value, orbit, slopes / np.linalg.norm(slopes), 0.0)
         return None
 
-    def _located(
-        self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
-    ) -> tuple[float, BranchOrbit] | None:
-        """Return the place along a step where a test is 0, and the orbit there."""
+    def _located(self, now: BranchOrbit, step: float, kind: str | float) -> tuple[float, BranchOrbit] | None:
+        """Return the place along a step where a test is 0 or the parameter has a value, and the orbit there."""
         from scipy.optimize import brentq
 
         missing = []
@@ -458,7 +478,7 @@ class Follower:
             if found is None:
                 missing.append(part)
                 return float(np.nan)
-            return test(found[0])
+            return found[0].tests[kind] if isinstance(kind, str) else found[0].value - kind
 
         try:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
@@ -466,26 +486,6 @@ class Follower:
             return None
         found = self.step(now, part) if part > 0.0 and not missing else None
         return None if found is None else (part, found[0])
-
-
-def _test_of(kind: str) -> Callable[[BranchOrbit], float]:
-    return lambda orbit: orbit.tests[kind]
-
-
-def _as_end(kind: str, now: PeriodicOrbit, at: PeriodicOrbit) -> str:
-    """Return the kind of a point, or the end of a branch that would go on as a copy of itself.
-
-    Beyond an orbit of half the period both halves change places. Beyond a symmetric orbit its mirror image follows.
-    """
-    if kind == BRANCH_POINT and at.turns > 1:
-        return f"period doubling of {at.once.name}"
-    if kind == BRANCH_POINT and is_symmetric(at) and not is_symmetric(now):
-        return f"{BRANCH_POINT} of the symmetric {at.name}"
-    return kind
-
-
-def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
-    return lambda orbit: orbit.value - bound
 
 
 def joined(backward: Branch, forward: Branch) -> Branch:

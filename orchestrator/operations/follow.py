@@ -13,11 +13,12 @@ class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
     Folds, branch points, period doublings, tori and grazes are located and printed, and branches that begin there are
-    followed. The stops must be rigid, the force harmonic. First orbits are searched along the range. --seed gives one
-    for the scene as it is, --from-dataset one at the values of its run.
+    followed. The stops must be rigid, the force harmonic. First orbits are those of one impact and those on which runs
+    over the range end. Index sums then show whether orbits are missing.
 
-    With --second, folds, period doublings, tori and grazes are curves over both numbers, also those that leave points
-    where two curves meet. The curves are then written and drawn, and the branches are printed.
+    --impacts and --periods search other orbits. --seed gives one for the scene as it is, --from-dataset one at the
+    values of its run. With --second, folds, period doublings, tori and grazes are curves over both numbers, also those
+    that leave points where two curves meet. The curves are then written and drawn, and the branches are printed.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
@@ -28,9 +29,9 @@ class Follow(Operation):
     stop: Annotated[float, Option("--to", help="Second end of its range.")]
     output: DatasetFile = None
     figure: FigureFile = None
-    impacts: Annotated[int | None, Option(help="Impacts of the first orbits (1).")] = None
+    impacts: Annotated[int | None, Option(help="Impacts of the first orbits.")] = None
     periods: Annotated[
-        int | None, Option(python="periods: int = 1", help="Forcing periods of the first orbits (1).")
+        int | None, Option(python="periods: int = 1", help="Forcing periods of the first orbits.")
     ] = None
     seed: Seed = None
     from_dataset: FromDataset = None
@@ -38,6 +39,9 @@ class Follow(Operation):
     doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
     grazes: Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")] = 1
     step: Annotated[float, Option(help="Largest step along a branch, relative to the range.")] = 0.01
+    starts: Annotated[
+        int, Option(help="Trains of impacts from which each search for orbits of several impacts starts.")
+    ] = 256
     second: Annotated[
         str | None,
         Option(metavar="KEY", help="Second number, over which the bifurcations are followed."),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,10 +12,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.branches import dataset_of_branches
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
+from vibroimpact.analysis.orbits.branches import MISSING_ORBITS, dataset_of_branches, mirror_images
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.departures import Departure, departures, passes
 from vibroimpact.analysis.orbits.following import (
-    BRANCH_POINT,
     Branch,
     BranchOrbit,
     Follower,
@@ -23,13 +24,15 @@ from vibroimpact.analysis.orbits.following import (
     SpecialPoint,
     joined,
 )
+from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
-from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.messages import Argument, Either, Message, message
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.messages import counted, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.find import long_runs, orbit_of_impacts
+from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
 from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
+from vibroimpact.orchestrator.orbits.index_check import IndexCheck
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.run.provenance import scene_attributes
@@ -44,6 +47,8 @@ MOST_BRANCHES = 256
 """Number of branches from which on no more are begun at special points."""
 FOLLOWED_TURNS = 2
 """Number of turns of a grazing orbit up to which the orbits that meet it are followed."""
+MOST_ROUNDS = 4
+"""Rounds of the self-check in which missing orbits are searched."""
 
 Followings = Iterator[tuple[Branch, BranchOrbit]]
 """Each new orbit, and the branch that it extends."""
@@ -67,6 +72,12 @@ class Followed:
     """Key of the scene that is varied."""
     branches: list[Branch] = field(default_factory=list)
     """The branches so far."""
+    ends: list[RunEnd] = field(default_factory=list)
+    """The motions on which runs over the range end, where these runs were made."""
+    search: str = ""
+    """A sentence on the starts of the search for first orbits, and its finds."""
+    check: IndexCheck | None = None
+    """The self-check by index sums, where orbits of all kinds were looked for."""
     meetings: list[Meeting] = field(default_factory=list)
     """The grazes of these branches, with the orbits that meet there."""
     is_cut_short: bool = False
@@ -75,13 +86,39 @@ class Followed:
     @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file of its orbits."""
-        return scene_attributes(self.scene, HISTORY) | {"parameter": self.parameter}
+        missing = [] if self.check is None else self.check.incomplete
+        texts = {
+            "first_orbits": self.origins,
+            "index_sums": self.sums,
+            MISSING_ORBITS: [f"{each.between[0]:.17g} {each.between[1]:.17g}" for each in missing],
+        }
+        told = {name: "\n".join(lines) for name, lines in texts.items() if lines}
+        return scene_attributes(self.scene, HISTORY) | {"parameter": self.parameter} | told
+
+    @property
+    def sums(self) -> list[str]:
+        """Lines on the self-check by index sums."""
+        return [] if self.check is None else self.check.lines
+
+    @property
+    def origins(self) -> list[str]:
+        """Lines on the search for first orbits: its starts, or the motions on which runs over the range end."""
+        values = [each.value for each in self.ends]
+        if not values:
+            return [self.search] if self.search else []
+        settings = FollowSettings(min(values), max(values))
+
+        def is_followed(end: RunEnd) -> bool:
+            return end.orbit is not None and _is_known(self.branches, end.orbit, end.value, settings)
+
+        return ends_in_words(self.ends, is_followed)
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The orbits as runs."""
+        """The orbits as runs; the branches of mirror images come last."""
+        branches = [branch for branch in self.branches if branch.orbits]
         return dataset_of_branches(
-            [branch for branch in self.branches if branch.orbits],
+            [*branches, *mirror_images(branches).values()],
             coordinate=coordinate_name(self.parameter, [self.parameter]),
             unit=cf_unit(self.scene, self.parameter) or "1",
             units=self.scene.units,
@@ -100,6 +137,7 @@ def follow_branches(
     doublings: int = 1,
     grazes: int = 1,
     longest: float = 0.01,
+    starts: int = STARTS,
     looking: Callable[[float], None] = lambda value: None,
     required: bool = True,
 ) -> Followings:
@@ -113,79 +151,43 @@ def follow_branches(
     begin with, and one is `required`.
     """
     scene, parameter = followed.scene, followed.parameter
-    _refuse(start, stop, impacts, periods, doublings, grazes, longest)
+    _refuse(start, stop, impacts, periods, doublings, grazes, longest, starts)
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
-    starts = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
-    for value, orbit in starts:
+    found = 0
+    for value, orbit in first_orbits(
+        body_at, scene, parameter, settings, impacts, periods, seed, followed.ends, starts, looking
+    ):
+        found += 1
         if not _is_known(followed.branches, orbit, value, settings):
             yield from _both_ways(follower, orbit, value, followed)
-    if required and not followed.branches:
-        raise OrbitError(
-            message(
-                f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
-                f"{parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
-                _other_orbits(scene, parameter, settings, (impacts or 1, periods)),
-            )
+    if seed is None and (impacts or 1) > 1:
+        followed.search = (
+            f"The search at {SEEDS} values or more took {starts} trains of impacts at each and found "
+            f"{counted(found, 'orbit')}; branches: {len(followed.branches)}."
         )
+    if required:
+        _refuse_nothing(followed, settings, impacts, periods)
     yield from _departed(follower, followed, doublings, grazes)
+    if seed is None and impacts is None and periods == 1:
+        followed.check = IndexCheck(scene, parameter, settings, starts)
+        yield from _completed(follower, followed, doublings, grazes, followed.check)
 
 
-def _other_orbits(scene: Scene, parameter: str, settings: FollowSettings, sought: tuple[int, int]) -> str:
-    """Return advice for a range without orbits of some impacts and periods: the orbits on which runs end there."""
-    ends = _counted(orbit for _, orbit in _ends_of_runs(scene, parameter, settings))
-    ends.pop(sought, None)
-    if not ends:
-        return "Try another range, or other impacts and periods: no run at these values ends on an orbit."
-    (impacts, periods), count = ends.most_common(1)[0]
-    runs = f": runs at {count} of these values end on P({impacts},{periods})."
-    return message("Try ", _asking(impacts, periods), runs)
-
-
-def orbits_not_followed(followed: Followed, start: float, stop: float) -> list[str]:
-    """Return a line for each kind of orbit on which runs end and that no branch holds, the commonest first.
-
-    `start` and `stop` are the range of the parameter; branches begin at orbits of one impact.
-    """
-    settings = FollowSettings(min(start, stop), max(start, stop))
-    ends = _ends_of_runs(followed.scene, followed.parameter, settings)
-    missed = _counted(
-        orbit for value, orbit in ends if not _is_known(followed.branches, orbit, value, settings)
-    )
-    return [
+def _refuse_nothing(followed: Followed, settings: FollowSettings, impacts: int | None, periods: int) -> None:
+    """Raise OrbitError if there is no branch, with the motions on which runs end."""
+    if followed.branches:
+        return
+    values = seed_values(settings)
+    ends = followed.ends or list(ends_of_runs(followed.scene, followed.parameter, values))
+    raise OrbitError(
         message(
-            f"Runs at {count} of {SEEDS} values of the range end on P({impacts},{periods}), which is not followed "
-            "here: ",
-            *(_asking(impacts, periods), "."),
+            f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
+            f"{followed.parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
+            where_runs_end(ends, (impacts or 1, periods)),
         )
-        for (impacts, periods), count in missed.most_common()
-    ]
-
-
-def _ends_of_runs(
-    scene: Scene, parameter: str, settings: FollowSettings
-) -> Iterator[tuple[float, PeriodicOrbit]]:
-    """Yield the orbits on which runs end, with their values of the parameter."""
-    with long_runs(scene) as impacts_at:
-        for value in seed_values(settings):
-            try:
-                body = impacting_body(scene.with_values({parameter: value}))
-            except SceneError:
-                continue  # the scene has no run there
-            orbit = orbit_of_impacts(body, impacts_at({parameter: value}))
-            if orbit is not None:
-                yield value, orbit
-
-
-def _counted(orbits: Iterable[PeriodicOrbit]) -> Counter[tuple[int, int]]:
-    """Return the number of orbits for each pair of impacts and periods."""
-    return Counter((orbit.phases.size, orbit.periods) for orbit in orbits)
-
-
-def _asking(impacts: int, periods: int) -> Message:
-    """Return the options that select orbits of some impacts and periods."""
-    return message(Argument("impacts", impacts), Either(", ", " "), Argument("periods", periods))
+    )
 
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:
@@ -200,17 +202,36 @@ def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: F
             result.branches.append(joined(backward, forward) if forward.orbits else backward)
 
 
-def _departed(follower: Follower, result: Followed, doublings: int, grazes: int) -> Followings:
-    """Follow the branches that begin at the special points of others.
+def _completed(
+    follower: Follower, result: Followed, doublings: int, grazes: int, check: IndexCheck
+) -> Followings:
+    """Follow orbits that index sums show to be missing, until a round finds none."""
+    for _ in range(MOST_ROUNDS):
+        begin = len(result.branches)
+        for value, orbit in check.missing(result.branches):
+            try:
+                yield from _both_ways(follower, orbit, value, result)
+            except OrbitError:
+                continue  # no branch leads on from an orbit at rounding from its end
+        if len(result.branches) == begin:
+            return
+        yield from _departed(follower, result, doublings, grazes, begin)
+
+
+def _departed(
+    follower: Follower, result: Followed, doublings: int, grazes: int, begin: int = 0
+) -> Followings:
+    """Follow the branches that begin at the special points of others, from branch number `begin` on.
 
     Doublings and grazes are followed one after the other up to their numbers, branch points always.
     """
-    waiting = deque((branch, doublings, grazes) for branch in result.branches)
+    waiting = deque((branch, doublings, grazes) for branch in result.branches[begin:])
     while waiting and not result.is_cut_short:
         result.is_cut_short = len(result.branches) >= MOST_BRANCHES
         parent, doublings, grazes = waiting.popleft()
         for point in parent.points:
-            is_graze, is_doubling = point.kind.startswith("graze"), point.kind == "period doubling"
+            is_graze = point.kind.startswith("graze")
+            is_doubling = point.kind in ("period doubling", AT_YIELD_VELOCITY)
             if is_doubling and not doublings:
                 continue
             found = departures(follower, point)
@@ -320,7 +341,14 @@ def _off_path(apart: NDArray[np.float64], steps: NDArray[np.float64]) -> float:
 
 
 def _refuse(
-    start: float, stop: float, impacts: int | None, periods: int, doublings: int, grazes: int, longest: float
+    start: float,
+    stop: float,
+    impacts: int | None,
+    periods: int,
+    doublings: int,
+    grazes: int,
+    longest: float,
+    starts: int,
 ) -> None:
     if not (np.isfinite(start) and np.isfinite(stop) and start != stop):
         raise UsageError(f"--from, --to: expected two different numbers, got {start:g} and {stop:g}.")
@@ -328,6 +356,8 @@ def _refuse(
         raise UsageError(f"--impacts: expected 1 to {MOST_IMPACTS}, got {impacts}.")
     if not periods >= 1:
         raise UsageError(f"--periods: expected 1 or more, got {periods}.")
+    if not starts >= 1:
+        raise UsageError(f"--starts: expected 1 or more, got {starts}.")
     if not doublings >= 0:
         raise UsageError(f"--doublings: expected 0 or more, got {doublings}.")
     if not grazes >= 0:

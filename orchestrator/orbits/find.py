@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
@@ -27,6 +28,7 @@ from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.seeds import Seed
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.running.kept import opened_scene as kept_scene
 from vibroimpact.orchestrator.scene import Scene
@@ -37,6 +39,8 @@ LONGEST = 16
 """Most forcing periods of an orbit on which a run may end."""
 TRANSIENT = 2000
 """Forcing periods of a run before its orbit is read."""
+RECORDED = 64
+"""Forcing periods in which its orbit is read: chaos takes 40 periods to recognise, an orbit twice its own."""
 LARGEST_PHASE = 1e6
 """Largest phase of a seed, rad; a larger phase has lost digits within its turn."""
 REPEATS = 1e-4
@@ -174,23 +178,19 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
 
 
 @contextmanager
-def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats | None]]:
-    """Yield a function that runs a scene long at values of its keys, and returns its last impacts (`RunRecord`)."""
-    long = scene.with_values(
-        {
-            "record.transient_periods": TRANSIENT,
-            "record.recorded_periods": 2 * LONGEST,
-            "record.impacts": True,
-        }
-    )
-    with kept_scene(long) as opened:
-        yield lambda values: opened.runner.run(values).impacts
+def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float], State | None], RunRecord]]:
+    """Yield a function that runs a scene long at values of its keys, from a carried state or from its own start."""
+    record = {"extrema": True, "strobe": True, "impacts": True, "each_period": True}
+    periods = {"transient_periods": TRANSIENT, "recorded_periods": RECORDED}
+    values = {f"record.{name}": value for name, value in {**record, **periods}.items()}
+    with kept_scene(scene.with_values(values)) as opened:
+        yield opened.runner.record_of
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
-    with long_runs(scene) as impacts_at:
-        return orbit_of_impacts(impacting_body(scene), impacts_at({}))
+    with long_runs(scene) as record_of:
+        return orbit_of_impacts(impacting_body(scene), record_of({}, None).impacts)
 
 
 def orbit_of_impacts(

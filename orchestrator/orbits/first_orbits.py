@@ -8,8 +8,9 @@ import numpy as np
 
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit, closed_form
 from vibroimpact.analysis.orbits.following import BodyAt, FollowSettings
-from vibroimpact.analysis.orbits.search import orbits_of
+from vibroimpact.analysis.orbits.search import STARTS, orbits_of
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_of_runs
 from vibroimpact.orchestrator.orbits.find import find_orbits
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.scene import Scene
@@ -26,14 +27,16 @@ def first_orbits(
     impacts: int | None,
     periods: int,
     seed: Seed | None,
+    ends: list[RunEnd],
+    starts: int = STARTS,
     looking: Callable[[float], None] = lambda value: None,
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Yield values of the parameter and a physical orbit at each; several may lie on one branch.
 
     The parameter is a key of the scene. A seed belongs to the scene's own value of it. The settings have its range. p
-    and q are `impacts` and `periods`: one impact by default, or as many as the seed has. The impacts of a seed, each a
-    phase and a stop, are near those of the only orbit. `looking` is called with each value at which many starts are
-    tried.
+    and q are `impacts` and `periods`. Without them and a seed, orbits are those of one impact, and those on which runs
+    end; `ends` takes the ends of these runs. The impacts of a seed, each a phase and a stop, are near those of the only
+    orbit. `looking` is called with each value at which runs are made or many starts are tried.
 
     UsageError: the seed does not fit the scene or the range. OrbitError: there is no physical orbit near the seed.
     """
@@ -41,8 +44,10 @@ def first_orbits(
         yield _of_seed(scene, parameter, settings, seed, impacts, periods)
     elif impacts in (None, 1):
         yield from _of_one_impact(body_at, settings, periods)
+        if impacts is None and periods == 1:
+            yield from _of_runs(scene, parameter, settings, ends, looking)
     else:
-        yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods, looking)
+        yield from _of_many_impacts(body_at, scene, parameter, settings, impacts, periods, starts, looking)
 
 
 def seed_values(settings: FollowSettings) -> list[float]:
@@ -63,6 +68,18 @@ def _of_one_impact(
             yield from ((value, orbit) for orbit in found if orbit.is_physical and orbit.turns == 1)
 
 
+def _of_runs(
+    scene: Scene,
+    parameter: str,
+    settings: FollowSettings,
+    ends: list[RunEnd],
+    looking: Callable[[float], None],
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    """Yield the orbits on which runs end, after all runs, so that a run goes on where the last one ended."""
+    ends.extend(ends_of_runs(scene, parameter, seed_values(settings), looking))
+    yield from ((each.value, each.orbit) for each in ends if each.orbit is not None)
+
+
 def _of_many_impacts(
     body_at: BodyAt,
     scene: Scene,
@@ -70,6 +87,7 @@ def _of_many_impacts(
     settings: FollowSettings,
     impacts: int,
     periods: int,
+    starts: int,
     looking: Callable[[float], None],
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Yield orbits at values of the range, first at the scene's own: a branch may lie between the others."""
@@ -77,7 +95,7 @@ def _of_many_impacts(
     inside = [own] if settings.lowest <= own <= settings.highest else []
     for value in [*inside, *seed_values(settings)]:
         looking(value)
-        yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods))
+        yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods, starts=starts))
 
 
 def _of_seed(

@@ -13,13 +13,14 @@ from typing import Self
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.orbits.branches import multiplier_text
+from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.departures import grazes
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
-from vibroimpact.analysis.orbits.symmetry import mirror_image
+from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.messages import counted, typed
+from vibroimpact.fmus.messages import counted
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.follow import Follow
@@ -29,7 +30,6 @@ from vibroimpact.orchestrator.orbits.branches import (
     Followed,
     Meeting,
     follow_branches,
-    orbits_not_followed,
 )
 from vibroimpact.orchestrator.orbits.loci import (
     COARSE,
@@ -69,6 +69,7 @@ class Following(Study[str]):
     doublings: int = 1
     grazes: int = 1
     step: float = 0.01
+    starts: int = STARTS
     second: str | None = None
     second_range: tuple[float, float] | None = None
 
@@ -96,6 +97,7 @@ class Following(Study[str]):
             doublings=options.doublings,
             grazes=options.grazes,
             step=options.step,
+            starts=options.starts,
             second=options.second,
             second_range=second_range,
         )
@@ -118,12 +120,13 @@ class Following(Study[str]):
     ) -> Generator[str, None, None]:
         orbits = follow_branches(
             *(followed, self.start, self.stop),
-            impacts=self.impacts,
+            impacts=self.impacts if required else self.impacts or 1,
             periods=self.periods,
             seed=self.seed,
             doublings=self.doublings,
             grazes=self.grazes,
             longest=step,
+            starts=self.starts,
             looking=lambda value: self.status(f"{self.begins}, {self.parameter} {value:.6g}"),
             required=required,
         )
@@ -165,9 +168,10 @@ class Following(Study[str]):
             say(
                 f"After {many} branches no more are begun at special points. Ask for fewer doublings or grazes."
             )
-        if self.seed is None and self.impacts is None and not self.incomplete:
-            for line in orbits_not_followed(self.followed, self.start, self.stop):
-                say(typed(line))
+        for line in (
+            self.followed.origins if self.incomplete else [*self.followed.origins, *self.followed.sums]
+        ):
+            say(line)
         if self.second is not None:
             self._print_loci()
             say(self.loci.left_out)
@@ -188,18 +192,23 @@ class Following(Study[str]):
         for number, branch in enumerate(self.followed.branches, start=1):
             name = f"{number}  {branch.full_name}"
             for point in branch.points:
-                rows.add_row(name, *_cells(point))
+                rows.add_row(name, *_cells(branch, point))
             if not branch.points:
                 rows.add_row(name, "nothing", "", "", "")
         wide_terminal().print(rows)
 
     def _print_branches(self) -> None:
+        images = mirror_images(self.followed.branches)
         for number, branch in enumerate(self.followed.branches, start=1):
             low, high = float(branch.values.min()), float(branch.values.max())
+            symmetry = "symmetric; " if branch.is_symmetric else ""
+            if number - 1 in images:
+                place = len(self.followed.branches) + 1 + list(images).index(number - 1)
+                symmetry = f"its mirror image is branch {place}, {images[number - 1].full_name}; "
             say(
                 f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
-                f"{_stable_orbits(branch)}; "
-                f"{_symmetry(branch)}begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
+                f"{_stable_orbits(branch)}; {symmetry}"
+                f"begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
             )
 
     def _meeting(self, meeting: Meeting) -> str:
@@ -245,14 +254,6 @@ class Following(Study[str]):
                 )
 
 
-def _symmetry(branch: Branch) -> str:
-    """Return the words on the mirror symmetry of a branch; an empty text if its body has none."""
-    if branch.is_symmetric:
-        return "symmetric; "
-    image = mirror_image(branch.orbits[len(branch.orbits) // 2].orbit)
-    return "" if image is None else f"its mirror image is {image.full_name}; "
-
-
 def _stable_orbits(branch: Branch) -> str:
     """Return the number of stable orbits, and in parentheses their ranges of the followed number if there are any.
 
@@ -269,12 +270,18 @@ def _stable_orbits(branch: Branch) -> str:
     return f"{sum(map(len, groups))} stable{f' ({shown})' if shown else ''}"
 
 
-def _cells(point: SpecialPoint) -> tuple[str, str, str, str]:
-    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts."""
+def _cells(branch: Branch, point: SpecialPoint) -> tuple[str, str, str, str]:
+    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts.
+
+    At a corner the largest multiplier of either side is shown.
+    """
     orbit = point.at.orbit
     largest = (
         "" if point.kind == "graze" else ", ".join(multiplier_text(each) for each in orbit.multipliers[:2])
     )
+    if point.kind == AT_YIELD_VELOCITY:
+        sides = (branch.orbits[point.place + k].orbit.multipliers[0] for k in (0, 1))
+        largest = " to ".join(map(multiplier_text, sides))
     speeds = ", ".join(f"{speed:.8g}" if speed > 1e-12 else "0" for speed in orbit.velocities)
     digits = UNEXPLAINED_DIGITS if point.kind == STABILITY_CHANGE else EXACT_DIGITS
     return point.kind, f"{point.at.value:.{digits}g}", speeds, largest

@@ -65,7 +65,7 @@ def oscillator() -> vi.Scene:
 
 def branches(scene: vi.Scene, span: tuple[float, float], step: float) -> list[Branch]:
     """Follow P(1,1) and the branches that double from it."""
-    return whole(Following(scene, FREQUENCY, *span, step=step, grazes=0)).followed.branches
+    return whole(Following(scene, FREQUENCY, *span, step=step, impacts=1, grazes=0)).followed.branches
 
 
 def doubling_by_sweeps(tolerance: float) -> tuple[float, int]:

@@ -17,7 +17,9 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.basins import Basins
-from vibroimpact.analysis.orbits.following import BRANCH_POINT, STABILITY_CHANGE, Branch, BranchOrbit
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
+from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
+from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit
 from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
@@ -188,6 +190,7 @@ def _unnamed_change(branch: Branch) -> str | None:
         "torus",
         "graze",
         "graze between impacts",
+        AT_YIELD_VELOCITY,
         BRANCH_POINT,
         STABILITY_CHANGE,
     }

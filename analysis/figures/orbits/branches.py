@@ -49,6 +49,7 @@ _MARKS = {
     SpecialOrbit.graze_between_impacts: "v",
     SpecialOrbit.stability_change: "X",
     SpecialOrbit.branch_point: "P",
+    SpecialOrbit.impact_at_the_yield_velocity: "<",
 }
 
 
@@ -78,6 +79,7 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     for axis, panel in zip(axes, panels, strict=True):
         if over is not None:
             draw_below(axis, over, name, panel)
+        _shade_missing(axis, dataset)
         _draw(axis, dataset, name, panel)
         axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
@@ -85,6 +87,13 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     words = axes[0].get_legend_handles_labels()[1]
     legend_outside(figure, axes[0], ncols=3 if max(map(len, words)) < _LONG else 2)
     return figure
+
+
+def _shade_missing(axis: Axes, dataset: xr.Dataset) -> None:
+    """Shade the ranges in which index sums show that orbits are missing."""
+    for number, line in enumerate(str(dataset.attrs.get("missing_orbits", "")).splitlines()):
+        low, high = map(float, line.split())
+        axis.axvspan(low, high, color="0.92", zorder=0.0, label="" if number else "orbits missing")
 
 
 def _label(dataset: xr.Dataset, panel: str) -> str:
@@ -154,6 +163,17 @@ def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str =
     axis.plot(x, np.concatenate(rows), rasterized=True, label=words, **_BELOW)
 
 
+def _continued(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return the rows of a branch, each turned by the impacts or periods that lead on from the row before.
+
+    An orbit counts from phase 0, which an impact passes between two orbits of a branch.
+    """
+    for k in range(1, len(values)):
+        turned = [np.roll(values[k], -turn) for turn in range(values.shape[1])]
+        values[k] = min(turned, key=lambda row: float(np.abs(row - values[k - 1]).sum()))
+    return values
+
+
 def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
@@ -164,7 +184,7 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         columns = min(rows[each].size for each in chosen)
-        values = np.array([rows[each][:columns] for each in chosen])
+        values = _continued(np.array([rows[each][:columns] for each in chosen]))
         for which, style, words in ((stable, _STABLE, "stable"), (~stable, _UNSTABLE, "unstable")):
             # a piece extends to its neighbours on both sides, so that no gap is left where stability changes
             keep = which[chosen] | np.append(which[chosen][1:], False) & ~which[chosen]
@@ -176,7 +196,7 @@ def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
                 labelled.add(words)
         for each in chosen[special[chosen] > 0]:
             kind = SpecialOrbit(int(special[each]))
-            words = str(kind.name).replace("_", " ")
+            words = str(kind.name).replace("impact_", "").replace("_", " ")
             axis.plot(
                 np.full(rows[each].size, places[each]),
                 rows[each],

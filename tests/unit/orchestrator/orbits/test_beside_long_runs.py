@@ -40,7 +40,7 @@ def scene(path: Path, **changes: Any) -> vi.Scene:
 @pytest.fixture(scope="module")
 def chain() -> Followed:
     """Return the branches of the chain of the thesis."""
-    return whole(Following(scene(CHAIN), FREQUENCY, 0.3, 2.2, doublings=2, grazes=0)).followed
+    return whole(Following(scene(CHAIN), FREQUENCY, 0.3, 2.2, doublings=2, impacts=1, grazes=0)).followed
 
 
 def run_from(orbit: PeriodicOrbit, frequency: float) -> tuple[str, Any]:
@@ -105,7 +105,9 @@ def test_a_chain_of_one_mass_has_the_points_of_the_oscillator() -> None:
         "[forcing]\namplitude = [0.5]\nangular_frequency = 1.0\n"
         "[[stop]]\nposition = 1.0\nrestitution = 0.7\n[record]\nrecorded_periods = 2\n"
     )
-    study = Following(vi.Scene.from_text(text), FREQUENCY, 0.6, 1.6, doublings=0, grazes=0, step=0.05)
+    study = Following(
+        vi.Scene.from_text(text), FREQUENCY, 0.6, 1.6, doublings=0, impacts=1, grazes=0, step=0.05
+    )
     followed = whole(study).followed
     found = sorted(point.at.value for branch in followed.branches for point in branch.points)
     expected = [0.7106873690939, 0.9364931207, 1.2185743569476, 1.5166110861]

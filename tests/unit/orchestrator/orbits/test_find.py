@@ -52,6 +52,31 @@ def scene(changes: dict[str, float]) -> vi.Scene:
     return vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({}).with_values(changes)
 
 
+def test_orbits_are_told_and_drawn(tmp_path: Path) -> None:
+    figure = tmp_path / "o.png"
+    done = in_this_process("orbit", SCENE, *AT, "--figure", figure)
+    assert (done.returncode, done.stderr) == (0, "")
+    for said in ("1.884298559", "0.7874223201", "2 physical orbits."):
+        assert said in done.stdout
+    assert figure.is_file()
+    done = in_this_process("orbit", SCENE, *AT, "--impacts", "3", "--periods", "1")
+    assert (done.returncode, "No physical orbit P(3,1)." in done.stdout) == (0, True)
+
+
+def test_unstable_orbits_of_two_impacts_are_found_and_the_run_ends_on_the_stable_one() -> None:
+    (unstable,) = vi.find_orbits(scene({"forcing.angular_frequency": 0.94}), 2, 2)
+    assert not unstable.is_stable
+    once, twice = vi.find_orbits(scene({"forcing.angular_frequency": 0.8}))
+    assert (once.name, once.is_stable, twice.name, twice.is_stable) == ("P(1,1)", False, "P(2,2)", True)
+
+
+def test_an_orbit_between_two_stops_is_that_of_a_long_run() -> None:
+    (orbit,) = vi.find_orbits(ROOT / "examples" / "two_stops.toml")
+    assert orbit.name == "P(2,1)"
+    assert orbit.contacts.tolist() == [0, 1]
+    assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-12)
+
+
 def test_orbits_are_the_runs_of_a_dataset_which_the_same_command_may_write_again(tmp_path: Path) -> None:
     output = tmp_path / "orbits.nc"
     for _ in range(2):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +13,8 @@ from support.places import ROOT
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.fmus.errors import DatasetError, SceneError
+from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.hard_cases.loose import ball_in_cavity, symmetric_orbit
-from vibroimpact.orchestrator.scene.changes import with_resting_start
 
 
 def in_this_process(arguments: list[str]) -> tuple[int, str, str]:
@@ -30,7 +28,7 @@ PARAMETER = "forcing.angular_frequency"
 
 @pytest.fixture(scope="module")
 def branches() -> object:
-    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, grazes=0)
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, impacts=1, grazes=0)
 
 
 def test_a_branch_of_a_ball_in_a_cavity_is_its_closed_form() -> None:
@@ -109,6 +107,8 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
         "1.6",
         "--step",
         "0.05",
+        "--impacts",
+        "1",
     ]
     code, out, err = in_this_process([*arguments, "-o", str(output), "--figure", str(figure)])
     assert (code, err) == (0, "")
@@ -124,7 +124,7 @@ def loci() -> xr.Dataset:
     both = {"second": "forcing.amplitude", "second_range": (0.3, 0.7)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vibroimpact.orchestrator.orbits.loci.SECOND_VALUES", 3)
-        return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, grazes=0, **both)
+        return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.05, doublings=0, impacts=1, grazes=0, **both)
 
 
 def test_bifurcations_over_two_numbers_are_a_dataset_and_drawn(loci: xr.Dataset) -> None:
@@ -177,61 +177,6 @@ def test_what_cannot_be_followed_is_one_line(arguments: list[str], said: str) ->
     assert err.count("\n") == 1
 
 
-SYMMETRIC = """
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.04
-[forcing]
-amplitude = 0.5
-angular_frequency = 0.98
-[[stop]]
-position = 1.0
-restitution = 0.7
-[[stop]]
-side = "lower"
-position = -1.0
-restitution = 0.7
-[record]
-recorded_periods = 8
-"""
-
-
-def test_a_loss_of_symmetry_is_a_branch_point_at_which_the_broken_branch_begins(tmp_path: Path) -> None:
-    path, output, figure = tmp_path / "two.toml", tmp_path / "b.nc", tmp_path / "b.png"
-    path.write_text(SYMMETRIC, encoding="utf-8")
-    span = ["--parameter", PARAMETER, "--from", "0.96", "--to", "1", "--step", "0.05", "--doublings", "0"]
-    code, out, err = in_this_process(["follow", str(path), *span, "-o", str(output), "--figure", str(figure)])
-    assert (code, err) == (0, "")
-    for said in (
-        "1  P(1,1) at stop 1: its graze between impacts at 0.97375271868 meets P(2,1)",
-        "its mirror image is P(1,1) at stop 2",
-        "ends: graze of P(1,1), branch point of the symmetric P(2,1).",
-        "symmetric; begun from P(2,1), 1 at stop 1, 1 at stop 2 at its pitchfork 0.97282429546",
-    ):
-        assert said in out
-    assert "no cause was found" not in out
-    with vi.open_dataset(output) as written:
-        runs = written.vibroimpact.runs
-        here = runs["orbit_special"].values == SpecialOrbit.branch_point
-        np.testing.assert_allclose(runs["angular_frequency"].values[here], 0.972824295465, atol=1e-11)
-        assert (runs["orbit_symmetric"].values[here] == 1).all()
-        broken = runs["orbit_branch"].values == 2
-        assert not runs["orbit_stable"].values[broken & ~here].any()
-        assert runs["orbit_symmetric"].values[broken & ~here].any() == 0
-        assert runs["angular_frequency"].values[broken].max() == pytest.approx(0.97375271868, abs=1e-10)
-
-
-def test_equal_orbits_at_two_stops_are_told_apart(tmp_path: Path) -> None:
-    path = tmp_path / "two.toml"
-    path.write_text(SYMMETRIC, encoding="utf-8")
-    span = ["--parameter", PARAMETER, "--from", "0.965", "--to", "0.973", "--step", "0.1", "--doublings", "0"]
-    code, out, _ = in_this_process(["follow", str(path), *span, "--set", "forcing.angular_frequency=0.97"])
-    assert code == 0
-    assert "P(1,1) at stop 1" in out
-    assert "P(1,1) at stop 2" in out
-
-
 def test_curves_over_two_numbers_say_on_which_branch_they_begin_and_what_is_left_out(
     loci: xr.Dataset,
 ) -> None:
@@ -266,43 +211,6 @@ def test_what_was_followed_before_ctrl_c_is_written(tmp_path: Path, monkeypatch:
     assert vi.open_dataset(output).sizes["angular_frequency"] >= 25
 
 
-def test_orbits_are_told_and_drawn(tmp_path: Path) -> None:
-    figure = tmp_path / "o.png"
-    arguments = [
-        "orbit",
-        str(SCENE),
-        "--set",
-        "sweep={}",
-        "--set",
-        f"{PARAMETER}=1.4",
-        "--figure",
-        str(figure),
-    ]
-    code, out, err = in_this_process(arguments)
-    assert (code, err) == (0, "")
-    assert "1.884298559" in out
-    assert "0.7874223201" in out
-    assert "2 physical orbits." in out
-    assert figure.is_file()
-    code, out, _ = in_this_process([*arguments[:-2], "--impacts", "3", "--periods", "1"])
-    assert (code, "No physical orbit P(3,1)." in out) == (0, True)
-
-
-def test_unstable_orbits_of_two_impacts_are_found_and_the_run_ends_on_the_stable_one() -> None:
-    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({})
-    (unstable,) = vi.find_orbits(scene.with_values({PARAMETER: 0.94}), 2, 2)
-    assert not unstable.is_stable
-    once, twice = vi.find_orbits(scene.with_values({PARAMETER: 0.8}))
-    assert (once.name, once.is_stable, twice.name, twice.is_stable) == ("P(1,1)", False, "P(2,2)", True)
-
-
-def test_an_orbit_between_two_stops_is_that_of_a_long_run() -> None:
-    (orbit,) = vi.find_orbits(ROOT / "examples" / "two_stops.toml")
-    assert orbit.name == "P(2,1)"
-    assert orbit.contacts.tolist() == [0, 1]
-    assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-12)
-
-
 def test_a_branch_ends_where_the_scene_allows_no_further() -> None:
     span = ["--parameter", "stop[1].restitution", "--from", "0.5", "--to", "1.5"]
     code, out, _ = in_this_process(
@@ -322,9 +230,8 @@ def test_what_was_followed_before_an_error_is_written(
 
     monkeypatch.setattr(Follower, "leave", fails)
     output = tmp_path / "b.nc"
-    code, out, err = in_this_process(
-        ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6", "-o", str(output)]
-    )
+    command = ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6"]
+    code, out, err = in_this_process([*command, "--impacts", "1", "-o", str(output)])
     assert code in (1, 2)
     assert err == "orbit: expected something else.\n"
     assert "0.93649312074" in out
@@ -338,119 +245,6 @@ def test_an_orbit_that_passes_through_its_stop_is_not_followed() -> None:
     (orbit,) = vi.find_orbits(scene, 1, 2, penetrating=True)
     with pytest.raises(OrbitError, match=r"got a P\(1,2\) that passes through stop 1 by 0.00339"):
         vi.follow(scene, PARAMETER, 0.8, 0.9, seed=[(float(orbit.phases[0]), 1)], periods=2)
-
-
-def swept_scene(**forcing: float) -> dict[str, object]:
-    """Return a two-sided oscillator whose frequency comes only from its sweep."""
-    stop = {"position": 1.0, "restitution": 0.7}
-    return {
-        "scene": {"units": "nondimensional"},
-        "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.04},
-        "forcing": {"amplitude": 0.5, **forcing},
-        "stop": [stop, {**stop, "side": "lower", "position": -1.0}],
-        "record": {"recorded_periods": 8},
-        "sweep": {PARAMETER: {"start": 0.95, "stop": 1.3, "points": 4}},
-    }
-
-
-def test_a_key_that_the_scene_leaves_to_its_sweep_is_followed() -> None:
-    left, given = swept_scene(), swept_scene(angular_frequency=1.1)
-    found = [vi.follow(scene, PARAMETER, 0.95, 1.0, step=0.2, doublings=0) for scene in (left, given)]
-    np.testing.assert_array_equal(*(each.impact_velocity.values for each in found))
-    assert "sweep" not in vi.Scene.from_text(found[0].attrs["scene"]).to_toml()
-
-
-def test_another_key_that_is_left_to_the_sweep_is_asked_for_with_what_to_write(tmp_path: Path) -> None:
-    file = tmp_path / "swept.toml"
-    file.write_text(vi.Scene.from_dict(swept_scene()).to_toml(), encoding="utf-8")
-    for command in (
-        ["follow", str(file), "--parameter", "forcing.amplitude", "--from", "0.3", "--to", "0.5"],
-        ["orbit", str(file)],
-        ["maps", str(file)],
-    ):
-        code, _, err = in_this_process(command)
-        assert code == 2
-        assert err == (
-            f"{file}: {PARAMETER}: expected a value beside those of the sweep, which is left out here, got none. "
-            f"Add it to the scene, or give it: --set 'sweep={{}}' --set '{PARAMETER}=0.95'.\n"
-        )
-
-
-def test_orbits_of_a_stop_that_keeps_the_body_from_0_need_no_start(tmp_path: Path) -> None:
-    scene = swept_scene(angular_frequency=2.2) | {"stop": [{"position": -0.1, "restitution": 0.7}]}
-    scene.pop("sweep")
-    written = scene | {"body": scene["body"] | {"displacement_start": -5.0}}  # type: ignore[operator]
-    for found, expected in zip(vi.find_orbits(scene, 1), vi.find_orbits(written, 1), strict=True):
-        np.testing.assert_array_equal(found.phases, expected.phases)
-    branch = vi.follow(scene, PARAMETER, 2.1, 2.3, step=0.2, doublings=0)
-    assert vi.Scene.from_text(branch.attrs["scene"]).value("body.displacement_start") == -0.1
-    with pytest.raises(SceneError, match="a start on the free side of stop"):
-        vi.run(scene)
-    file = tmp_path / "below.toml"
-    file.write_text(branch.attrs["scene"].replace("displacement_start = -0.1", ""), encoding="utf-8")
-    assert in_this_process(["orbit", str(file), "--impacts", "1"])[0] == 0
-
-
-def test_a_chain_whose_stops_exclude_0_is_searched_from_its_stops() -> None:
-    chain = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0], "dampings": 0.1}
-    document = {"body": chain, "stop": [{"position": -0.2}, {"position": 0.3, "side": "lower", "mass": 1}]}
-    assert with_resting_start(document)["body"]["displacement_start"] == [0.3, -0.2]
-    swept = {"stop[1].position": {"values": [-0.4, 0.1]}}
-    assert with_resting_start(document | {"sweep": swept})["body"]["displacement_start"] == [0.3, -0.4]
-    assert with_resting_start({"body": chain, "stop": [{"position": 0.0}]})["body"] == chain
-
-
-@pytest.mark.parametrize(
-    "document",
-    [
-        {},
-        {"body": 3},
-        {"body": {}, "stop": 7},
-        {"body": {}, "stop": [{"position": "a"}, 4]},
-        {"body": {"kind": []}},
-    ],
-)
-def test_a_scene_of_any_content_is_left_to_its_rules(document: dict[str, object]) -> None:
-    assert with_resting_start(document) == document
-
-
-def test_without_an_orbit_of_one_impact_the_number_of_impacts_is_named() -> None:
-    scene = swept_scene(angular_frequency=1.1)
-    scene |= {"stop": [{**stop, "position": 0.5 * stop["position"]} for stop in scene["stop"]]}  # type: ignore[attr-defined]
-    with pytest.raises(
-        OrbitError,
-        match=r"got none\. Try impacts=2, periods=1: runs at \d+ of these values end on P\(2,1\)\.",
-    ):
-        vi.follow(scene, PARAMETER, 1.0, 2.0)
-
-
-def test_what_runs_end_on_and_no_branch_holds_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "two_stops.toml"
-    file.write_text(vi.Scene.from_dict(swept_scene()).to_toml(), encoding="utf-8")
-    command = [
-        "follow",
-        str(file),
-        "--parameter",
-        PARAMETER,
-        "--from",
-        "0.9",
-        "--to",
-        "1.3",
-        "--step",
-        "0.05",
-        "--grazes",
-        "0",
-    ]
-    code, out, err = in_this_process(command)
-    assert code == 0, err
-    said = [line for line in out.splitlines() if "not followed here" in line]
-    assert re.fullmatch(
-        r"Runs at \d+ of 25 values of the range end on P\(2,1\), which is not followed here: "
-        r"--impacts 2 --periods 1\.",
-        said[0],
-    )
-    _, out, _ = in_this_process([*command, "--impacts", "1"])
-    assert "not followed here" not in out  # only this kind was requested
 
 
 @pytest.mark.parametrize("variable", ["displacement_max", "strobe_displacement", "impact_phase"])
@@ -468,39 +262,3 @@ def test_branches_over_a_sweep_draw_the_variable_that_is_asked_for(branches: obj
     assert np.isfinite(drawn).sum() > 3 * below.get_ydata().size
     with pytest.raises(DatasetError, match="expected one that orbits recorded"):
         vi.draw(branches, over=sweep, variable="nothing")  # type: ignore[arg-type]
-
-
-def special_values(found: xr.Dataset, kind: SpecialOrbit, name: str) -> list[float]:
-    runs = found.vibroimpact.runs
-    return [float(each) for each in runs[name].values[runs["orbit_special"].values == kind]]
-
-
-def test_doublings_are_followed_one_after_the_other() -> None:
-    # Thompson and Ghaffari's cascade: no damping, restitution .8, the stop at the place of rest
-    scene = {
-        "scene": {"units": "nondimensional"},
-        "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.0},
-        "forcing": {"amplitude": 1.0, "angular_frequency": 2.65},
-        "stop": [{"position": 0.0, "restitution": 0.8}],
-        "record": {"recorded_periods": 1},
-    }
-    found = vi.follow(scene, PARAMETER, 2.64, 2.7316, doublings=3, grazes=0, step=0.1)
-    assert special_values(found, SpecialOrbit.period_doubling, "angular_frequency") == pytest.approx(
-        [2.65334773, 2.71598725, 2.72911792, 2.73136382], abs=5e-9
-    )
-    periods = found.vibroimpact.runs["orbit_periods"].values
-    assert sorted(set(periods)) == [1, 2, 4, 8]
-
-
-def test_a_branch_over_the_amplitude_turns_just_before_its_graze() -> None:
-    # example 15.2 of COCO: the graze is where the steady motion reaches the stop, at the amplitude .1
-    scene = {
-        "scene": {"units": "nondimensional"},
-        "body": {"mass": 1.0, "stiffness": 1.0, "damping": 0.1},
-        "forcing": {"amplitude": 0.15, "angular_frequency": 1.0},
-        "stop": [{"position": 1.0, "restitution": 0.8}],
-        "record": {"recorded_periods": 1},
-    }
-    found = vi.follow(scene, "forcing.amplitude", 0.09, 0.2, grazes=0, step=0.2)
-    assert special_values(found, SpecialOrbit.fold, "amplitude") == pytest.approx([0.09997075], abs=5e-9)
-    assert special_values(found, SpecialOrbit.graze, "amplitude") == pytest.approx([0.1], abs=1e-12)

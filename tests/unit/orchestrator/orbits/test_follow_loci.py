@@ -29,6 +29,7 @@ def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings(
         0.8,
         0.9,
         doublings=0,
+        impacts=1,
         grazes=0,
         second=POSITION,
         second_range=(0.03, 0.2),
@@ -39,7 +40,7 @@ def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings(
         position, frequency = float(loci["position"][place]), float(loci["angular_frequency"][place])
         scene = vi.Scene.from_file(CHAIN).with_values({POSITION: position})
         alone = vi.follow(
-            scene, PARAMETER, frequency - 0.02, frequency + 0.05, doublings=0, grazes=0, step=0.1
+            scene, PARAMETER, frequency - 0.02, frequency + 0.05, doublings=0, impacts=1, grazes=0, step=0.1
         )
         runs = alone.vibroimpact.runs
         found = runs["angular_frequency"].values[
@@ -99,7 +100,9 @@ def _tori_have_multipliers_on_the_unit_circle(two: FollowedLoci) -> None:
 @pytest.mark.parametrize("longest", [0.01, 0.2])
 def test_a_branch_is_followed_once_however_far_its_orbits_lie_apart(longest: float) -> None:
     scene = vi.Scene.from_file(CHAIN).with_values({POSITION: 0.0372})
-    found = whole(Following(scene, PARAMETER, 1.6, 2.2, step=longest, doublings=0, grazes=0)).followed
+    found = whole(
+        Following(scene, PARAMETER, 1.6, 2.2, step=longest, doublings=0, impacts=1, grazes=0)
+    ).followed
     assert [branch.name for branch in found.branches] == ["P(1,1)"]
 
 
@@ -130,7 +133,7 @@ def test_the_file_says_where_its_branches_are(tmp_path: Path) -> None:
     output = tmp_path / "loci.nc"
     span = ["--parameter", PARAMETER, "--from", "0.84", "--to", "0.9", "--step", "0.1", "--doublings", "0"]
     second = ["--second", POSITION, "--second-from", "0.1", "--second-to", "0.15"]
-    done = in_this_process("follow", CHAIN, *span, *second, "-o", output)
+    done = in_this_process("follow", CHAIN, *span, *second, "--impacts", "1", "-o", output)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"{output} has the curves over both numbers; branches are written without --second." in done.stdout
     with vi.open_dataset(output) as found:
@@ -139,6 +142,15 @@ def test_the_file_says_where_its_branches_are(tmp_path: Path) -> None:
 
 def test_without_a_bifurcation_branches_are_what_there_is() -> None:
     found = vi.follow(
-        CHAIN, PARAMETER, 0.9, 1.0, doublings=0, grazes=0, step=0.1, second=POSITION, second_range=(0.1, 0.15)
+        CHAIN,
+        PARAMETER,
+        0.9,
+        1.0,
+        doublings=0,
+        impacts=1,
+        grazes=0,
+        step=0.1,
+        second=POSITION,
+        second_range=(0.1, 0.15),
     )
     assert set(found["orbit_special"].values) == {SpecialOrbit.none}
