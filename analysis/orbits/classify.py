@@ -1,4 +1,4 @@
-"""The study `classify`: each run is P(p,q), chaos, rest, sticking, no impacts, or unknown with a reason.
+"""The study `classify`: each run is P(p,q), quasi-periodic, chaos, rest, no impacts, or unknown with a reason.
 
 A run shows its state once in each forcing period. A motion repeats after q periods if the distance between states q
 periods apart is 0, or tends to 0. A slow transient with a multiplier near -1 alternates for long, but its distances
@@ -31,6 +31,7 @@ from vibroimpact.analysis.orbits.impact_classes import (
     own_period,
     states_of_periods,
 )
+from vibroimpact.analysis.orbits.rotation import FEWEST_STATES, Rotation, rotation_of, rotations_in_words
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.html_view import html_table
@@ -65,22 +66,26 @@ class RunClass:
     ----------
     kind : OrbitClass
     impacts, periods : int
-        p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts.
+        p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts. The q of a quasi-periodic
+        motion is the number of its curves in the strobe section.
     reason : str
         Reason why the class is unknown.
+    rotation : Rotation or None
+        Rotation number of a quasi-periodic motion.
     """
 
     kind: OrbitClass
     impacts: int = 0
     periods: int = 0
     reason: str = ""
+    rotation: Rotation | None = None
 
     @property
     def name(self) -> str:
-        """The class in words: `P(1,1)`, `P(inf,2)`, `no impacts`, `chaos`, `rest`, `unknown`."""
+        """The class in words: `P(1,1)`, `P(inf,2)`, `no impacts`, `quasi-periodic`, `chaos`, `rest`, `unknown`."""
         if self.kind in (OrbitClass.periodic, OrbitClass.sticking):
             return f"P({self.impacts if self.impacts >= 0 else 'inf'},{self.periods})"
-        return str(self.kind.name).replace("_", " ")
+        return self.kind.words
 
 
 class ClassesOfRuns(list[RunClass]):
@@ -99,12 +104,16 @@ class ClassesOfRuns(list[RunClass]):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The classified dataset, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`."""
+        """The classified dataset, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`.
+
+        Quasi-periodic runs have `class_rotation_number` and `class_rotation_error`.
+        """
         units: UnitSystem = self._runs.attrs.get("units_system", "SI")
         run_id = run_ids(self._runs)
         columns = {}
         for name, values in _columns(self).items():
-            missing = np.array(["" if values.dtype == object else -1], dtype=values.dtype)
+            fill = {"O": "", "f": np.nan}.get(values.dtype.kind, -1)
+            missing = np.array([fill], dtype=values.dtype)
             placed = np.asarray(np.concatenate([values, missing])[run_id.values])
             columns[name] = (run_id.dims, placed, attributes_of(name, units))
         return self._runs.assign(columns)
@@ -115,9 +124,14 @@ class ClassesOfRuns(list[RunClass]):
         return f"<classes of {len(self)} runs: {', '.join(listed + ['...'] * (len(counts) > _MOST_SHOWN))}>"
 
     def _repr_html_(self) -> str:
+        return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), self.counted())
+
+    def counted(self) -> list[tuple[str, int, str]]:
+        """Return each class with its number of runs, and the reason or the range of the rotation numbers."""
         counts = Counter((each.name, each.reason) for each in self).most_common()
-        rows = [(name, count, reason) for (name, reason), count in counts]
-        return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), rows)
+        numbers = rotations_in_words([each.rotation for each in self if each.rotation is not None])
+        is_turning = OrbitClass.quasi_periodic.words
+        return [(name, count, numbers if name == is_turning else why) for (name, why), count in counts]
 
 
 @dataclass(eq=False)
@@ -206,7 +220,7 @@ class ClassesOfDataset(Study[RunClass]):
     def print_results(self) -> None:
         """Print the number of runs of each class."""
         rows = table("Classes of the runs", "<class", ">runs", "<why")
-        for (name, reason), count in Counter((each.name, each.reason) for each in self.classes).most_common():
+        for name, count, reason in self.classes.counted():
             rows.add_row(name, f"{count}", reason)
         wide_terminal().print(rows)
 
@@ -266,11 +280,14 @@ def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSyste
 
 def _columns(classes: Sequence[RunClass]) -> dict[str, NDArray[Any]]:
     """Return the variables of classes, run by run."""
+    rotations = [each.rotation for each in classes]
     columns = {
         "class_kind": [each.kind for each in classes],
         "class_impacts": [each.impacts for each in classes],
         "class_periods": [each.periods for each in classes],
         "class_reason": [each.reason for each in classes],
+        "class_rotation_number": [np.nan if each is None else each.number for each in rotations],
+        "class_rotation_error": [np.nan if each is None else each.error for each in rotations],
     }
     return {name: np.array(values, dtype=RULES[name].dtype) for name, values in columns.items()}
 
@@ -317,14 +334,16 @@ def class_of(
             reason = f"repeats after {periods} periods, or after {periods // 2}: it comes together too slowly to tell"
             return RunClass(OrbitClass.unknown, 0, periods, reason)
         return _repeating(impacts, periods, has_stuck)
+    if rotation := rotation_of(scaled):
+        return RunClass(OrbitClass.quasi_periodic, 0, rotation.curves, rotation=rotation)
     if len(states) < FEWEST_OF_CHAOS:
         reason = f"no period up to {len(states) // 2}; {FEWEST_OF_CHAOS} recorded periods tell chaos"
         return RunClass(OrbitClass.unknown, reason=reason)
     if _growth(scaled) >= GROWTH:
         return RunClass(OrbitClass.chaos)
-    return RunClass(
-        OrbitClass.unknown, reason=f"no period up to {len(states) // 2}, and neighbours do not part"
-    )
+    more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(states) < FEWEST_STATES)
+    reason = f"no period up to {len(states) // 2}, and neighbours do not part{more}"
+    return RunClass(OrbitClass.unknown, reason=reason)
 
 
 def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClass:
