@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
 from vibroimpact.analysis.dataset.accessor import columns_of_runs, run_ids
-from vibroimpact.analysis.dataset.clock import refuse_quasi_periodic
+from vibroimpact.analysis.dataset.clock import turns_of_sines
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
 from vibroimpact.analysis.files.stores import Place
@@ -175,7 +175,7 @@ class ClassesOfDataset(Study[RunClass]):
         A dataset of one value for all periods, or without strobe and extrema, raises DatasetError.
         """
         runs = self.runs
-        refuse_quasi_periodic(runs.attrs, "classify")
+        turns = turns_of_sines(runs, "classify")
         columns = [name for name in _STATES if name in runs.variables]
         if not columns and has_named_contacts(runs):
             ends = runs.vibroimpact.runs["outcome"].values
@@ -192,16 +192,18 @@ class ClassesOfDataset(Study[RunClass]):
                     "classify: expected values of each period, got one for all. Run with each_period."
                 )
         known: dict[RunClass, RunClass] = {}  # millions of runs have few classes
-        further = [name for name in _BESIDE if name in runs.variables]
+        further, place = [name for name in _BESIDE if name in runs.variables], -1
         for block in columns_of_runs(runs, [*columns, *further, "outcome"]):
             states = np.stack([block[name] for name in columns], axis=-1)
             counts, sticks = (block.get(name) for name in _BESIDE)
             for run, outcome in enumerate(block["outcome"]):
+                place += 1
                 found = class_of(
                     states[run],
                     None if counts is None else counts[run],
                     Outcome(int(outcome)),
                     sticks is not None and bool(sticks[run] > 0),
+                    None if turns is None else turns[place],
                 )
                 yield known.setdefault(found, found)
 
@@ -293,7 +295,11 @@ def _columns(classes: Sequence[RunClass]) -> dict[str, NDArray[Any]]:
 
 
 def class_of(
-    states: Floats, impacts: Floats | None, outcome: Outcome = Outcome.ok, has_stuck: bool = False
+    states: Floats,
+    impacts: Floats | None,
+    outcome: Outcome = Outcome.ok,
+    has_stuck: bool = False,
+    turns: Floats | None = None,
 ) -> RunClass:
     """Return the class of one run.
 
@@ -306,6 +312,9 @@ def class_of(
     outcome : Outcome
     has_stuck : bool
         Whether the run has rested on a stop.
+    turns : array, shape (sine,), or None
+        Turns of sines without a common period in a forcing period; their phases are part of the state. Chaos then
+        needs as many periods as quasi-periodic motion. None: all forces repeat with the forcing period.
 
     Examples
     --------
@@ -334,11 +343,18 @@ def class_of(
             reason = f"repeats after {periods} periods, or after {periods // 2}: it comes together too slowly to tell"
             return RunClass(OrbitClass.unknown, 0, periods, reason)
         return _repeating(impacts, periods, has_stuck)
-    if rotation := rotation_of(scaled):
+    known = None if turns is None or turns.size != 1 else float(turns[0])
+    if rotation := rotation_of(scaled, known):
         return RunClass(OrbitClass.quasi_periodic, 0, rotation.curves, rotation=rotation)
-    if len(states) < FEWEST_OF_CHAOS:
-        reason = f"no period up to {len(states) // 2}; {FEWEST_OF_CHAOS} recorded periods tell chaos"
+    fewest = FEWEST_OF_CHAOS if turns is None else FEWEST_STATES
+    if len(states) < fewest:
+        reason = f"no period up to {len(states) // 2}; {fewest} recorded periods tell chaos"
         return RunClass(OrbitClass.unknown, reason=reason)
+    if turns is not None and not turns.size:
+        return RunClass(OrbitClass.unknown, reason="frequencies of the forces are unknown")
+    if turns is not None:
+        angles = 2.0 * np.pi * np.outer(np.arange(len(scaled)), turns)
+        scaled = np.concatenate([scaled, np.cos(angles), np.sin(angles)], axis=1)
     if _growth(scaled) >= GROWTH:
         return RunClass(OrbitClass.chaos)
     more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(states) < FEWEST_STATES)

@@ -23,6 +23,8 @@ MOST_CURVES = 64
 """Largest number of curves that a motion visits one after the other."""
 LINES, MOST_TURNS = 3, 3
 """Number of strongest spectral lines that are tried, and turns of the angle in which a line may turn once."""
+MOST_DIGITS = 10
+"""Largest number of digits of a rotation number in words."""
 CONSTANT = 1e-9
 """Range of a quantity, over its size, below which it is constant."""
 MISPLACED = 3.0
@@ -77,7 +79,7 @@ class Rotation:
         ('rotation number 0.381966011 +- 2e-09', 'rotation number 0.2100 +- 1e-04 on 4 curves')
         """
         error = max(self.error, 1e-15)
-        digits = int(np.clip(np.ceil(-np.log10(error)), 1, 15))
+        digits = int(np.clip(np.ceil(-np.log10(error)), 1, MOST_DIGITS))
         where = f" on {self.curves} curves" if self.curves > 1 else ""
         return f"rotation number {self.number:.{digits}f} +- {error:.0e}{where}"
 
@@ -95,19 +97,21 @@ def rotations_in_words(rotations: Sequence[Rotation]) -> str:
     return f"rotation numbers {min(numbers):.6g} to {max(numbers):.6g}{where}"
 
 
-def rotation_of(states: Floats) -> Rotation | None:
+def rotation_of(states: Floats, known: float | None = None) -> Rotation | None:
     """Return the rotation number of a motion; None where its states are on no closed curves: equations.md 4.15.
 
     Parameters
     ----------
     states : array, shape (period, quantity)
         Quantities of consecutive forcing periods, finite; displacement and velocity at forcing phase 0 are enough.
+    known : float or None
+        Turns of a second sine in a forcing period, of which the states may be a function.
 
     Examples
     --------
     >>> angle = 2.0 * np.pi * np.arange(500) * (3.0 - np.sqrt(5.0)) / 2.0
     >>> rotation_of(np.column_stack([np.cos(angle), np.sin(angle) + 0.3 * np.cos(2.0 * angle)])).text
-    'rotation number 0.38196601125 +- 3e-14'
+    'rotation number 0.3819660113 +- 3e-14'
     """
     low, high = states.min(axis=0), states.max(axis=0)
     moves = high - low > CONSTANT * np.abs(states).max(axis=0)
@@ -117,7 +121,7 @@ def rotation_of(states: Floats) -> Rotation | None:
     least = np.inf
     for curves in range(1, min(MOST_CURVES, len(states) // FEWEST_STATES) + 1):
         parts = [scaled[place::curves] for place in range(curves)]
-        for number, error in _candidates(parts[0]):
+        for number, error in _candidates(parts[0], [] if known is None else [(curves * known % 1.0, 0.0)]):
             off, is_curve = _fit(parts[0], number, error)
             # more curves, or more turns, count only where they bring the states nearer
             is_near = is_curve and off < least / LEAST_FALL and _is_far_from_resonances(number, len(parts[0]))
@@ -130,10 +134,10 @@ def rotation_of(states: Floats) -> Rotation | None:
     return None
 
 
-def _candidates(states: Floats) -> Iterator[tuple[float, float]]:
-    """Yield rotation numbers that the strongest spectral lines of states may belong to, with their errors."""
+def _candidates(states: Floats, known: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """Yield rotation numbers that known and the strongest spectral lines of states may belong to, with their errors."""
     signal = states[:, 0] + 1j * states[:, min(1, states.shape[1] - 1)]
-    found = list(_lines(signal))
+    found = [*known, *_lines(signal)]
     for turns in range(1, min(MOST_TURNS, len(states) // FEWEST_STATES) + 1):
         for frequency, error in found:
             for turn in range(turns):
