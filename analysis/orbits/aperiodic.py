@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,8 @@ class LongRuns(NamedTuple):
 
     def of(self, chosen: NDArray[np.bool_]) -> LongRuns:
         """Return some of the runs."""
-        return self._make(each[chosen] for each in self)
+        rows: list[NDArray[Any]] = [each[chosen] for each in self]
+        return LongRuns(*rows)
 
 
 def attractor_of_runs(runs: LongRuns, flow: Flow, scale: Floats) -> Attractor:

@@ -50,6 +50,8 @@ FEWEST, FEWEST_OF_CHAOS = 6, 40
 """Recorded periods below which the class is unknown, and below which no run is called chaos."""
 GROWTH, PERIODS_AHEAD = 0.05, 6
 """Rate, 1 / period, above which the separation of neighbouring states is chaos; number of periods ahead."""
+GROWTH_BESIDE_SINES = 0.1
+"""The same rate under sines without a common period, where a motion that is not chaotic may have a rate of 0.08."""
 LEAST_FALL = 5.0
 """Fall of the distance of two rounds over a run, over a round's change, above which the rounds may be equal."""
 _MOST_SHOWN = 6
@@ -355,7 +357,7 @@ def class_of(
     if turns is not None:
         angles = 2.0 * np.pi * np.outer(np.arange(len(scaled)), turns)
         scaled = np.concatenate([scaled, np.cos(angles), np.sin(angles)], axis=1)
-    if _growth(scaled) >= GROWTH:
+    if _growth(scaled) >= (GROWTH if turns is None else GROWTH_BESIDE_SINES):
         return RunClass(OrbitClass.chaos)
     more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(states) < FEWEST_STATES)
     reason = f"no period up to {len(states) // 2}, and neighbours do not part{more}"

@@ -38,10 +38,12 @@ Distances of chaotic states do not fall; those of a smooth curve fall by 16.
 """
 FARTHEST = 0.01
 """Largest distance of states from the curve, over its size."""
-ROUNDING = 1e-7
-"""Distance of states from the curve, over its size, that counts as rounding."""
+ROUNDING = 1e-5
+"""Distance of states from the curve, over its size, that counts as rounding, or as the rest of a transient."""
 SEPARATE = 3.0
 """Median distance of two curves, over that of neighbouring states of one, above which they are two."""
+EXPLAINED = 1e-3
+"""Largest distance of states from the curve, over its size, that the error of a rotation number explains."""
 CORNERS = 0.2
 """Share of the states that may be next to a corner of the curve, where an impact touches a stop."""
 SWEPT = np.array([8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 4.0, 4.0, 0.2])
@@ -121,16 +123,25 @@ def rotation_of(states: Floats, known: float | None = None) -> Rotation | None:
     least = np.inf
     for curves in range(1, min(MOST_CURVES, len(states) // FEWEST_STATES) + 1):
         parts = [scaled[place::curves] for place in range(curves)]
+        size = float(np.ptp(parts[0], axis=0).max())
         for number, error in _candidates(parts[0], [] if known is None else [(curves * known % 1.0, 0.0)]):
             off, is_curve = _fit(parts[0], number, error)
-            # more curves, or more turns, count only where they bring the states nearer
-            is_near = is_curve and off < least / LEAST_FALL and _is_far_from_resonances(number, len(parts[0]))
-            if is_near and all(_fit(part, number, error)[1] for part in parts[1:]):
+            # more curves, or more turns, count only where the states are far from fewer
+            is_free = _is_far_from_resonances(number, len(parts[0]))
+            if (
+                is_curve
+                and is_free
+                and least > FARTHEST * size
+                and all(_fit(part, number, error)[1] for part in parts[1:])
+            ):
                 if curves > 1 and _overlap(parts[0], parts[1]):
                     return None  # one curve, too rough for the number of its states
                 folded = number % 1.0
                 return Rotation(min(folded, 1.0 - folded), error, curves)
-            least = min(least, off)
+            if (
+                is_free or curves == 1
+            ):  # the states of a resonance of the curves are near each other for any number
+                least = min(least, off)
     return None
 
 
@@ -190,7 +201,7 @@ def _fit(states: Floats, number: float, error: float) -> tuple[float, bool]:
     angles, half = np.mod(number * np.arange(len(states)), 1.0), len(states) // 2
     size = float((states.max(axis=0) - states.min(axis=0)).max())
     off, off_half = _from_curve(states, angles), _from_curve(states[:half], angles[:half])
-    explained = max(ROUNDING, 2.0 * np.pi * error * len(states)) * size
+    explained = float(np.clip(2.0 * np.pi * error * len(states), ROUNDING, EXPLAINED)) * size
     largest = min(max(off_half / LEAST_FALL, explained), FARTHEST * size)
     return off, off <= largest
 

@@ -39,7 +39,8 @@ def edge_tracks(
 ) -> Generator[Track, None, None]:
     """Yield an edge state for each pair of neighbouring attractors; orbits that are known already do not count.
 
-    `labels` has the shape (y, x), as the plane of starts. Without a body, whose forces do not repeat, no orbit is found.
+    `labels` has the shape (y, x), as the plane of starts. Without a body, as under forces that do not repeat, no
+    orbit is found.
     """
 
     def refine(rows: Floats) -> PeriodicOrbit | None:
