@@ -71,6 +71,12 @@ class OrbitClass(IntEnum):
     sticking = 3
     chaos = 4
     rest = 5
+    quasi_periodic = 6
+
+    @property
+    def words(self) -> str:
+        """The class as text, such as `no impacts` and `quasi-periodic`."""
+        return "quasi-periodic" if self is OrbitClass.quasi_periodic else str(self.name).replace("_", " ")
 
 
 class MeasurementFlag(IntFlag):
@@ -267,7 +273,15 @@ _RULES = (
     ),
     VariableRule("class_kind", ("run",), "1", "class of the motion", np.int8, _flags(OrbitClass)),
     VariableRule("class_impacts", ("run",), "1", "impacts of what repeats; -1: without number", np.int32),
-    VariableRule("class_periods", ("run",), "1", "forcing periods after which the motion repeats", np.int32),
+    VariableRule(
+        "class_periods",
+        ("run",),
+        "1",
+        "forcing periods after which the motion repeats; number of curves of a quasi-periodic motion",
+        np.int32,
+    ),
+    VariableRule("class_rotation_number", ("run",), "1", "rotation number of a quasi-periodic motion"),
+    VariableRule("class_rotation_error", ("run",), "1", "error of the rotation number"),
     VariableRule("class_reason", ("run",), "1", "why the class is unknown", object),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}

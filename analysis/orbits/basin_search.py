@@ -9,12 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.orbits.aperiodic import (
+    APERIODIC,
+    DRAWN,
+    LongRuns,
+    are_aperiodic,
+    attractor_of_runs,
+)
 from vibroimpact.analysis.orbits.basins import (
     UNDECIDED,
     Attractor,
@@ -36,7 +42,7 @@ from vibroimpact.analysis.orbits.chaotic_groups import (
     merged,
 )
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.recurrence import Recurrence, correlation_dimension, long_period, recurrence
+from vibroimpact.analysis.orbits.recurrence import Recurrence, long_period, recurrence
 
 Places = NDArray[np.int64]
 
@@ -135,20 +141,11 @@ class OnTheirWay:
         return np.where(self._lost[places], -1, labels)
 
 
-class _Runs(NamedTuple):
-    """Long runs without a period: whether each is chaotic, block features, and sections."""
-
-    chaotic: NDArray[np.bool_]
-    features: Floats
-    sections: Floats
-    extremes: Floats
-
-
 class _Search(OnTheirWay):
     def __init__(self, basins: Basins, flow: Flow, block: int, draw: np.random.Generator) -> None:
         super().__init__(basins, flow, block)
         self._draw = draw
-        self._runs: _Runs | None = None
+        self._runs: LongRuns | None = None
         self._seen_aperiodic = False
 
     def blocks(self) -> Generator[Basins, None, None]:
@@ -189,11 +186,29 @@ class _Search(OnTheirWay):
     def _see_free_motion(self, places: Places) -> None:
         """Name the motion without impacts once a start can meet no stop any more."""
         state, left = self._flow.free_state, places[self._basins.labels[places] == UNDECIDED]
-        known = any(each.kind.kind is OrbitClass.no_impacts for each in self._basins.attractors)
-        if state is None or known or not self._flow.stays_free(self._now[left]).any():
+        if (
+            state is None
+            or self._knows_free_motion()
+            or not (free := self._flow.stays_free(self._now[left])).any()
+        ):
             return
-        self._keep(RunClass(OrbitClass.no_impacts, 0, 1), state[None])
+        if self._flow.turns is None:
+            self._keep(RunClass(OrbitClass.no_impacts, 0, 1), state[None])
+        else:
+            self._keep_free_motion(self._now[left[free][0]])
         self.match(left)
+
+    def _knows_free_motion(self) -> bool:
+        return any(each.kind.kind is OrbitClass.no_impacts for each in self._basins.attractors)
+
+    def _keep_free_motion(self, state: Floats) -> None:
+        """Append the motion without impacts of forces that do not repeat; it has no state that repeats."""
+        section = self._flow.section(state[None], BLOCK * BLOCKS)
+        measured = self._flow.measure(state[None], BLOCK, 1).features[0, 0]
+        features = Features(measured, section.extremes[0])
+        drawn, none = self._states_of(state, DRAWN), np.empty((0, state.size))
+        kind = RunClass(OrbitClass.no_impacts)
+        self._basins.attractors.append(Attractor(kind, none, 0.0, features, self._flow.decay, drawn))
 
     def _find_attractors(self, places: Places, most: int, *, first: bool = False) -> None:
         """Find the attractors of some of these starts."""
@@ -208,7 +223,9 @@ class _Search(OnTheirWay):
         """Keep the attractor of a run that repeats, unless it is known or no attractor."""
         if not np.isfinite(state).all():
             return
-        if kind.kind in (OrbitClass.chaos, OrbitClass.unknown):
+        if kind.kind is OrbitClass.no_impacts and self._flow.turns is not None:
+            return  # its starts are known as soon as they can meet no stop
+        if kind.kind in APERIODIC:
             self._seen_aperiodic = True
             return
         periods = max(kind.periods, 1)
@@ -323,14 +340,14 @@ class _Search(OnTheirWay):
         if not left.size:
             return
         chosen, kinds = self._long_runs(left, CHAOS_SAMPLE)
-        if not _are_aperiodic(kinds, self._now[chosen]).all() and left.size > chosen.size:
+        if not are_aperiodic(kinds, self._now[chosen]).all() and left.size > chosen.size:
             chosen, kinds = self._long_runs(left, MOST_SINGLE)
         for place, kind in zip(chosen, kinds, strict=True):
             self._add(kind, self._now[place])
         for place, kind in zip(chosen, kinds, strict=True):
             self._basins.labels[place] = self._ended_on(kind, self._now[place])
         self.match(self.left())
-        aperiodic = _are_aperiodic(kinds, self._now[chosen])
+        aperiodic = are_aperiodic(kinds, self._now[chosen])
         if aperiodic.any() and not aperiodic.all():
             # some of them may not yet have come near to the attractors of the others
             self.follow(chosen[aperiodic], self._transient)
@@ -348,7 +365,7 @@ class _Search(OnTheirWay):
 
     def _with_long_periods(self, kinds: list[RunClass], states: Floats) -> list[RunClass]:
         """Return the classes of runs; chaos and unknown ones get the period with which their section repeats."""
-        unknown = np.flatnonzero(_are_aperiodic(kinds, states))
+        unknown = np.flatnonzero(are_aperiodic(kinds, states))
         if not unknown.size:
             return kinds
         found, sections = list(kinds), self._flow.section(states[unknown], BLOCK * BLOCKS).states
@@ -380,7 +397,7 @@ class _Search(OnTheirWay):
         are_new = len(self._basins.numbers) < 2
         measured = self._flow.measure(states, BLOCK, BLOCKS).features
         chaotic = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
-        runs = _Runs(chaotic, measured, section.states, section.extremes)
+        runs = LongRuns(chaotic, measured, section.states, section.extremes, states)
         own = self._grouped(runs, by_cells if recurs.all() else recurrence(section.states))
         labels = np.zeros(self._basins.labels.size, np.int64)
         if len(self._basins.numbers) > 1 and places.size > chosen.size:
@@ -397,14 +414,14 @@ class _Search(OnTheirWay):
             missed = missed_share(chosen.size)
             self._basins.undetected_share_below += missed * places.size / self._basins.possible
 
-    def _grouped(self, runs: _Runs, by_cells: Recurrence) -> NDArray[np.int64]:
+    def _grouped(self, runs: LongRuns, by_cells: Recurrence) -> NDArray[np.int64]:
         """Return the group of each of some long runs; a new group gets an attractor."""
         found = self._basins
         if len(found.numbers) > 1:
             return found.groups.of(runs.features.mean(axis=1).reshape(len(runs.features), -1))
         earlier = 0 if self._runs is None else len(self._runs.chaotic)
         if self._runs is not None:
-            runs = _Runs(*(np.concatenate(both) for both in zip(self._runs, runs, strict=True)))
+            runs = LongRuns(*(np.concatenate(both) for both in zip(self._runs, runs, strict=True)))
             by_cells = recurrence(runs.sections)
         self._runs, found.groups = runs, grouped(runs.features)
         known = int(found.groups.labels[0]) if earlier else -1
@@ -421,19 +438,14 @@ class _Search(OnTheirWay):
         found.separation = Separation(len(numbers), int(by_cells.labels.max()) + 1, agree)
         return found.groups.labels[earlier:]
 
-    def _aperiodic(self, group: int, runs: _Runs) -> Attractor:
+    def _aperiodic(self, group: int, runs: LongRuns) -> Attractor:
         """Return the attractor of a group of runs."""
-        of_group = self._basins.groups.labels == group
-        at_stops = self._basins.groups.means[group].reshape(-1, len(Feature))
-        extremes = runs.extremes[of_group]
-        features = Features(
-            at_stops,
-            np.array([extremes[:, 0].min(), extremes[:, 1].max()]),
-            correlation_dimension(runs.sections[of_group][0]),
-        )
-        kind = OrbitClass.chaos if runs.chaotic[of_group].mean() > 0.5 else OrbitClass.unknown
-        state = np.empty((0, self._now.shape[1]))
-        return Attractor(RunClass(kind), state, 0.0, features, is_one=self._basins.groups.is_sure)
+        groups, flow = self._basins.groups, self._flow
+        found = attractor_of_runs(runs.of(groups.labels == group), flow, self._basins.scale)
+        section = self._states_of(runs.states[groups.labels == group][0], DRAWN)
+        at_stops = groups.means[group].reshape(-1, len(Feature))
+        features = replace(found.features, at_stops=at_stops)
+        return replace(found, features=features, section=section, is_one=groups.is_sure)
 
     def _merge(self) -> None:
         """Merge groups that single blocks do not separate."""
@@ -442,12 +454,6 @@ class _Search(OnTheirWay):
         found.attractors[first] = replace(found.attractors[first], is_one=False)
         found.attractors[:] = [each for n, each in enumerate(found.attractors) if n not in others]
         found.numbers = found.numbers[:1]
-
-
-def _are_aperiodic(kinds: list[RunClass], states: Floats) -> NDArray[np.bool_]:
-    """Return a mask of the runs without a period that did not fail."""
-    aperiodic = [kind.kind in (OrbitClass.chaos, OrbitClass.unknown) and not kind.periods for kind in kinds]
-    return np.array(aperiodic) & np.isfinite(states).all(axis=1)
 
 
 def _same_partition(one: NDArray[np.int64], other: NDArray[np.int64]) -> bool:

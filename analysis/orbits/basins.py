@@ -51,6 +51,13 @@ class Flow(Protocol):
         """Rate at which the slowest free motion decays, 1 / forcing period; infinite where none decays."""
 
     @property
+    def turns(self) -> Floats | None:
+        """Turns of further sines in a forcing period, shape (sine,), whose phases are the last variables.
+
+        None where all forces repeat with the forcing period.
+        """
+
+    @property
     def free_state(self) -> Floats | None:
         """State at forcing phase 0 of the steady motion without impacts, shape (variable,); None where it hits."""
 
@@ -129,6 +136,12 @@ class Attractor:
     features: Features
     decay: float = np.inf
     """Rate at which its slowest neighbours come back, 1 / forcing period."""
+    section: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    """States at forcing phase 0 of a motion that does not repeat, shape (period, variable)."""
+    exponent: float = np.nan
+    """Largest Lyapunov exponent of a motion that does not repeat, 1 / forcing period."""
+    exponent_error: float = np.nan
+    """Standard error of the exponent."""
     is_one: bool = True
     """False for chaotic motion that may lie on several attractors, which could not be separated."""
 
@@ -154,7 +167,10 @@ class Attractor:
 
     @property
     def name(self) -> str:
-        """`P(p,q)`, `no impacts`, `chaos`, `aperiodic`; `chaotic, not told apart` where there may be several."""
+        """`P(p,q)`, `no impacts`, `quasi-periodic`, `chaos`, `aperiodic`.
+
+        `chaotic, not told apart` means that there may be several.
+        """
         if not self.is_one:
             return "chaotic, not told apart"
         return "aperiodic" if self.kind.kind is OrbitClass.unknown else self.kind.name
@@ -217,6 +233,14 @@ class Basins:
         return [
             f"{name} {_letter(plain[:place].count(name))}" if plain.count(name) > 1 else name
             for place, name in enumerate(plain)
+        ]
+
+    @property
+    def full_names(self) -> list[str]:
+        """Names of the attractors, with the rotation numbers of quasi-periodic motions."""
+        return [
+            name if each.kind.rotation is None else f"{name}, {each.kind.rotation.text}"
+            for name, each in zip(self.names, self.attractors, strict=True)
         ]
 
     @property

@@ -1,4 +1,4 @@
-"""The study `classify`: each run is P(p,q), chaos, rest, sticking, no impacts, or unknown with a reason.
+"""The study `classify`: each run is P(p,q), quasi-periodic, chaos, rest, no impacts, or unknown with a reason.
 
 A run shows its state once in each forcing period. A motion repeats after q periods if the distance between states q
 periods apart is 0, or tends to 0. A slow transient with a multiplier near -1 alternates for long, but its distances
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import dataset_place, open_dataset, read_runs
 from vibroimpact.analysis.dataset.accessor import columns_of_runs, run_ids
-from vibroimpact.analysis.dataset.clock import refuse_quasi_periodic
+from vibroimpact.analysis.dataset.clock import turns_of_sines
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
 from vibroimpact.analysis.files.stores import Place
@@ -31,6 +31,7 @@ from vibroimpact.analysis.orbits.impact_classes import (
     own_period,
     states_of_periods,
 )
+from vibroimpact.analysis.orbits.rotation import FEWEST_STATES, Rotation, rotation_of, rotations_in_words
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.html_view import html_table
@@ -49,6 +50,8 @@ FEWEST, FEWEST_OF_CHAOS = 6, 40
 """Recorded periods below which the class is unknown, and below which no run is called chaos."""
 GROWTH, PERIODS_AHEAD = 0.05, 6
 """Rate, 1 / period, above which the separation of neighbouring states is chaos; number of periods ahead."""
+GROWTH_BESIDE_SINES = 0.1
+"""The same rate under sines without a common period, where a motion that is not chaotic may have a rate of 0.08."""
 LEAST_FALL = 5.0
 """Fall of the distance of two rounds over a run, over a round's change, above which the rounds may be equal."""
 _MOST_SHOWN = 6
@@ -65,22 +68,26 @@ class RunClass:
     ----------
     kind : OrbitClass
     impacts, periods : int
-        p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts.
+        p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts. The q of a quasi-periodic
+        motion is the number of its curves in the strobe section.
     reason : str
         Reason why the class is unknown.
+    rotation : Rotation or None
+        Rotation number of a quasi-periodic motion.
     """
 
     kind: OrbitClass
     impacts: int = 0
     periods: int = 0
     reason: str = ""
+    rotation: Rotation | None = None
 
     @property
     def name(self) -> str:
-        """The class in words: `P(1,1)`, `P(inf,2)`, `no impacts`, `chaos`, `rest`, `unknown`."""
+        """The class in words: `P(1,1)`, `P(inf,2)`, `no impacts`, `quasi-periodic`, `chaos`, `rest`, `unknown`."""
         if self.kind in (OrbitClass.periodic, OrbitClass.sticking):
             return f"P({self.impacts if self.impacts >= 0 else 'inf'},{self.periods})"
-        return str(self.kind.name).replace("_", " ")
+        return self.kind.words
 
 
 class ClassesOfRuns(list[RunClass]):
@@ -99,12 +106,16 @@ class ClassesOfRuns(list[RunClass]):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The classified dataset, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`."""
+        """The classified dataset, with `class_kind`, `class_impacts`, `class_periods`, `class_reason`.
+
+        Quasi-periodic runs have `class_rotation_number` and `class_rotation_error`.
+        """
         units: UnitSystem = self._runs.attrs.get("units_system", "SI")
         run_id = run_ids(self._runs)
         columns = {}
         for name, values in _columns(self).items():
-            missing = np.array(["" if values.dtype == object else -1], dtype=values.dtype)
+            fill = {"O": "", "f": np.nan}.get(values.dtype.kind, -1)
+            missing = np.array([fill], dtype=values.dtype)
             placed = np.asarray(np.concatenate([values, missing])[run_id.values])
             columns[name] = (run_id.dims, placed, attributes_of(name, units))
         return self._runs.assign(columns)
@@ -115,9 +126,14 @@ class ClassesOfRuns(list[RunClass]):
         return f"<classes of {len(self)} runs: {', '.join(listed + ['...'] * (len(counts) > _MOST_SHOWN))}>"
 
     def _repr_html_(self) -> str:
+        return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), self.counted())
+
+    def counted(self) -> list[tuple[str, int, str]]:
+        """Return each class with its number of runs, and the reason or the range of the rotation numbers."""
         counts = Counter((each.name, each.reason) for each in self).most_common()
-        rows = [(name, count, reason) for (name, reason), count in counts]
-        return html_table(f"Classes of {len(self)} runs", ("class", "runs", "why"), rows)
+        numbers = rotations_in_words([each.rotation for each in self if each.rotation is not None])
+        is_turning = OrbitClass.quasi_periodic.words
+        return [(name, count, numbers if name == is_turning else why) for (name, why), count in counts]
 
 
 @dataclass(eq=False)
@@ -161,7 +177,7 @@ class ClassesOfDataset(Study[RunClass]):
         A dataset of one value for all periods, or without strobe and extrema, raises DatasetError.
         """
         runs = self.runs
-        refuse_quasi_periodic(runs.attrs, "classify")
+        turns = turns_of_sines(runs, "classify")
         columns = [name for name in _STATES if name in runs.variables]
         if not columns and has_named_contacts(runs):
             ends = runs.vibroimpact.runs["outcome"].values
@@ -178,16 +194,18 @@ class ClassesOfDataset(Study[RunClass]):
                     "classify: expected values of each period, got one for all. Run with each_period."
                 )
         known: dict[RunClass, RunClass] = {}  # millions of runs have few classes
-        further = [name for name in _BESIDE if name in runs.variables]
+        further, place = [name for name in _BESIDE if name in runs.variables], -1
         for block in columns_of_runs(runs, [*columns, *further, "outcome"]):
             states = np.stack([block[name] for name in columns], axis=-1)
             counts, sticks = (block.get(name) for name in _BESIDE)
             for run, outcome in enumerate(block["outcome"]):
+                place += 1
                 found = class_of(
                     states[run],
                     None if counts is None else counts[run],
                     Outcome(int(outcome)),
                     sticks is not None and bool(sticks[run] > 0),
+                    None if turns is None else turns[place],
                 )
                 yield known.setdefault(found, found)
 
@@ -206,7 +224,7 @@ class ClassesOfDataset(Study[RunClass]):
     def print_results(self) -> None:
         """Print the number of runs of each class."""
         rows = table("Classes of the runs", "<class", ">runs", "<why")
-        for (name, reason), count in Counter((each.name, each.reason) for each in self.classes).most_common():
+        for name, count, reason in self.classes.counted():
             rows.add_row(name, f"{count}", reason)
         wide_terminal().print(rows)
 
@@ -266,17 +284,24 @@ def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSyste
 
 def _columns(classes: Sequence[RunClass]) -> dict[str, NDArray[Any]]:
     """Return the variables of classes, run by run."""
+    rotations = [each.rotation for each in classes]
     columns = {
         "class_kind": [each.kind for each in classes],
         "class_impacts": [each.impacts for each in classes],
         "class_periods": [each.periods for each in classes],
         "class_reason": [each.reason for each in classes],
+        "class_rotation_number": [np.nan if each is None else each.number for each in rotations],
+        "class_rotation_error": [np.nan if each is None else each.error for each in rotations],
     }
     return {name: np.array(values, dtype=RULES[name].dtype) for name, values in columns.items()}
 
 
 def class_of(
-    states: Floats, impacts: Floats | None, outcome: Outcome = Outcome.ok, has_stuck: bool = False
+    states: Floats,
+    impacts: Floats | None,
+    outcome: Outcome = Outcome.ok,
+    has_stuck: bool = False,
+    turns: Floats | None = None,
 ) -> RunClass:
     """Return the class of one run.
 
@@ -289,6 +314,9 @@ def class_of(
     outcome : Outcome
     has_stuck : bool
         Whether the run has rested on a stop.
+    turns : array, shape (sine,), or None
+        Turns of sines without a common period in a forcing period; their phases are part of the state. Chaos then
+        needs as many periods as quasi-periodic motion. None: all forces repeat with the forcing period.
 
     Examples
     --------
@@ -317,14 +345,23 @@ def class_of(
             reason = f"repeats after {periods} periods, or after {periods // 2}: it comes together too slowly to tell"
             return RunClass(OrbitClass.unknown, 0, periods, reason)
         return _repeating(impacts, periods, has_stuck)
-    if len(states) < FEWEST_OF_CHAOS:
-        reason = f"no period up to {len(states) // 2}; {FEWEST_OF_CHAOS} recorded periods tell chaos"
+    known = None if turns is None or turns.size != 1 else float(turns[0])
+    if rotation := rotation_of(scaled, known):
+        return RunClass(OrbitClass.quasi_periodic, 0, rotation.curves, rotation=rotation)
+    fewest = FEWEST_OF_CHAOS if turns is None else FEWEST_STATES
+    if len(states) < fewest:
+        reason = f"no period up to {len(states) // 2}; {fewest} recorded periods tell chaos"
         return RunClass(OrbitClass.unknown, reason=reason)
-    if _growth(scaled) >= GROWTH:
+    if turns is not None and not turns.size:
+        return RunClass(OrbitClass.unknown, reason="frequencies of the forces are unknown")
+    if turns is not None:
+        angles = 2.0 * np.pi * np.outer(np.arange(len(scaled)), turns)
+        scaled = np.concatenate([scaled, np.cos(angles), np.sin(angles)], axis=1)
+    if _growth(scaled) >= (GROWTH if turns is None else GROWTH_BESIDE_SINES):
         return RunClass(OrbitClass.chaos)
-    return RunClass(
-        OrbitClass.unknown, reason=f"no period up to {len(states) // 2}, and neighbours do not part"
-    )
+    more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(states) < FEWEST_STATES)
+    reason = f"no period up to {len(states) // 2}, and neighbours do not part{more}"
+    return RunClass(OrbitClass.unknown, reason=reason)
 
 
 def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClass:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.basin_search import ROUNDS, SEARCH_PERIODS, OnTheirWay
 from vibroimpact.analysis.orbits.basins import UNDECIDED, Basins, Floats, Flow, Labels
 from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
+from vibroimpact.analysis.orbits.separation import UNKNOWN, Separation, of_rates
 
 TOGETHER, APART = 1e-12, 1e-7
 """Distances of the straddling states, over the size of the motion: bisection ends below, and begins above."""
@@ -24,6 +25,10 @@ INNER = 30
 """States between the straddling states that are followed at once."""
 MOST_BISECTIONS = 40
 """Largest number of rounds of one bisection; each divides the distance by INNER + 1."""
+ROUNDING = 1e-16
+"""Distance of the straddling states that counts where they meet."""
+TURNING = 8
+"""First periods, in which the straddling states turn to the direction in which they part."""
 TRACKED, LOOKED_AT = 240, 40
 """Forcing periods for which an edge state is followed at most, and after which its orbit is looked for."""
 
@@ -50,6 +55,8 @@ class Track(NamedTuple):
     """Largest distance of the straddling states, over the size of the motion."""
     orbit: PeriodicOrbit | None
     """None where the edge state has come near to no orbit that is found: it may be chaotic."""
+    parting: Separation = UNKNOWN
+    """Rate at which the straddling states part: the largest Lyapunov exponent of the edge state."""
 
 
 def neighbouring_pairs(labels: Labels) -> list[tuple[tuple[int, int], NDArray[np.int64]]]:
@@ -117,6 +124,7 @@ class EdgeTracking:
         rows: list[Floats] = []
         gap = self._distance(pair)
         orbit: PeriodicOrbit | None = None
+        rates: list[float] = []
         while orbit is None and len(states) < TRACKED:
             if self._distance(pair) > APART:
                 pair = self._bisected(pair, between[0])
@@ -126,12 +134,14 @@ class EdgeTracking:
             impacts[:, 0] += len(states) * self._period
             states.append(pair[0])
             rows.append(impacts)
+            before = self._distance(pair)
             pair = self._flow.follow(pair, 1).states
             gap = max(gap, self._distance(pair))
+            rates.append(float(np.log(max(self._distance(pair), ROUNDING) / before)))
             if len(states) % LOOKED_AT == 0:
                 found = self._refine(np.concatenate(rows[-2 * LOOKED_AT :]))
                 orbit = None if found is None or found.is_stable else found
-        return Track(between, np.array(states), gap, orbit)
+        return Track(between, np.array(states), gap, orbit, of_rates(rates[TURNING:]))
 
     def _distance(self, pair: Floats) -> float:
         return float((np.abs(pair[1] - pair[0]) / self._basins.scale).max())

@@ -19,7 +19,7 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.basins import HISTORY, BasinsOfScene, attractor_values
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.further_sines import strobed_body
 from vibroimpact.orchestrator.orbits.planes import Plane, Span, plane_of, spans_of
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.run.provenance import scene_attributes
@@ -168,6 +168,6 @@ def _range_of(options: Options) -> tuple[float, float] | None:
 
 def _joint(scenes: list[Scene], plane: Plane) -> Plane:
     """Return a plane that holds the planes of all scenes."""
-    spans: list[tuple[Span, Span]] = [spans_of(each, impacting_body(each), plane)[0] for each in scenes]
+    spans: list[tuple[Span, Span]] = [spans_of(each, strobed_body(each), plane)[0] for each in scenes]
     x, y = ((min(each[axis][0] for each in spans), max(each[axis][1] for each in spans)) for axis in (0, 1))
     return Plane(x, y, plane.points, plane.number)

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
+from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits.basin_search import find_basins
 from vibroimpact.analysis.orbits.basins import (
     BEYOND_A_STOP,
@@ -23,15 +24,16 @@ from vibroimpact.analysis.orbits.basins import (
 )
 from vibroimpact.analysis.orbits.borders import border_dimension, border_share
 from vibroimpact.analysis.orbits.edges import Track
+from vibroimpact.analysis.orbits.separation import Separation
 from vibroimpact.analysis.orbits.symmetry import mirrored_contacts
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.basins import Basins as Options
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.orbits.edges import EDGE_ROWS, edge_tracks, edge_values, print_edges
+from vibroimpact.orchestrator.orbits.further_sines import FurtherSines, strobed_body
 from vibroimpact.orchestrator.orbits.planes import (
     Plane,
     axes_of,
@@ -48,6 +50,15 @@ from vibroimpact.orchestrator.ssp import opened_scene
 HISTORY = "basins of attraction found by vibroimpact"
 ATTRACTOR_ROWS = (
     ("attractor_name", "attractor", "1", "what it is", "text"),
+    ("attractor_rotation_number", "attractor", "1", "rotation number of a quasi-periodic motion"),
+    ("attractor_rotation_error", "attractor", "1", "error of the rotation number"),
+    (
+        "attractor_exponent",
+        "attractor",
+        "1",
+        "largest Lyapunov exponent in a forcing period, without a period",
+    ),
+    ("attractor_exponent_error", "attractor", "1", "standard error of the exponent"),
     ("basin_fraction", "attractor", "1", "share of the starts that end on it"),
     ("basin_fraction_low", "attractor", "1", "lower end of the 95 % confidence interval of the share"),
     ("basin_fraction_high", "attractor", "1", "upper end of the 95 % confidence interval of the share"),
@@ -72,6 +83,13 @@ TABLE = ResultTable(
     ("velocity_start", "velocity_start", "m s-1", "velocity{of} at the start"),
     ("basin", "velocity_start displacement_start", "1", "attractor, from 0; -1 undecided, -2 beyond a stop"),
     *ATTRACTOR_ROWS,
+    (
+        "section_displacement",
+        "attractor section_period",
+        "m",
+        "displacement at forcing phase 0 of a motion without a period",
+    ),
+    ("section_velocity", "attractor section_period", "m s-1", "velocity of this motion"),
     ("attractor_displacement", "attractor period", "m", "displacement at forcing phase 0"),
     ("attractor_velocity", "attractor period", "m s-1", "velocity at forcing phase 0"),
     (
@@ -93,12 +111,17 @@ def attractor_values(found: Basins, images: Any, stops: int) -> dict[str, Any]:
     """Return the variables of `ATTRACTOR_ROWS`; `images` are the mirrored contacts, or None."""
     each_one = [each.features for each in found.attractors]
     ends = found.intervals
+    rotations = [each.kind.rotation for each in found.attractors]
 
     def of_stops(values: list[Floats]) -> Floats:
         return np.array(values).reshape(-1, stops)
 
     return {
-        "attractor_name": found.names,
+        "attractor_name": found.full_names,
+        "attractor_rotation_number": np.array([np.nan if one is None else one.number for one in rotations]),
+        "attractor_rotation_error": np.array([np.nan if one is None else one.error for one in rotations]),
+        "attractor_exponent": np.array([each.exponent for each in found.attractors]),
+        "attractor_exponent_error": np.array([each.exponent_error for each in found.attractors]),
         "basin_fraction": found.fractions,
         "basin_fraction_low": ends[:, 0],
         "basin_fraction_high": ends[:, 1],
@@ -147,12 +170,20 @@ def basins_dataset(
     points = np.full((len(found.attractors), most, 2), np.nan)
     for place, attractor in enumerate(found.attractors):
         points[place, : len(attractor.states)] = attractor.states[:, [across, along]]
+    drawn = max([len(each.section) for each in found.attractors], default=0)
+    section = np.full((len(found.attractors), drawn, 2), np.nan)
+    for place, attractor in enumerate(found.attractors):
+        if len(attractor.section):
+            section[place, : len(attractor.section)] = attractor.section[:, [across, along]]
+    names = ("section_displacement", "section_velocity") if drawn else ()
+    sections = dict(zip(names, np.moveaxis(section, -1, 0), strict=False))
     dimension = border_dimension(labels)
     values = {
         "displacement_start": x,
         "velocity_start": y,
         "basin": labels,
-        **attractor_values(found, mirrored_contacts(impacting_body(scene)), len(scene.stops)),
+        **attractor_values(found, mirrored_contacts(strobed_body(scene)), len(scene.stops)),
+        **sections,
         "attractor_displacement": points[..., 0],
         "attractor_velocity": points[..., 1],
         "attractor_radius": np.array([each.radius for each in found.attractors]),
@@ -185,17 +216,19 @@ class BasinsOfScene(Study[Basins]):
         if self.periods < 1:
             raise UsageError(f"basins: periods: expected 1 at least, got {self.periods}.")
         self.scene = self.scene.unswept()
-        body = impacting_body(self.scene)
+        body = strobed_body(self.scene)
         axes_of(self.scene, self.plane.number)
         spans, scale = spans_of(self.scene, body, self.plane)
         self.x, self.y, states = start_states(self.scene, self.plane, spans)
-        beyond = beyond_stops(self.scene, body, states)
+        phases = len(FurtherSines.of(self.scene))
+        beyond = beyond_stops(self.scene, body, states[:, : states.shape[1] - phases])
         if beyond.all():
             raise UsageError("basins: x: expected starts on the free side of the stops, got none.")
-        half = states.shape[1] // 2
+        half = (states.shape[1] - phases) // 2
         sizes = np.repeat(
             [max(size, np.abs(ends).max()) for size, ends in zip(scale, spans, strict=True)], half
         )
+        sizes = np.append(sizes, np.zeros(phases))  # neighbours share the phases of forces
         labels = np.where(beyond, BEYOND_A_STOP, UNDECIDED).astype(np.int16)
         self.tracks: list[Track] = []
         self._body = body
@@ -224,7 +257,8 @@ class BasinsOfScene(Study[Basins]):
     def _track(self, flow: BodyFlow) -> Generator[Basins, None, None]:
         """Follow the edges between the basins."""
         labels = self.known.labels.reshape(self.y.size, self.x.size)
-        for track in edge_tracks(self.known, labels, self._body, flow, block=BLOCK):
+        body = self._body if flow.turns is None else None
+        for track in edge_tracks(self.known, labels, body, flow, block=BLOCK):
             self.tracks.append(track)
             self.status(f"edges: {len(self.tracks)}")
             yield self.known
@@ -243,7 +277,7 @@ class BasinsOfScene(Study[Basins]):
             "<displacement, velocity at forcing phase 0",
         )
         ends = found.intervals
-        for place, (name, each) in enumerate(zip(found.names, found.attractors, strict=True)):
+        for place, (name, each) in enumerate(zip(found.full_names, found.attractors, strict=True)):
             states = np.column_stack(
                 [data[f"attractor_{what}"].values[place] for what in ("displacement", "velocity")]
             )
@@ -279,7 +313,8 @@ def say_search(found: Basins) -> None:
         )
     if found.told_by_sample:
         say(
-            f"{found.told_by_sample} starts count as chaotic because all of a sample of those like them were."
+            f"{found.told_by_sample} starts count as motions without a period because all of a sample of those "
+            "like them were."
         )
     if found.attractors:
         say(
@@ -300,7 +335,9 @@ def _say_partners(found: Basins, partner: list[int]) -> None:
 def _say_aperiodic(found: Basins) -> None:
     """Print the features of attractors without a period, and whether recurrence separates them, too."""
     aperiodic = [
-        (name, each) for name, each in zip(found.names, found.attractors, strict=True) if not each.has_period
+        (name, each)
+        for name, each in zip(found.names, found.attractors, strict=True)
+        if not (each.has_period or each.kind.kind is OrbitClass.no_impacts)
     ]
     for name, each in aperiodic:
         if not each.is_one:
@@ -327,7 +364,10 @@ def _features_in_words(each: Attractor) -> str:
     rates = ", ".join(f"{rate:.3g} at stop {stop}" for stop, rate in enumerate(features.impacts, start=1))
     spreads = ", ".join(f"{spread:.3g}" for spread in features.phase_spread)
     dimension = f"dimension {features.dimension:.2f}" if features.dimension else "no dimension: a long period"
-    return f"impacts in a forcing period: {rates}; spread of impact phases {spreads} rad; {dimension}"
+    parting = Separation(each.exponent, each.exponent_error).text
+    return (
+        f"impacts in a forcing period: {rates}; spread of impact phases {spreads} rad; {dimension}; {parting}"
+    )
 
 
 def _say_border(data: xr.Dataset) -> None:

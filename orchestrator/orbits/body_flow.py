@@ -13,12 +13,13 @@ import numpy as np
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
+from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits.basins import Ends, Floats, Section
 from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.free_motion import FreeMotion
+from vibroimpact.orchestrator.orbits.further_sines import FurtherSines, strobed_body
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.forces import phases_of_new_start
 from vibroimpact.orchestrator.run.limits import may_go_by_lanes
@@ -63,10 +64,15 @@ class _OneByOne:
             self._runners[periods] = PointRunner(self._scene.with_values(record), execution="fused")
         return self._runners[periods]
 
-    def run(self, state: Floats, periods: tuple[int, int], *, first: bool) -> RunRecord:
-        """Return the record of a run from a state, at time 0 (first) or where the phase of the clock is 0."""
+    def run(
+        self, state: Floats, periods: tuple[int, int], phases: dict[str, float], *, first: bool
+    ) -> RunRecord:
+        """Return the record of a run from a state, at time 0 (first) or where the phase of the clock is 0.
+
+        `phases` are those of further sines, by key of the scene.
+        """
         try:
-            return self._runner(periods).run({}, tuple(state.tolist()), at_time_0=first)
+            return self._runner(periods).run(phases, tuple(state.tolist()), at_time_0=first)
         except ComponentError as problem:
             return empty_record(self._scene, Outcome.error, str(problem), 0.0)
 
@@ -91,10 +97,13 @@ class BodyFlow:
         self._recording = [self._loop(record) for _ in range(count)]
         self._measuring = [self._loop({**bare, "impacts": True}) for _ in range(count)]
         self.names = scene.body.start_names
-        body = impacting_body(scene)
+        body = strobed_body(scene)
         decay = body.slowest_decay * body.period
         self.decay = decay if decay > 0.0 else math.inf
-        self._free = FreeMotion.of(scene, body)
+        self.period = body.period
+        self._sines = FurtherSines.of(scene)
+        self._free = FreeMotion.of(scene, body, self._sines)
+        self.turns = self._sines.turns if len(self._sines) else None
 
     @property
     def free_state(self) -> Floats | None:
@@ -134,10 +143,16 @@ class BodyFlow:
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
         """Return the states after some forcing periods: see `analysis.orbits.basins.Flow`."""
         columns = self._run(self._bare, states, (0, periods), first=first)
-        return Ends(
-            np.concatenate([_final(each) for each in columns]),
-            np.concatenate([_went_well(each) for each in columns]),
-        )
+        ends = self._final(columns, states, periods, first=first)
+        return Ends(ends, np.concatenate([_went_well(each) for each in columns]))
+
+    def _final(self, columns: list[RunColumns], states: Floats, periods: int, *, first: bool) -> Floats:
+        """Return the last states of runs from some states, with the phases of further sines."""
+        ends = np.concatenate([_final(each) for each in columns])
+        if self.turns is None:
+            return ends
+        phases = self._sines.after(states[:, len(self.names) :], periods, first=first)
+        return np.concatenate([ends, phases], axis=1)
 
     def classes(
         self, states: Floats, transient: int, *, first: bool = False
@@ -145,7 +160,10 @@ class BodyFlow:
         """Return the class of a run from each state after a transient (forcing periods), and its last states."""
         columns = self._run(self._recording, states, (transient, RECORDED), first=first)
         found = [kind for each in columns for kind in _classes(each)]
-        return found, np.concatenate([_final(each) for each in columns])
+        if self.turns is not None:  # neighbours part by phases of further sines
+            free = OrbitClass.no_impacts
+            found = [each if each.kind is free else RunClass(OrbitClass.unknown) for each in found]
+        return found, self._final(columns, states, transient + RECORDED, first=first)
 
     def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
         """Return features of impacts in consecutive blocks: see `analysis.orbits.basins.Flow`."""
@@ -153,7 +171,7 @@ class BodyFlow:
         for _ in range(blocks):  # one block after the other keeps few impacts in memory
             columns = self._run(self._measuring, states, (0, periods), first=False)
             features.append(np.concatenate([self._features(each, periods) for each in columns]))
-            states = np.concatenate([_final(each) for each in columns])
+            states = self._final(columns, states, periods, first=False)
             well &= np.concatenate([_went_well(each) for each in columns])
         return Blocks(np.stack(features, axis=1), states, well)
 
@@ -215,7 +233,13 @@ class BodyFlow:
     ) -> RunRecord:
         if self._closing:
             raise _Closing
-        return loop.run(state, periods, first=first)
+        count, keys = len(self.names), dict[str, float]()
+        if self.turns is not None:
+            clock = self.scene.clock
+            assert clock is not None, "further sines have a clock"
+            turned = 0.0 if first else clock.phase / clock.angular_frequency
+            keys = self._sines.phases_of_scene(state[count:], turned)
+        return loop.run(state[:count], periods, keys, first=first)
 
     def _prepared(
         self, loop: PointLoop, states: Floats, periods: tuple[int, int], *, first: bool
@@ -224,12 +248,13 @@ class BodyFlow:
         assert one is not None, "the scene has run"
         names, count = loop.driver.float_names, len(states)
         table = np.repeat(one.table, count, axis=0)
-        table[:, [names.index(name) for name in self.names]] = states
+        table[:, [names.index(name) for name in self.names]] = states[:, : len(self.names)]
         period = 2.0 * math.pi / one.columns["forcing.angular_frequency"][0]
         start = float(one.begin[0]) if first else 0.0
         for name, phase in ({} if first else phases_of_new_start(self.scene)).items():
             if name in names:
                 table[:, names.index(name)] = phase
+        table[:, [names.index(name) for name in self._sines.names]] = states[:, len(self.names) :]
         begin = np.full(count, start + periods[0] * period)
         return PreparedPoints(
             np.ones(count, np.bool_),

@@ -27,23 +27,28 @@ EDGE_ROWS = (
     ("edge_orbit", "edge", "1", "orbit on the edge; empty where none was found", "text"),
     ("edge_seed", "edge", "1", "phases (rad) and stops of its impacts, for --seed", "text"),
     ("edge_multiplier", "edge multiplier", "1", "its largest multipliers in its period, by their real parts"),
+    ("edge_exponent", "edge", "1", "largest Lyapunov exponent of the edge state in a forcing period"),
+    ("edge_exponent_error", "edge", "1", "standard error of the exponent"),
     ("edge_displacement", "edge edge_period", "m", "displacement of the edge state at forcing phase 0"),
     ("edge_velocity", "edge edge_period", "m s-1", "velocity of the edge state at forcing phase 0"),
 )
 
 
 def edge_tracks(
-    found: Basins, labels: Labels, body: ImpactingBody, flow: BodyFlow, *, block: int
+    found: Basins, labels: Labels, body: ImpactingBody | None, flow: BodyFlow, *, block: int
 ) -> Generator[Track, None, None]:
     """Yield an edge state for each pair of neighbouring attractors; orbits that are known already do not count.
 
-    `labels` has the shape (y, x), as the plane of starts.
+    `labels` has the shape (y, x), as the plane of starts. Without a body, as under forces that do not repeat, no
+    orbit is found.
     """
 
     def refine(rows: Floats) -> PeriodicOrbit | None:
+        if body is None:
+            return None
         return orbit_of_impacts(body, rows, longest=LOOKED_AT - 1)
 
-    tracking = EdgeTracking(found, flow, refine, block=block, period=body.period)
+    tracking = EdgeTracking(found, flow, refine, block=block, period=flow.period)
     known: list[PeriodicOrbit] = []
     for between, places in neighbouring_pairs(labels)[:MOST_PAIRS]:
         tracked = 0
@@ -79,6 +84,8 @@ def edge_values(tracks: list[Track], axes: tuple[int, int]) -> dict[str, Any]:
         "edge_multiplier": np.array(
             [none if each is None else each.multipliers[:SHOWN].real for each in orbits]
         ).reshape(-1, SHOWN),
+        "edge_exponent": np.array([each.parting.exponent for each in tracks]),
+        "edge_exponent_error": np.array([each.parting.error for each in tracks]),
         "edge_displacement": points[..., 0],
         "edge_velocity": points[..., 1],
     }
@@ -100,7 +107,9 @@ def print_edges(tracks: list[Track], names: list[str]) -> None:
         rows.add_row(
             " and ".join(names[number] for number in each.between),
             f"none found in {len(each.states)} periods" if orbit is None else orbit.full_name,
-            "" if orbit is None else ", ".join(map(multiplier_text, orbit.multipliers[:SHOWN])),
+            each.parting.text
+            if orbit is None
+            else ", ".join(map(multiplier_text, orbit.multipliers[:SHOWN])),
             "" if orbit is None else f"--seed {seed_text(orbit)} --periods {orbit.periods}",
         )
     wide_terminal().print(rows)

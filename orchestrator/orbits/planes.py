@@ -14,6 +14,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.operations.basins import Basins as Options
 from vibroimpact.orchestrator.orbits.bodies import modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
+from vibroimpact.orchestrator.orbits.further_sines import FurtherSines
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
@@ -85,9 +86,12 @@ def _first_hit(scene: Scene) -> int:
 
 
 def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[Floats, Floats, Floats]:
-    """Return displacements, velocities and the start states of a plane, shape (y * x, variable)."""
-    numbers = float_parameters(scene, None)
-    own = np.array([numbers.get(name, 0.0) for name in scene.body.start_names])
+    """Return displacements, velocities and the start states of a plane, shape (y * x, variable).
+
+    Phases of sines without a common period are the last variables.
+    """
+    numbers, sines = float_parameters(scene, None), FurtherSines.of(scene)
+    own = np.array([numbers.get(name, 0.0) for name in (*scene.body.start_names, *sines.names)])
     across, along = axes_of(scene, plane.number)
     x, y = (np.linspace(*span, count) for span, count in zip(spans, plane.points, strict=True))
     states = np.repeat(own[None], x.size * y.size, axis=0)
@@ -112,16 +116,16 @@ def spans_of(
     flow = BodyFlow(scene, workers=1)
     try:
         numbers = float_parameters(scene, None)
-        own = np.array([[numbers.get(name, 0.0) for name in flow.names]])
+        own = np.array([[numbers.get(name, 0.0) for name in (*flow.names, *FurtherSines.of(scene).names)]])
         seen = [flow.follow(own, 1, first=True).states[0]]
         for periods in (1, 2, 3, 5, 7, 11, 50, 100):
             seen.append(flow.follow(seen[-1][None], periods).states[0])
     finally:
         flow.close()
-    half = own.shape[1] // 2
+    half = len(flow.names) // 2
     table = np.nan_to_num(np.abs(np.array([own[0], *seen])))
     size = max(float(table[:, :half].max()), body.scale / float(np.abs(body.contacts[0].shape).max()) * 1e-3)
-    speed = max(float(table[:, half:].max()), size * body.angular_frequency)
+    speed = max(float(table[:, half : 2 * half].max()), size * body.angular_frequency)
     x = plane.x or (-REACH * size, REACH * size)
     y = plane.y or (-REACH * speed, REACH * speed)
     if plane.x is None and not scene.body.IS_STRUCTURE:

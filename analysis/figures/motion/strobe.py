@@ -12,6 +12,7 @@ from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
 from vibroimpact.analysis.figures.scene_text import fixed_positions, observed_stops
 from vibroimpact.analysis.figures.sweep.diagrams import draw_diagram, one_value, varied
 from vibroimpact.analysis.figures.window import View
+from vibroimpact.analysis.orbits.rotation import rotation_of
 from vibroimpact.fmus.errors import DatasetError
 
 # Number of points of a section above which they are small, so that the layers of an attractor show.
@@ -32,11 +33,19 @@ def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
     figure = canvas(75)
     axis = figure.subplots()
     draw_section(axis, chosen.isel(run=0))
+    axis.set_title(_rotation_in_words(chosen.isel(run=0)), fontsize=8)
     for position in fixed_positions(observed_stops(dataset)):
         low, high = axis.get_xlim()
         if low <= position <= high:
             axis.axvline(position, **STOP_LINE)
     return figure
+
+
+def _rotation_in_words(run: xr.Dataset) -> str:
+    """Return the rotation number of a run whose section is made of closed curves; empty for other runs."""
+    states = np.column_stack([run["strobe_displacement"].values, run["strobe_velocity"].values])
+    found = rotation_of(states) if np.isfinite(states).all() and len(states) else None
+    return "" if found is None else f"quasi-periodic, {found.text}"
 
 
 def draw_section(axis: Axes, run: xr.Dataset) -> None:

@@ -46,8 +46,11 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             color=colour,
             markeredgecolor="black",
             markersize=4.5,
-            label=f"{names[place]}: {_share(dataset, place)}",
+            label=_label(names[place], _share(dataset, place)),
         )
+    if "section_displacement" in dataset:
+        x, y = (dataset[f"section_{what}"].values for what in ("displacement", "velocity"))
+        axis.plot(x.ravel(), y.ravel(), ".", color="black", markersize=1.0, markeredgewidth=0.0)
     if "edge_orbit" in dataset:
         _draw_edges(axis, dataset)
     for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
@@ -71,6 +74,11 @@ def _draw_edges(axis: Axes, dataset: xr.Dataset) -> None:
         there = np.isfinite(x)
         words = f"on an edge: {name.partition(')')[0]})" if name else "edge state without a known orbit"
         axis.plot(x[there], y[there], "x" if name else "+", color="black", markersize=5.5, label=words)
+
+
+def _label(name: str, share: str) -> str:
+    """Return a name and its share for the legend, in lines if the name has a rotation number."""
+    return f"{name}: {share}" if "," not in name else f"{name.replace(', ', f',{chr(10)}')}:{chr(10)}{share}"
 
 
 def _share(dataset: xr.Dataset, place: int) -> str:

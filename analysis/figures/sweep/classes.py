@@ -27,7 +27,13 @@ from vibroimpact.fmus.errors import DatasetError
 
 KIND = "class_kind"
 _COLOURS = ("#0F4C81", "#56A5DC", "#3C7D3C", "#9BC46B", "#7A4B9A", "#C79BD6", "#8A6D00", "#E0B53A")
-OWN_COLOURS = {"no impacts": "0.85", "chaos": "#B5410B", "rest": "0.55", "unknown": "0.35"}
+OWN_COLOURS = {
+    "no impacts": "0.85",
+    "chaos": "#B5410B",
+    "rest": "0.55",
+    "unknown": "0.35",
+    "quasi-periodic": "#1FA39A",
+}
 _SHORT = 10
 """Letters of a name up to which four names of the legend fit side by side."""
 OTHER_COLOUR = "#EFD9B4"
@@ -60,7 +66,7 @@ def _names(dataset: xr.Dataset, impacts_of: xr.Dataset | None = None) -> Any:
         if OrbitClass(kind) in (OrbitClass.periodic, OrbitClass.sticking):
             where = f" at {contact_label(source, stop)}" if stop > 0 else ""
             return f"P({impacts if impacts >= 0 else 'inf'},{periods}){where}"
-        return str(OrbitClass(kind).name).replace("_", " ")
+        return OrbitClass(kind).words
 
     columns = [dataset[name].values for name in (KIND, "class_impacts", "class_periods")]
     only = _only_stop(source)

@@ -64,6 +64,7 @@ class KnownMap:
 
     decay = float("inf")
     free_state = None
+    turns = None
 
     @staticmethod
     def stays_free(states: Floats) -> NDArray[np.bool_]:

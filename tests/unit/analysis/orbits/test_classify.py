@@ -91,8 +91,20 @@ def test_chaos_is_told_where_there_are_periods_enough() -> None:
         OrbitClass.unknown,
         "no period up to 10; 40 recorded periods tell chaos",
     )
-    turning = np.stack([wave(np.sqrt(5.0) * np.arange(200)) for wave in (np.cos, np.sin)], axis=1)
-    assert class_of(turning, np.ones(200)).kind is OrbitClass.unknown
+
+
+def test_a_closed_curve_of_states_is_quasi_periodic_where_there_are_states_enough() -> None:
+    turn = 2.0 * np.pi * np.sqrt(5.0) * np.arange(200)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    found = class_of(circle, np.ones(200))
+    assert (found.name, found.periods) == ("quasi-periodic", 1)
+    assert found.rotation is not None
+    assert found.rotation.number == pytest.approx(np.sqrt(5.0) - 2.0, abs=1e-9)
+    few = class_of(circle[:60], np.ones(60))
+    assert (few.kind, few.reason.rpartition("; ")[2]) == (
+        OrbitClass.unknown,
+        "100 recorded periods tell quasi-periodic motion",
+    )
 
 
 def test_rest_sticking_no_impacts_and_failures_have_their_names() -> None:
