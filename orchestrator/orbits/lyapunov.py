@@ -59,6 +59,18 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         for place in range(runs.sizes["run"]):
             yield _of_run(self._bodies, impacts, runs, place)
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no run has exponents."""
+        return all(isinstance(each, str) for each in self.found)
+
+    @property
+    def summary(self) -> str:
+        """A sentence on a study in which no run has exponents: the reasons with their numbers of runs."""
+        counts = _counted([each for each in self.found if isinstance(each, str)])
+        reasons = "; ".join(f"{count} of {len(self.found)}: {words}" for words, count in counts)
+        return f"lyapunov: expected runs with exponents, got none. {reasons}"
+
     def made(self) -> xr.Dataset:
         """Return the exponents on the dimensions of the sweep."""
         many = self.runs.vibroimpact.runs.sizes["run"] - len(self.found)
@@ -66,13 +78,11 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
 
     def print_results(self) -> None:
         """Print the exponents of runs, and the number of runs without; DatasetError if no run has exponents."""
+        if self.is_empty:
+            raise DatasetError(self.summary)
         reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
-        counts = _counted([text for text in reasons if text])
-        if all(reasons):
-            summary = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
-            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {summary}")
         _print(self.dataset)
-        for words, count in counts:
+        for words, count in _counted([text for text in reasons if text]):
             say(f"{count} without: {words}")
 
 

@@ -8,9 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside, unit_symbol
+from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
+from vibroimpact.analysis.figures.sweep.classes import draw_classes
 from vibroimpact.analysis.figures.sweep.diagrams import (
     draw_map,
     edges,
@@ -41,6 +44,12 @@ _LOCI: dict[SpecialOrbit, dict[str, Any]] = {
     SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
     SpecialOrbit.graze_between_impacts: {"color": "#6F4E9C", "linestyle": (0, (5, 1.2, 1.2, 1.2))},
 }
+_ON_CLASSES: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 1.2,
+    "path_effects": [withStroke(linewidth=2.6, foreground="white")],
+}
+"""Style of loci on a map of classes, whose colours leave none for lines."""
 _MARKS = {
     SpecialOrbit.fold: "s",
     SpecialOrbit.period_doubling: "D",
@@ -78,7 +87,7 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     for axis, panel in zip(axes, panels, strict=True):
         if over is not None:
             draw_below(axis, over, name, panel)
-        _draw(axis, dataset, name, panel)
+        draw_orbits(axis, dataset, name, panel)
         axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
     axes[-1].set_xlabel(label(dataset[name]))
@@ -101,7 +110,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
     if over is not None:
         if sorted(varied(over)) != sorted(names):
             raise DatasetError(wrong_sweep(f"a map of {' and '.join(names)} below", over))
-        figure = draw_map(over)
+        figure = draw_classes(over) if CLASS_KIND in over else draw_map(over)
         x, y = in_order_of_the_scene(over, varied(over))
         panels = [axis for axis in figure.axes if axis.get_ylabel() == label(over[y])]
     else:
@@ -111,21 +120,29 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         x, y = sorted(names, key=lambda name: name != first)
         panels[0].set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
     branch, special = runs[BRANCH].values, runs["orbit_special"].values
+    on_classes = _ON_CLASSES if over is not None and CLASS_KIND in over else {}
     labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         kind = SpecialOrbit(int(special[chosen[0]]))
         words = str(kind.name).replace("_", " ")
-        style = _LOCI.get(kind, {"color": "0.4"})
+        style = {"linewidth": 1.0, **_LOCI.get(kind, {"color": "0.4"}), **on_classes}
         shown = None if words in labelled else words
         for axis in panels:
-            axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
+            axis.plot(runs[x].values[chosen], runs[y].values[chosen], label=shown, **style)
         labelled.add(words)
     if over is None:
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
+    columns = 3 if max(map(len, labelled), default=0) < _LONG else 2
+    if figure.legends:  # colours of classes
+        legend = figure.legends[0]
+        legend.remove()
+        handles = [*legend.legend_handles, *panels[0].get_legend_handles_labels()[0]]
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize=7)
+    else:
+        legend_outside(figure, panels[0], ncols=columns)
     return figure
 
 
@@ -149,12 +166,21 @@ def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
 
 def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str = "simulated") -> None:
     """Draw the values of a sweep in grey."""
-    places, rows = over.vibroimpact.runs[name].values, _rows(over, panel)
-    x = np.concatenate([np.full(row.size, place) for place, row in zip(places, rows, strict=True)])
-    axis.plot(x, np.concatenate(rows), rasterized=True, label=words, **_BELOW)
+    x, y = values_of_runs(over, name, panel)
+    axis.plot(x, y, rasterized=True, label=words, **_BELOW)
 
 
-def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
+def values_of_runs(dataset: xr.Dataset, name: str, panel: str, direction: str = "") -> tuple[Any, Any]:
+    """Return the values of a panel with those of the parameter; of the runs in one direction if it is named."""
+    runs, rows = dataset.vibroimpact.runs, _rows(dataset, panel)
+    chosen = runs["direction"].values == direction if direction else np.full(len(rows), True)
+    sizes = [row.size if one else 0 for row, one in zip(rows, chosen, strict=True)]
+    values = [row for row, one in zip(rows, chosen, strict=True) if one]
+    return np.repeat(runs[name].values, sizes), np.concatenate(values)
+
+
+def draw_orbits(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
+    """Draw orbits over their parameter into a panel: branches as lines, special points as marks."""
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
     rows = _rows(dataset, panel)
