@@ -17,6 +17,8 @@ PARTS = "parts"
 """Attribute of a composed dataset: the names of its parts, separated by blanks."""
 _NAMES_A_DIMENSION = ("sample_dimension", SWEPT_ALONG)
 """Attributes of variables whose value is a dimension."""
+_OF_THE_FILE = ("_FillValue", "coordinates")
+"""Attributes of variables that only a file needs."""
 
 
 def composed(kind: str, parts: Mapping[str, xr.Dataset], attrs: Mapping[str, Any]) -> xr.Dataset:
@@ -84,5 +86,6 @@ def _renamed(dataset: xr.Dataset, prefix: str, new: str) -> xr.Dataset:
             for name, value in variable.attrs.items()
             if name in _NAMES_A_DIMENSION
         }
-        variable.attrs = {**variable.attrs, **own}
+        kept = {name: value for name, value in variable.attrs.items() if name not in _OF_THE_FILE}
+        variable.attrs = {**kept, **own}
     return found

@@ -10,6 +10,7 @@ from typing import Any, Self
 import xarray as xr
 
 from vibroimpact.analysis.dataset.composed import composed
+from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.analysis.dataset.schema import names_list
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.study import Study
@@ -67,9 +68,7 @@ class Diagram(Study[str]):
         self.axes = axes_of(self.scene, (self.parameter, self.start, self.stop, self.values), second)
         self.scene = _within(self.scene.unswept([axis.key for axis in self.axes]), self.axes)
         self.names = _chosen(self.parts, OF_TWO if len(self.axes) > 1 else OF_ONE)
-        periods = EXPONENT_PERIODS if "exponents" in self.names else CLASSIFIED_PERIODS
-        self.sweep = SweptRuns(self.scene, self.axes, periods)
-        self.studies: dict[str, Study[Any]] = {}
+        self.studies = {name: self._study_of(name) for name in self.names if name != "exponents"}
         self.refused: dict[str, str] = {}
 
     @classmethod
@@ -108,7 +107,9 @@ class Diagram(Study[str]):
             raise next(iter(problems.values()))
 
     def _rows_of(self, part: str) -> Generator[str, None, None]:
-        study = self.studies[part] = self._study_of(part)
+        if part == "exponents":
+            self.studies[part] = self._study_of(part)
+        study = self.studies[part]
         study.status = lambda text: self.status(f"{part}: {text}")
         with closing(study.rows()) as rows:
             for row in rows:
@@ -119,14 +120,19 @@ class Diagram(Study[str]):
             raise OrbitError(_why_nothing(study))
 
     def _study_of(self, part: str) -> Study[Any]:
+        """Return the study of a part; UsageError for a number that it cannot take."""
         axis = self.axes[0]
         if part == "sweep":
-            return self.sweep
+            periods = EXPONENT_PERIODS if "exponents" in self.names else CLASSIFIED_PERIODS
+            return SweptRuns(self.scene, self.axes, periods)
+        if part == "exponents":
+            return ExponentsOfRuns(opened_in_memory(self.studies["sweep"].dataset))
         if part == "shares":
             plane = Plane(points=(self.points, self.points))
             return BasinShares(self.scene, plane, axis.key, (axis.low, axis.high), self.share_values)
-        if part == "exponents":
-            return ExponentsOfRuns(self.sweep.opened)
+        for name in ("doublings", "grazes"):
+            if getattr(self, name) < 0:
+                raise UsageError(f"--{name}: expected 0 or more, got {getattr(self, name)}.")
         second = self.axes[1] if part == "loci" else None
         return Following(
             *(self.scene, axis.key, axis.low, axis.high),
@@ -159,7 +165,10 @@ class Diagram(Study[str]):
     def print_results(self) -> None:
         """Print the results of each part, and the reasons for missing parts."""
         for study in self.made_parts.values():
-            study.print_results()
+            if isinstance(study, ExponentsOfRuns):
+                study.print_summary()
+            else:
+                study.print_results()
         for name, problem in self.refused.items():
             say(f"No {name}: {typed(problem)}")
 
@@ -174,7 +183,7 @@ def _has_results(study: Study[Any]) -> bool:
 def _why_nothing(study: Study[Any]) -> str:
     """Return the reason for which a finished study has no results."""
     if isinstance(study, ExponentsOfRuns):
-        return study.summary
+        return study.why_none
     return "diagram: expected bifurcations that can be followed over both numbers, got none."
 
 

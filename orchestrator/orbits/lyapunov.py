@@ -65,7 +65,7 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         return all(isinstance(each, str) for each in self.found)
 
     @property
-    def summary(self) -> str:
+    def why_none(self) -> str:
         """A sentence on a study in which no run has exponents: the reasons with their numbers of runs."""
         counts = _counted([each for each in self.found if isinstance(each, str)])
         reasons = "; ".join(f"{count} of {len(self.found)}: {words}" for words, count in counts)
@@ -79,10 +79,20 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
     def print_results(self) -> None:
         """Print the exponents of runs, and the number of runs without; DatasetError if no run has exponents."""
         if self.is_empty:
-            raise DatasetError(self.summary)
-        reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
+            raise DatasetError(self.why_none)
         _print(self.dataset)
-        for words, count in _counted([text for text in reasons if text]):
+        self.print_summary()
+
+    def print_summary(self) -> None:
+        """Print the number of runs with exponents, if they are many, and of those without, with the reasons."""
+        known = [each for each in self.found if isinstance(each, Exponents)]
+        if len(known) > _MOST_SHOWN:
+            chaotic = sum(bool(each.per_impact[0] > 2.0 * each.standard_error[0]) for each in known)
+            say(f"{len(known)} runs have exponents, of {chaotic} the largest is positive.")
+        reasons = [
+            str(text) for text in self.dataset.reason.values.ravel() if str(text) not in ("", "no run")
+        ]
+        for words, count in _counted(reasons):
             say(f"{count} without: {words}")
 
 
@@ -185,10 +195,6 @@ def _print(found: xr.Dataset) -> None:
             f"{int(one.impacts)}",
         )
     wide_terminal().print(rows)
-    if known.sizes["run"] > _MOST_SHOWN:
-        first = known.isel(exponent=0)
-        chaotic = int((first.lyapunov_exponent > 2.0 * first.standard_error).sum())
-        say(f"{known.sizes['run']} runs have exponents, of {chaotic} the largest is positive.")
 
 
 def _where(one: xr.Dataset, found: xr.Dataset) -> str:

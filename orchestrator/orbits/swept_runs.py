@@ -131,7 +131,7 @@ class _StatusProgress(Progress):
 
 @dataclass(eq=False)
 class SweptRuns(Study[xr.Dataset]):
-    """Runs of a scene over one axis up and down, or over two from its start. The only row has all runs."""
+    """Runs of a body over one axis up and down; over two, and of components, from the start. The only row has all."""
 
     name = "sweep"
     nothing = "a run"
@@ -141,7 +141,8 @@ class SweptRuns(Study[xr.Dataset]):
     recorded_periods: int = CLASSIFIED_PERIODS
 
     def __post_init__(self) -> None:
-        path = {"path": "up-down"} if len(self.axes) == 1 else {}
+        goes_both_ways = len(self.axes) == 1 and self.scene.is_one_body
+        path = {"path": "up-down"} if goes_both_ways else {}
         sweep = {
             axis.key: {"start": axis.low, "stop": axis.high, "points": axis.values, **path}
             for axis in self.axes
@@ -168,11 +169,6 @@ class SweptRuns(Study[xr.Dataset]):
         else:
             flat = with_classes(flat, self.classes.classes, self.scene.units)
         yield flat
-
-    @property
-    def opened(self) -> xr.Dataset:
-        """The runs on the dimensions of their sweep."""
-        return opened_in_memory(self.found[0])
 
     def made(self) -> xr.Dataset:
         """Return the runs one after the other."""

@@ -173,7 +173,9 @@ def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str =
 def values_of_runs(dataset: xr.Dataset, name: str, panel: str, direction: str = "") -> tuple[Any, Any]:
     """Return the values of a panel with those of the parameter; of the runs in one direction if it is named."""
     runs, rows = dataset.vibroimpact.runs, _rows(dataset, panel)
-    chosen = runs["direction"].values == direction if direction else np.full(len(rows), True)
+    # one direction alone is a scalar
+    directions = np.broadcast_to(runs["direction"].values, len(rows))
+    chosen = directions == direction if direction else np.full(len(rows), True)
     sizes = [row.size if one else 0 for row, one in zip(rows, chosen, strict=True)]
     values = [row for row, one in zip(rows, chosen, strict=True) if one]
     return np.repeat(runs[name].values, sizes), np.concatenate(values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,8 +19,9 @@ from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.sweep.classes import draw_classes
 from vibroimpact.analysis.figures.sweep.diagrams import crowded, draw_map, draw_points, varied
 
-_SWEEPS = {"up": ("#8CC4EE", 2.4), "down": ("#E9A13B", 1.2)}
+_SWEEPS = {"up": ("#8CC4EE", 2.2), "down": ("#E9A13B", 1.2), "independent": ("#8CC4EE", 2.0)}
 """Colour and size of the points of each direction: the points of both are seen where they agree."""
+_WORDS = {"independent": "runs"}
 _RESPONSE = ("displacement_range", "impact_velocity")
 _HEIGHTS = {"displacement_range": 45, "impact_velocity": 45, "shares": 32, "exponents": 32}
 """Heights of the panels, mm."""
@@ -93,9 +95,11 @@ def _draw_panel(axis: Axes, parts: Mapping[str, xr.Dataset], panel: str, name: s
 
 def _draw_response(axis: Axes, parts: Mapping[str, xr.Dataset], panel: str, name: str) -> None:
     for direction, (colour, size) in _SWEEPS.items() if "sweep" in parts else ():
+        if direction not in np.unique(parts["sweep"]["direction"].values):
+            continue
         x, y = values_of_runs(parts["sweep"], name, panel, direction)
         style = {"color": colour, "marker": "o", "markersize": size, "markeredgewidth": 0.0}
-        draw_points(axis, x, y, crowded(x, y), label=f"{direction} sweep", **style)
+        draw_points(axis, x, y, crowded(x, y), label=_WORDS.get(direction, f"{direction} sweep"), **style)
     if "branches" in parts:
         draw_orbits(axis, parts["branches"], name, panel)
     shown = parts["sweep"] if "sweep" in parts else parts["branches"]
