@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from vibroimpact.fmus.errors import DatasetError
 BRANCH = "orbit_branch"
 _LONG = 20
 """Letters of a legend entry above which three entries do not fit side by side."""
+_ROW = 0.1
+"""Height that the page gains for a row of the legend, in."""
 _STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
 _UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
 _ALONE: dict[str, Any] = {"marker": "o", "markersize": 3.4}
@@ -135,15 +138,28 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    columns = 3 if max(map(len, labelled), default=0) < _LONG else 2
-    if figure.legends:  # colours of classes
-        legend = figure.legends[0]
-        legend.remove()
-        handles = [*legend.legend_handles, *panels[0].get_legend_handles_labels()[0]]
-        figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize=7)
+    if figure.legends:
+        _name_loci_beside_classes(figure, panels[0])
     else:
-        legend_outside(figure, panels[0], ncols=columns)
+        legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
     return figure
+
+
+def _name_loci_beside_classes(figure: Figure, panel: Axes) -> None:
+    """Name loci and classes in one legend, for which the page becomes longer."""
+    legend = figure.legends[0]
+    legend.remove()
+    handles = [*legend.legend_handles, *panel.get_legend_handles_labels()[0]]
+    rows = math.ceil(len(handles) / 3)
+    figure.set_figheight(figure.get_figheight() + _ROW * rows)
+    figure.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=3,
+        frameon=False,
+        fontsize=7,
+        columnspacing=1.2,
+    )
 
 
 def _ends(values: Any) -> tuple[float, float]:

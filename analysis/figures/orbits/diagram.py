@@ -43,6 +43,7 @@ def draw_diagram(dataset: xr.Dataset) -> Figure:
         _draw_panel(axis, parts, panel, name)
         axis.margins(x=0.02)
     axes[-1].set_xlabel(shown)
+    axes[-1].locator_params(axis="x", nbins=5)  # long numbers of a short range would overlap
     words = axes[0].get_legend_handles_labels()[1]
     if panels[0] != "shares":
         legend_outside(
