@@ -97,7 +97,7 @@ class Diagram(Study[str]):
         """
         problems: dict[str, VibroimpactError] = {}
         for part in self.names:
-            self.interruption = f"Interrupted in the part {part}: the above is what was found."
+            self.interruption = f"Interrupted: the above is what was found, up to the part {part}."
             self.status(part)
             try:
                 yield from self._rows_of(part)

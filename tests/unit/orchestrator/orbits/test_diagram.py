@@ -196,7 +196,7 @@ def test_ctrl_c_in_a_part_leaves_the_parts_before_it_and_what_that_part_has(scen
     rows.close()
     found = study.made()
     assert str(found.attrs["parts"]).split() == ["sweep", "shares"]
-    assert study.interruption.startswith("Interrupted in the part shares")
+    assert study.interruption.endswith("up to the part shares.")
     assert found.sizes["shares_parameter"] == 1
     assert isinstance(vi.draw(found), Figure)
 
