@@ -70,6 +70,7 @@ if TYPE_CHECKING:  # names for type checkers and editors; a test compares them w
     from vibroimpact.hardware.recordings import import_recording as import_recording
     from vibroimpact.orbits import basins as basins
     from vibroimpact.orbits import control as control
+    from vibroimpact.orbits import diagram as diagram
     from vibroimpact.orbits import find_orbits as find_orbits
     from vibroimpact.orbits import follow as follow
     from vibroimpact.orbits import maps as maps
@@ -123,7 +124,7 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
-    "orbits": ("basins", "control", "find_orbits", "follow", "maps", "transients"),
+    "orbits": ("basins", "control", "diagram", "find_orbits", "follow", "maps", "transients"),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
     "orchestrator.orbits.resonances": ("resonances",),

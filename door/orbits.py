@@ -11,11 +11,12 @@ from vibroimpact.analysis.orbits.basins import MOST_PERIODS
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.given import PathLike, SceneLike, given_result, given_scene
+from vibroimpact.given import PathLike, SceneLike, given_result, given_scene, scene_with_modes
 from vibroimpact.orchestrator.orbits.basin_shares import VALUES, BasinShares
 from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.control import Controlled
 from vibroimpact.orchestrator.orbits.control_plan import ControlSettings, control_plan
+from vibroimpact.orchestrator.orbits.diagram import Diagram
 from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.maps import MapOfScene, settings_of
@@ -160,6 +161,84 @@ def follow(
         second_range=second_range,
     )
     return runs_of_study(study, written)
+
+
+def diagram(
+    scene: SceneLike,
+    parameter: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    path: PathLike | None = None,
+    *,
+    values: int | None = None,
+    parts: Sequence[str] | None = None,
+    points: int = 60,
+    share_values: int = 41,
+    doublings: int = 1,
+    grazes: int = 1,
+    second: str | None = None,
+    second_range: tuple[float, float] | None = None,
+    second_values: int | None = None,
+) -> xr.Dataset:
+    """Return sweep, branches, shares of basins and exponents over a parameter, or classes and loci over two.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Without a parameter its own sweep of one or two keys gives ranges and numbers of values.
+    parameter : str, optional
+        Key of a number in the scene, for example `forcing.angular_frequency`.
+    start, stop : float, optional
+        Ends of the parameter's range.
+    path : path, optional
+        Dataset file to write as well (.nc).
+    values : int, optional
+        Number of values of the sweep. Default: 401, or 121 with a second parameter.
+    parts : sequence of str, optional
+        Parts that are made: `sweep` (runs up and down), `branches` (see `follow`), `shares` (see `basins`),
+        `exponents` of the runs (see `lyapunov`). With a second parameter: `sweep` (a map of the runs), `loci`.
+    points : int
+        Starts along both axes of the planes in which basins are found.
+    share_values : int
+        Number of values at which shares are found.
+    doublings, grazes : int
+        See `follow`.
+    second, second_range, second_values : optional
+        Key, ends and number of values (81) of a second parameter.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of all parts, each with the name of its part in front. `.vibroimpact.part(name)` is the dataset of
+        one part alone. The attribute `parts` names the parts; `refused` has the reasons for missing ones.
+
+    Raises
+    ------
+    UsageError, SceneError
+        A range is empty or incomplete, a part unknown, or a parameter is no number of the scene.
+    OrbitError, DatasetError
+        The scene can have none of the parts.
+
+    Examples
+    --------
+    >>> found = diagram("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
+    >>> found.vibroimpact.part("branches").orbit_stable                         # doctest: +SKIP
+    """
+    given = given_scene(scene)
+    written = given_result(path, [scene, given])
+    study = Diagram(
+        *(scene_with_modes(given), parameter, start, stop),
+        values=values,
+        parts=parts,
+        points=points,
+        share_values=share_values,
+        doublings=doublings,
+        grazes=grazes,
+        second=second,
+        second_range=second_range,
+        second_values=second_values,
+    )
+    return of_study(study, written)
 
 
 def maps(scene: SceneLike | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.composed import part_of
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
     Direction,
@@ -63,6 +64,25 @@ class VibroimpactAccessor:
         flat = flat.isel(run=flat["run_id"].values >= 0)
         flat = flat.isel(run=np.argsort(flat["run_id"].values))
         return flat.transpose("run", ...)
+
+    def part(self, name: str) -> xr.Dataset:
+        """Return a part of a diagram: the dataset of its own study, with runs on the dimensions of their sweep.
+
+        Parameters
+        ----------
+        name : str
+            One of the names in the attribute `parts`.
+
+        Raises
+        ------
+        DatasetError
+            There is no such part.
+
+        Examples
+        --------
+        >>> vi.diagram("scene.toml").vibroimpact.part("branches")                   # doctest: +SKIP
+        """
+        return part_of(self._dataset, name)
 
     def __repr__(self) -> str:
         facts = "; ".join(f"{name}: {value}" for name, value in self._facts())

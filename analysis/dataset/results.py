@@ -137,6 +137,11 @@ def _rule(name: str, dims: str, unit: str, words: str, of: str = "") -> Variable
     return VariableRule(name, tuple(dims.split()), unit, words, object if of == "text" else None)
 
 
+_MOST_PLAIN = 1 << 16
+"""Size of a variable of numbers above which it is stored compressed, bytes."""
+_DEFLATED = {"zlib": True, "complevel": 1, "shuffle": True}
+
+
 def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str = "") -> None:
     """Write the dataset of an analysis.
 
@@ -173,6 +178,7 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     described = dataset.assign_attrs(program_attributes() | dataset.attrs | identity)
     encoding: dict[Any, dict[str, Any]] = {
         name: {"_FillValue": np.nan if name not in dataset.coords else None}
+        | (_DEFLATED if variable.nbytes > _MOST_PLAIN else {})
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }

@@ -80,6 +80,9 @@ def kinds() -> dict[str, Picture]:
         "branches": _of(
             "branches", "branches", f"vibroimpact follow examples/bifurcation.toml {span} -o branches.nc"
         ),
+        "diagram": _of(
+            "diagram", "diagram", "vibroimpact diagram examples/bifurcation.toml --points 20 -o diagram.nc"
+        ),
         "classes": _of("classes", "classes", "vibroimpact classify bifurcation.nc -o classes.nc"),
         "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),

@@ -82,6 +82,7 @@ COMMANDS: Mapping[str, str] = {
     "spikes": "analysis.operations.spikes:Spikes",
     "orbit": "orchestrator.operations.orbit:FindOrbits",
     "follow": "orchestrator.operations.follow:Follow",
+    "diagram": "orchestrator.operations.diagram:MakeDiagram",
     "maps": "orchestrator.operations.maps:Maps",
     "classify": "analysis.operations.classify:Classify",
     "lyapunov": "orchestrator.operations.lyapunov:Lyapunov",
@@ -113,6 +114,7 @@ PANELS: Mapping[str, tuple[str, ...]] = {
     "Orbits": (
         "orbit",
         "follow",
+        "diagram",
         "maps",
         "classify",
         "lyapunov",

@@ -59,6 +59,18 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
         for place in range(runs.sizes["run"]):
             yield _of_run(self._bodies, impacts, runs, place)
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no run has exponents."""
+        return all(isinstance(each, str) for each in self.found)
+
+    @property
+    def why_none(self) -> str:
+        """A sentence on a study in which no run has exponents: the reasons with their numbers of runs."""
+        counts = _counted([each for each in self.found if isinstance(each, str)])
+        reasons = "; ".join(f"{count} of {len(self.found)}: {words}" for words, count in counts)
+        return f"lyapunov: expected runs with exponents, got none. {reasons}"
+
     def made(self) -> xr.Dataset:
         """Return the exponents on the dimensions of the sweep."""
         many = self.runs.vibroimpact.runs.sizes["run"] - len(self.found)
@@ -66,13 +78,21 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
 
     def print_results(self) -> None:
         """Print the exponents of runs, and the number of runs without; DatasetError if no run has exponents."""
-        reasons = [str(text) for text in self.dataset.reason.values.ravel() if str(text) != "no run"]
-        counts = _counted([text for text in reasons if text])
-        if all(reasons):
-            summary = "; ".join(f"{count} of {len(reasons)}: {words}" for words, count in counts)
-            raise DatasetError(f"lyapunov: expected runs with exponents, got none. {summary}")
+        if self.is_empty:
+            raise DatasetError(self.why_none)
         _print(self.dataset)
-        for words, count in counts:
+        self.print_summary()
+
+    def print_summary(self) -> None:
+        """Print the number of runs with exponents, if they are many, and of those without, with the reasons."""
+        known = [each for each in self.found if isinstance(each, Exponents)]
+        if len(known) > _MOST_SHOWN:
+            chaotic = sum(bool(each.per_impact[0] > 2.0 * each.standard_error[0]) for each in known)
+            say(f"{len(known)} runs have exponents, of {chaotic} the largest is positive.")
+        reasons = [
+            str(text) for text in self.dataset.reason.values.ravel() if str(text) not in ("", "no run")
+        ]
+        for words, count in _counted(reasons):
             say(f"{count} without: {words}")
 
 
@@ -175,10 +195,6 @@ def _print(found: xr.Dataset) -> None:
             f"{int(one.impacts)}",
         )
     wide_terminal().print(rows)
-    if known.sizes["run"] > _MOST_SHOWN:
-        first = known.isel(exponent=0)
-        chaotic = int((first.lyapunov_exponent > 2.0 * first.standard_error).sum())
-        say(f"{known.sizes['run']} runs have exponents, of {chaotic} the largest is positive.")
 
 
 def _where(one: xr.Dataset, found: xr.Dataset) -> str:

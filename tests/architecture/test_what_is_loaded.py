@@ -98,6 +98,10 @@ OTHERS: Rows = {
     "convert swept.nc swept.zarr": ("zarr", 0),
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
+    "diagram scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9 --values 3 --parts sweep": (
+        "scipy",
+        0,
+    ),
     # the names of connections are labels
     "run two_oscillators.toml -o two.nc": (f"{RECOGNIZED} fmpy", 0),
     "sensitivity drawn.nc": (RECOGNIZED, 0),

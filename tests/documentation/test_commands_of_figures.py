@@ -17,6 +17,7 @@ from support.places import EXAMPLES, ROOT
 PAGES = ("thesis_figures", "orbits")
 BIFURCATION, CHAIN = "examples/bifurcation.toml", "examples/thesis/figure_6_13.toml"
 FREQUENCY = "--parameter forcing.angular_frequency"
+ALONE = "--doublings 0 --grazes 0 "
 SECOND = "--second forcing.amplitude --second-from 0.02 --second-to 1.2 --doublings 0 --grazes 0"
 
 
@@ -69,6 +70,23 @@ COMMANDS = {
         (133, 81, 79),
         is_long=True,
     ),
+    **{
+        f"diagram {BIFURCATION} --set forcing.amplitude={amplitude} {FREQUENCY} {span} --parts sweep,branches "
+        f"{alone}--figure figure_3_{name}.png": Shown(says, is_long=name != "11a")
+        for name, amplitude, span, alone, says in (
+            ("11a", "0.565", "--from 0.66 --to 0.665", "", ("0.66249338975", "0.66214571411")),
+            ("11b", "0.560634561", "--from 0.664 --to 0.669", ALONE, ("0.66583281193",)),
+            ("11c", "0.555", "--from 0.668 --to 0.673", "", ("0.67011972282", "0.67028496114", "chaos")),
+            (
+                "12",
+                "0.560634561",
+                "--from 0.5 --to 1.8",
+                ALONE,
+                ("0.56760845439", "1.5486395306", "ends: closed."),
+            ),
+            ("13", "0.6", "--from 0.5 --to 1.8", "", ("0.63511486615", "0.54529693896", "1.5674598785")),
+        )
+    },
     "energies examples/thesis/figure_6_15.toml": Shown(("0.630961", "0.859039", "0.760263")),
     'run examples/thesis/figure_6_4.toml --set "stop=[]" -o free.nc': Shown(("922 runs in",)),
     f"maps {CHAIN} --set forcing.angular_frequency=1.76 --set record.recorded_periods=4000 "
@@ -97,6 +115,13 @@ COMMANDS = {
     ),
     "basins examples/basins.toml --parameter forcing.angular_frequency --from 0.9 --to 1.6 --values 36 --points 40 "
     "--x=-2:1 --y=-3:3 --figure shares.png": Shown(("24.88 %", "0.19 % of the plane"), is_long=True),
+    f"diagram {BIFURCATION} -o diagram.nc --figure diagram.png": Shown(
+        ("0.93649312074", "526 runs have exponents, of 15 the largest is positive."), is_long=True
+    ),
+    f"diagram {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second forcing.amplitude --second-from 0.02 "
+    "--second-to 0.8 --doublings 0 --grazes 0 --figure diagram_map.png": Shown(
+        ("fold: 0.66583281185, 0.56063456", "P(1,1)"), is_long=True
+    ),
     f"control {BIFURCATION} --from 1 --to 0.7 -o kept.nc --keep parts": Shown(
         ("Kept to 0.7107: kept to the end of the plan.", "1.3e-05 away"), is_long=True
     ),

@@ -32,6 +32,7 @@ CASES = {
     "basins": ("basins", 2),
     "classify": ("classes", 2),
     "control": ("control", 1),
+    "diagram": ("diagram", 3),
     "effects": ("effects", 2),
     "energies": ("energies", 2),
     "follow": ("branches", 5),

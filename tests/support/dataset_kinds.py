@@ -79,6 +79,11 @@ KINDS = {
     "branches": "follow forced.toml --parameter forcing.angular_frequency --from 0.85 --to 0.9 --step 0.2",
     "bifurcations over two keys": "follow forced.toml --parameter forcing.angular_frequency --from 0.6 --to 0.9 "
     "--second stop[1].restitution --second-from 0.69 --second-to 0.71",
+    "diagram": "diagram forced.toml --parameter forcing.angular_frequency --from 0.85 --to 0.9 --values 3 "
+    "--points 4 --share-values 2 --doublings 0 --grazes 0",
+    "diagram over two keys": "diagram forced.toml --parameter forcing.angular_frequency --from 0.85 --to 0.95 "
+    "--values 3 --second stop[1].restitution --second-from 0.69 --second-to 0.71 --second-values 2 --doublings 0 "
+    "--grazes 0",
     "map of impacts": "maps forced.toml --kind impact",
     "map of states": "maps forced.toml --kind strobe",
     "map of sets": "maps forced.toml --kind discontinuity --points 30",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.families import register_results
@@ -13,11 +14,20 @@ from vibroimpact.analysis.figures.page import canvas, legend_outside
 
 def draw_basin_shares(dataset: xr.Dataset) -> Figure:
     """Draw the shares of attractors as stacked fractions over the parameter, with their confidence intervals."""
+    figure = canvas(75)
+    axis = figure.subplots()
+    draw_shares(axis, dataset)
+    x, names = dataset["parameter"].values, dataset["attractor_name"].values
+    axis.set(xlim=(x.min(), x.max()), xlabel=_name(dataset["parameter"]))
+    legend_outside(figure, axis, ncols=1 if max(map(len, names), default=0) > 22 else 2)
+    return figure
+
+
+def draw_shares(axis: Axes, dataset: xr.Dataset) -> None:
+    """Draw stacked shares into a panel."""
     x, shares = dataset["parameter"].values, dataset["basin_fraction"].values
     low, high = (dataset[f"basin_fraction_{end}"].values for end in ("low", "high"))
     names = [str(name) for name in dataset["attractor_name"].values]
-    figure = canvas(75)
-    axis = figure.subplots()
     below = np.zeros(x.size)
     for place, name in enumerate(names):
         colour = COLOURS[place % len(COLOURS)]
@@ -36,14 +46,7 @@ def draw_basin_shares(dataset: xr.Dataset) -> Figure:
         axis.fill_between(
             x, 100.0 * below, 100.0, color="white", linewidth=0.0, step="mid", label="undecided"
         )
-    axis.set(
-        xlim=(x.min(), x.max()),
-        ylim=(0.0, 100.0),
-        xlabel=_name(dataset["parameter"]),
-        ylabel="share of starts (%)",
-    )
-    legend_outside(figure, axis, ncols=1 if max(map(len, names), default=0) > 22 else 2)
-    return figure
+    axis.set(ylim=(0.0, 100.0), ylabel="share of starts (%)")
 
 
 def _name(parameter: xr.DataArray) -> str:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside, unit_symbol
+from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
+from vibroimpact.analysis.figures.sweep.classes import draw_classes
 from vibroimpact.analysis.figures.sweep.diagrams import (
     draw_map,
     edges,
@@ -24,6 +28,8 @@ from vibroimpact.fmus.errors import DatasetError
 BRANCH = "orbit_branch"
 _LONG = 20
 """Letters of a legend entry above which three entries do not fit side by side."""
+_ROW = 0.1
+"""Height that the page gains for a row of the legend, in."""
 _STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
 _UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
 _ALONE: dict[str, Any] = {"marker": "o", "markersize": 3.4}
@@ -41,6 +47,12 @@ _LOCI: dict[SpecialOrbit, dict[str, Any]] = {
     SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
     SpecialOrbit.graze_between_impacts: {"color": "#6F4E9C", "linestyle": (0, (5, 1.2, 1.2, 1.2))},
 }
+_ON_CLASSES: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 1.2,
+    "path_effects": [withStroke(linewidth=2.6, foreground="white")],
+}
+"""Style of loci on a map of classes, whose colours leave none for lines."""
 _MARKS = {
     SpecialOrbit.fold: "s",
     SpecialOrbit.period_doubling: "D",
@@ -80,7 +92,7 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
         if over is not None:
             draw_below(axis, over, name, panel)
         _shade_missing(axis, dataset)
-        _draw(axis, dataset, name, panel)
+        draw_orbits(axis, dataset, name, panel)
         axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
     axes[-1].set_xlabel(label(dataset[name]))
@@ -110,7 +122,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
     if over is not None:
         if sorted(varied(over)) != sorted(names):
             raise DatasetError(wrong_sweep(f"a map of {' and '.join(names)} below", over))
-        figure = draw_map(over)
+        figure = draw_classes(over) if CLASS_KIND in over else draw_map(over)
         x, y = in_order_of_the_scene(over, varied(over))
         panels = [axis for axis in figure.axes if axis.get_ylabel() == label(over[y])]
     else:
@@ -120,22 +132,43 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         x, y = sorted(names, key=lambda name: name != first)
         panels[0].set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
     branch, special = runs[BRANCH].values, runs["orbit_special"].values
+    on_classes = _ON_CLASSES if over is not None and CLASS_KIND in over else {}
     labelled: set[str] = set()
     for number in np.unique(branch[branch > 0]):
         chosen = order[branch[order] == number]
         kind = SpecialOrbit(int(special[chosen[0]]))
         words = str(kind.name).replace("_", " ")
-        style = _LOCI.get(kind, {"color": "0.4"})
+        style = {"linewidth": 1.0, **_LOCI.get(kind, {"color": "0.4"}), **on_classes}
         shown = None if words in labelled else words
         for axis in panels:
-            axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
+            axis.plot(runs[x].values[chosen], runs[y].values[chosen], label=shown, **style)
         labelled.add(words)
     if over is None:
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
+    if figure.legends:
+        _name_loci_beside_classes(figure, panels[0])
+    else:
+        legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
     return figure
+
+
+def _name_loci_beside_classes(figure: Figure, panel: Axes) -> None:
+    """Name loci and classes in one legend, for which the page becomes longer."""
+    legend = figure.legends[0]
+    legend.remove()
+    handles = [*legend.legend_handles, *panel.get_legend_handles_labels()[0]]
+    rows = math.ceil(len(handles) / 3)
+    figure.set_figheight(figure.get_figheight() + _ROW * rows)
+    figure.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=3,
+        frameon=False,
+        fontsize=7,
+        columnspacing=1.2,
+    )
 
 
 def _ends(values: Any) -> tuple[float, float]:
@@ -158,9 +191,8 @@ def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
 
 def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str = "simulated") -> None:
     """Draw the values of a sweep in grey."""
-    places, rows = over.vibroimpact.runs[name].values, _rows(over, panel)
-    x = np.concatenate([np.full(row.size, place) for place, row in zip(places, rows, strict=True)])
-    axis.plot(x, np.concatenate(rows), rasterized=True, label=words, **_BELOW)
+    x, y = values_of_runs(over, name, panel)
+    axis.plot(x, y, rasterized=True, label=words, **_BELOW)
 
 
 def _continued(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
@@ -174,7 +206,19 @@ def _continued(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return values
 
 
-def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
+def values_of_runs(dataset: xr.Dataset, name: str, panel: str, direction: str = "") -> tuple[Any, Any]:
+    """Return the values of a panel with those of the parameter; of the runs in one direction if it is named."""
+    runs, rows = dataset.vibroimpact.runs, _rows(dataset, panel)
+    # one direction alone is a scalar
+    directions = np.broadcast_to(runs["direction"].values, len(rows))
+    chosen = directions == direction if direction else np.full(len(rows), True)
+    sizes = [row.size if one else 0 for row, one in zip(rows, chosen, strict=True)]
+    values = [row for row, one in zip(rows, chosen, strict=True) if one]
+    return np.repeat(runs[name].values, sizes), np.concatenate(values)
+
+
+def draw_orbits(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
+    """Draw orbits over their parameter into a panel: branches as lines, special points as marks."""
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
     rows = _rows(dataset, panel)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.families import register_results
@@ -81,6 +84,15 @@ def _draw_map(dataset: xr.Dataset, names: list[str]) -> Figure:
 def _draw_sweep(dataset: xr.Dataset, name: str) -> Figure:
     figure = canvas(60)
     axis = figure.subplots()
+    draw_exponents(axis, dataset, name)
+    axis.set_xlabel(label(dataset[name]))
+    if len(axis.get_legend_handles_labels()[1]) > 1:
+        axis.legend(frameon=False, fontsize=7)
+    return figure
+
+
+def draw_exponents(axis: Axes, dataset: xr.Dataset, name: str, colours: Mapping[str, str] = _COLOURS) -> None:
+    """Draw the largest exponent of each run over a swept parameter into a panel; directions have their colours."""
     directions = dataset["direction"].values.tolist() if "direction" in dataset["reason"].dims else [None]
     for direction in directions:
         one = dataset if direction is None else dataset.sel(direction=direction)
@@ -93,14 +105,11 @@ def _draw_sweep(dataset: xr.Dataset, name: str) -> Figure:
             marker=".",
             markersize=2.5,
             elinewidth=0.5,
-            color=_COLOURS.get(str(direction), "#20567D"),
+            color=colours.get(str(direction), "#20567D"),
             label=None if direction is None else f"{direction} sweep",
         )
     axis.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-    axis.set(xlabel=label(dataset[name]), ylabel="largest exponent per impact (-)")
-    if len(directions) > 1:
-        axis.legend(frameon=False, fontsize=7)
-    return figure
+    axis.set_ylabel("largest exponent per impact (-)")
 
 
 register_results("lyapunov", "Lyapunov exponents", draw_lyapunov)

@@ -266,8 +266,13 @@ def _draw_branch(
         number, name = stop
         style |= _OF_STOPS[(number - 1) % len(_OF_STOPS)][direction]
         words = [*(words if direction != "independent" else []), name]
-    x, y, single = x[shown], y[shown], crowd <= 1.0
-    axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=", ".join(words), **style)
+    draw_points(axis, x[shown], y[shown], crowd, label=", ".join(words), **style)
+
+
+def draw_points(axis: Axes, x: Any, y: Any, crowd: Any, **style: Any) -> None:
+    """Draw points as marks; points of crowded columns (`crowded`) are small, and the fainter the more there are."""
+    single = crowd <= 1.0
+    axis.plot(x[single], y[single], linestyle="none", rasterized=True, **style)
     if not single.all():
         opacity = np.clip(1.0 / crowd[~single], _FAINTEST, 1.0)
         faded = {"color": style["color"], "alpha": opacity, "linewidths": 0.0}
