@@ -31,7 +31,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
-from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
+from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
@@ -45,8 +45,6 @@ SAME_ORBIT = 0.02
 """Distance, in ranges of the parameter and radians, below which an orbit lies on a known branch."""
 MOST_BRANCHES = 256
 """Number of branches from which on no more are begun at special points."""
-MOST_BEGUN_IMPACTS = 16
-"""Impacts of an orbit up to which branches begin at special points, unless an orbit was given or searched."""
 FOLLOWED_TURNS = 2
 """Number of turns of a grazing orbit up to which the orbits that meet it are followed."""
 MOST_ROUNDS = 4
