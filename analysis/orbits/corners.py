@@ -7,7 +7,7 @@ multipliers. A step ends at the corner, and the next one begins in the direction
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.branch_points import bordered_determinant
 from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit
 from vibroimpact.fmus.bodies.impacting_body import Floats
-
-if TYPE_CHECKING:
-    from vibroimpact.analysis.orbits.following import BranchOrbit, Follower
 
 AT_YIELD_VELOCITY = "impact at the yield velocity"
 """Kind of a point where an impact passes its yield velocity."""
@@ -34,6 +31,53 @@ REACH = 2.0
 """Distance of a corner, over the step that found no orbit, up to which it is searched."""
 
 
+class _Span(Protocol):
+    @property
+    def span(self) -> float:
+        """Range of the parameter."""
+
+
+class BranchEquations(Protocol):
+    """Equations of the orbits of a branch over their unknowns: phases, and the parameter over its range."""
+
+    @property
+    def settings(self) -> _Span:
+        """The range of the parameter."""
+
+    def residual(
+        self, orbit: PeriodicOrbit, phases: Floats, value: float
+    ) -> tuple[Floats, Floats, PeriodicOrbit]:
+        """Return distances from the stops, their slopes by the phases, and the orbit."""
+
+    def matrix(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
+        """Return the derivatives of the distances by all unknowns."""
+
+
+class BranchPlace(Protocol):
+    """An orbit of a branch with its direction."""
+
+    @property
+    def value(self) -> float:
+        """Value of the parameter."""
+
+    @property
+    def orbit(self) -> PeriodicOrbit:
+        """The orbit."""
+
+    @property
+    def tangent(self) -> Floats:
+        """Direction of the branch."""
+
+
+class CornerSide(NamedTuple):
+    """The orbit at a corner with direction, determinant and multipliers of one side."""
+
+    value: float
+    orbit: PeriodicOrbit
+    tangent: Floats
+    border: float
+
+
 @dataclass(frozen=True, slots=True)
 class Corner:
     """A corner of a branch.
@@ -42,13 +86,13 @@ class Corner:
     ----------
     place : float
         Distance along the branch.
-    before, beyond : BranchOrbit
+    before, beyond : CornerSide
         The orbit, with direction and multipliers of either side.
     """
 
     place: float
-    before: BranchOrbit
-    beyond: BranchOrbit
+    before: CornerSide
+    beyond: CornerSide
 
 
 def crosses(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
@@ -57,11 +101,11 @@ def crosses(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
 
 
 def next_corner(
-    follower: Follower, now: BranchOrbit, step: float, taken: BranchOrbit | None
+    follower: BranchEquations, now: BranchPlace, step: float, taken: PeriodicOrbit | None
 ) -> Corner | None:
     """Return the first corner within a step to `taken`, or near one that found no orbit; None without a corner."""
     excess = _excess(now.orbit)
-    if (excess == -1.0).all() or (taken is not None and not crosses(now.orbit, taken.orbit)):
+    if (excess == -1.0).all() or (taken is not None and not crosses(now.orbit, taken)):
         return None
     unknowns = _unknowns(follower, now)
     try:
@@ -69,7 +113,7 @@ def next_corner(
             rates = _rates(follower, now.orbit, unknowns, now.tangent)
             reach = REACH * step
         else:
-            rates, reach = (_excess(taken.orbit) - excess) / step, step
+            rates, reach = (_excess(taken) - excess) / step, step
         with np.errstate(divide="ignore", invalid="ignore"):
             places = -excess / rates
         for place in sorted(each for each in places if SAME_SPEED * step < each <= reach):
@@ -83,7 +127,7 @@ def next_corner(
     return None
 
 
-def split_orbit(follower: Follower, at: BranchOrbit, twice: BranchOrbit) -> BranchOrbit | None:
+def split_orbit(follower: BranchEquations, at: BranchPlace, twice: BranchPlace) -> CornerSide | None:
     """Return the orbit at a corner, counted twice, with the direction of orbits with an impact on either side.
 
     They begin there where a multiplier jumps across -1. None if there are none, or several impacts are at the corner.
@@ -106,7 +150,7 @@ def split_orbit(follower: Follower, at: BranchOrbit, twice: BranchOrbit) -> Bran
     above, below = _rates(follower, twice.orbit, beside, tangent)[pair]
     if not above * below < 0.0:
         return None
-    return replace(twice, tangent=tangent if above > 0.0 else -tangent)
+    return CornerSide(twice.value, twice.orbit, tangent if above > 0.0 else -tangent, 0.0)
 
 
 def _excess(orbit: PeriodicOrbit) -> Floats:
@@ -115,18 +159,18 @@ def _excess(orbit: PeriodicOrbit) -> Floats:
     return np.asarray(orbit.velocities / levels[orbit.contacts] - 1.0)
 
 
-def _unknowns(follower: Follower, at: BranchOrbit) -> Floats:
+def _unknowns(follower: BranchEquations, at: BranchPlace) -> Floats:
     return np.append(at.orbit.phases, at.value / follower.settings.span)
 
 
 def _residual(
-    follower: Follower, like: PeriodicOrbit, unknowns: Floats
+    follower: BranchEquations, like: PeriodicOrbit, unknowns: Floats
 ) -> tuple[Floats, Floats, PeriodicOrbit]:
     """Return distances from the stops, their slopes by the phases, and the orbit."""
     return follower.residual(like, unknowns[:-1], float(unknowns[-1]) * follower.settings.span)
 
 
-def _rates(follower: Follower, like: PeriodicOrbit, unknowns: Floats, direction: Floats) -> Floats:
+def _rates(follower: BranchEquations, like: PeriodicOrbit, unknowns: Floats, direction: Floats) -> Floats:
     """Return the slopes of all excesses in a direction, shape (p,)."""
     ends = [
         _excess(_residual(follower, like, unknowns + side * SLOPE_STEP * direction)[2])
@@ -136,7 +180,7 @@ def _rates(follower: Follower, like: PeriodicOrbit, unknowns: Floats, direction:
 
 
 def _solved(
-    follower: Follower, like: PeriodicOrbit, unknowns: Floats, impact: int
+    follower: BranchEquations, like: PeriodicOrbit, unknowns: Floats, impact: int
 ) -> tuple[Floats, PeriodicOrbit] | None:
     """Return unknowns and orbit near a start where an impact has its yield velocity, by Newton's method."""
     least = np.inf
@@ -157,7 +201,7 @@ def _solved(
 
 
 def _both_sides(
-    follower: Follower, now: BranchOrbit, unknowns: Floats, orbit: PeriodicOrbit
+    follower: BranchEquations, now: BranchPlace, unknowns: Floats, orbit: PeriodicOrbit
 ) -> Corner | None:
     """Return the corner at an orbit; None if the branch only touches the yield velocity there."""
     at = np.abs(_excess(orbit)) < SAME_SPEED
@@ -170,19 +214,20 @@ def _both_sides(
     onwards = -rates[at] * np.sign(_excess(now.orbit))[at]
     if not ((onwards > 0.0).all() or (onwards < 0.0).all()):
         return None
+    turned = beyond._replace(tangent=-beyond.tangent, border=-beyond.border)
     place = float(now.tangent @ (unknowns - _unknowns(follower, now)))
-    return Corner(place, before, beyond if onwards[0] > 0.0 else beyond.turned)
+    return Corner(place, before, beyond if onwards[0] > 0.0 else turned)
 
 
 def _one_side(
-    follower: Follower,
-    now: BranchOrbit,
+    follower: BranchEquations,
+    now: BranchPlace,
     unknowns: Floats,
     orbit: PeriodicOrbit,
     at: NDArray[np.bool_],
     falling: NDArray[np.bool_],
     direction: Floats,
-) -> BranchOrbit | None:
+) -> CornerSide | None:
     """Return the orbit at a corner with direction and multipliers of one side; None if that side is not there."""
     beside = unknowns + BESIDE * direction
     if (_residual(follower, orbit, beside)[2].falling != falling).any():
@@ -193,10 +238,6 @@ def _one_side(
     tangent = tangent if tangent @ now.tangent >= 0.0 else -tangent
     shares = np.where(at, np.where(falling, 1.0 + SAME_SPEED, 1.0 - SAME_SPEED), 1.0)
     velocities = orbit.velocities * shares
-    return replace(
-        now,
-        value=value,
-        orbit=replace(orbit, velocities=velocities),
-        tangent=tangent,
-        border=bordered_determinant(matrix, tangent),
+    return CornerSide(
+        value, replace(orbit, velocities=velocities), tangent, bordered_determinant(matrix, tangent)
     )

@@ -80,7 +80,7 @@ def _split(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
     """Yield the branch of twice the period that begins at an impact at its yield velocity, if there is one."""
     start = split_orbit(follower, at, _twice(at))
     if start is not None:
-        yield Departure(start, AT_YIELD_VELOCITY)
+        yield Departure(BranchOrbit(*start), AT_YIELD_VELOCITY)
 
 
 def _twice(at: BranchOrbit) -> BranchOrbit:

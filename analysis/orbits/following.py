@@ -235,11 +235,11 @@ class Follower:
             yield now
         while len(branch.orbits) < self.settings.most_orbits:
             found = self.step(now, step)
-            corner = None if born else next_corner(self, now, step, found[0] if found else None)
+            corner = None if born else next_corner(self, now, step, found[0].orbit if found else None)
             if corner is not None:
                 if (yield from self._to_corner(branch, now, corner)):
                     return
-                now, step = corner.beyond, 0.1 * longest
+                now, step = branch.orbits[-1], 0.1 * longest
                 continue
             too_near = found is not None and abs(found[0].border) < NEAR * abs(now.border)
             if found is None or too_near or (born and not found[0].orbit.is_physical):
@@ -269,14 +269,14 @@ class Follower:
         self, branch: Branch, now: BranchOrbit, corner: Corner
     ) -> Generator[BranchOrbit, None, bool]:
         """Add the events before a corner, and its orbit, to the branch; return whether the branch ends there."""
-        if (yield from self._passed(branch, now, corner.before, corner.place)):
+        before, orbit = BranchOrbit(*corner.before), corner.before.orbit
+        if (yield from self._passed(branch, now, before, corner.place)):
             return True
-        orbit = corner.before.orbit
         if orbit.turns > 1:
             branch.ends.append(f"{AT_YIELD_VELOCITY} of {orbit.once.name}")
         else:
-            branch.points.append(SpecialPoint(AT_YIELD_VELOCITY, corner.before, len(branch.orbits)))
-        branch.orbits += [corner.before, corner.beyond][: 1 if orbit.turns > 1 else 2]
+            branch.points.append(SpecialPoint(AT_YIELD_VELOCITY, before, len(branch.orbits)))
+        branch.orbits += [before, BranchOrbit(*corner.beyond)][: 1 if orbit.turns > 1 else 2]
         yield branch.orbits[-1]
         return orbit.turns > 1
 

@@ -31,7 +31,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
-from vibroimpact.orchestrator.orbits.first_orbits import SEEDS, first_orbits, seed_values
+from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.dataset import cf_unit
@@ -80,6 +80,10 @@ class Followed:
     """The self-check by index sums, where orbits of all kinds were looked for."""
     meetings: list[Meeting] = field(default_factory=list)
     """The grazes of these branches, with the orbits that meet there."""
+    most_begun_impacts: int = MOST_IMPACTS
+    """Impacts of an orbit up to which branches begin at special points."""
+    left: int = 0
+    """Number of branches of more impacts that are not followed."""
     is_cut_short: bool = False
     """Whether branches begin at special points that were not followed, since there are too many."""
 
@@ -167,12 +171,14 @@ def follow_branches(
             f"The search at {SEEDS} values or more took {starts} trains of impacts at each and found "
             f"{counted(found, 'orbit')}; branches: {len(followed.branches)}."
         )
-    if required:
-        _refuse_nothing(followed, settings, impacts, periods)
+    if seed is None and impacts is None:
+        followed.most_begun_impacts = MOST_BEGUN_IMPACTS
     yield from _departed(follower, followed, doublings, grazes)
     if seed is None and impacts is None and periods == 1:
         followed.check = IndexCheck(scene, parameter, settings, starts)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
+    if required:
+        _refuse_nothing(followed, settings, impacts, periods)
 
 
 def _refuse_nothing(followed: Followed, settings: FollowSettings, impacts: int | None, periods: int) -> None:
@@ -181,9 +187,10 @@ def _refuse_nothing(followed: Followed, settings: FollowSettings, impacts: int |
         return
     values = seed_values(settings)
     ends = followed.ends or list(ends_of_runs(followed.scene, followed.parameter, values))
+    kind = "an orbit with impacts" if followed.ends else f"a physical orbit P({impacts or 1},{periods})"
     raise OrbitError(
         message(
-            f"follow: expected a physical orbit P({impacts or 1},{periods}) at one of {SEEDS} values of "
+            f"follow: expected {kind} at one of {SEEDS} values of "
             f"{followed.parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
             where_runs_end(ends, (impacts or 1, periods)),
         )
@@ -242,6 +249,9 @@ def _departed(
             for departure in found:
                 others = [each for each in result.branches if each is not parent or is_graze or is_doubling]
                 if any(passes(each, departure.start, follower.settings.span) for each in others):
+                    continue
+                if departure.start.orbit.phases.size > result.most_begun_impacts:
+                    result.left += 1
                     continue
                 count = len(result.branches)
                 yield from _leaving(follower, departure, parent, result)

@@ -15,6 +15,8 @@ from vibroimpact.orchestrator.orbits.find import find_orbits
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.scene import Scene
 
+MOST_BEGUN_IMPACTS = 16
+"""Impacts of an orbit up to which branches begin at ends of runs and at special points, unless an orbit is given."""
 SEEDS = 25
 """Values of the parameter at which first orbits are searched."""
 
@@ -77,7 +79,8 @@ def _of_runs(
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     """Yield the orbits on which runs end, after all runs, so that a run goes on where the last one ended."""
     ends.extend(ends_of_runs(scene, parameter, seed_values(settings), looking))
-    yield from ((each.value, each.orbit) for each in ends if each.orbit is not None)
+    orbits = ((each.value, each.orbit) for each in ends if each.orbit is not None)
+    yield from (each for each in orbits if each[1].phases.size <= MOST_BEGUN_IMPACTS)
 
 
 def _of_many_impacts(

@@ -168,6 +168,11 @@ class Following(Study[str]):
             say(
                 f"After {many} branches no more are begun at special points. Ask for fewer doublings or grazes."
             )
+        if self.followed.left:
+            say(
+                f"Branches of more than {self.followed.most_begun_impacts} impacts that begin at special points: "
+                f"{self.followed.left}, not followed. Give a seed, or --impacts and --periods, to follow them."
+            )
         for line in (
             self.followed.origins if self.incomplete else [*self.followed.origins, *self.followed.sums]
         ):

@@ -157,7 +157,7 @@ def test_curves_lie_on_the_map_of_both_numbers(loci: xr.Dataset) -> None:
         (["--from", "1", "--to", "1"], "--from, --to: expected two different numbers, got 1 and 1."),
         (["--parameter", "body.kind"], "scene key: expected a numeric key"),
         (["--parameter", "no.such"], "scene key: expected a numeric key"),
-        (["--from", "2.5", "--to", "3"], "follow: expected a physical orbit P(1,1)"),
+        (["--from", "2.5", "--to", "3"], "follow: expected an orbit with impacts at one of 25 values"),
         (["--periods", "0"], "--periods: expected 1 or more, got 0."),
         (["--grazes", "-1"], "--grazes: expected 0 or more, got -1."),
         (["--step", "0"], "--step: expected 1e-4 to 0.2, got 0."),
