@@ -368,6 +368,8 @@ def test_the_edge_of_a_chaotic_pair_has_a_symmetric_saddle_that_follow_takes() -
     assert found.edge_orbit.values.tolist() == ["P(2,1), 1 at stop 1, 1 at stop 2"]
     largest, second = found.edge_multiplier.values[0]
     assert (largest, second) == pytest.approx((2.857171, 0.048073), rel=1e-5)
+    # both sides of the edge part at the rate of the multiplier
+    assert found.edge_exponent.item() == pytest.approx(np.log(largest), abs=1e-3)
     assert largest * second == pytest.approx(0.7**4 * np.exp(-2.0 * 0.04 * 2.0 * np.pi / 0.9), rel=1e-9)
     seed = [(float(p), int(s)) for p, s in (each.split(":") for each in found.edge_seed.values[0].split(","))]
     assert seed[1][0] - seed[0][0] == pytest.approx(np.pi, abs=1e-9), "half a period apart"
