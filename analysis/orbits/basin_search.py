@@ -372,7 +372,7 @@ class _Search(OnTheirWay):
     def _with_long_periods(self, kinds: list[RunClass], states: Floats) -> list[RunClass]:
         """Return the classes of runs; chaos and unknown ones get the period with which their section repeats."""
         unknown = np.flatnonzero(are_aperiodic(kinds, states))
-        if not unknown.size:
+        if not unknown.size or self._flow.turns is not None:  # no state has its phases of further sines again
             return kinds
         found, sections = list(kinds), self._flow.section(states[unknown], BLOCK * BLOCKS).states
         for place, section in zip(unknown.tolist(), sections, strict=True):
