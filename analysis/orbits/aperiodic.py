@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits.basins import Attractor, Features, Floats, Flow
+from vibroimpact.analysis.orbits.chaotic_groups import Feature
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.recurrence import correlation_dimension
+from vibroimpact.analysis.orbits.recurrence import correlation_dimension, long_period
 from vibroimpact.analysis.orbits.rotation import Rotation, rotation_of
 from vibroimpact.analysis.orbits.separation import separation_of
 
@@ -40,6 +41,7 @@ class LongRuns(NamedTuple):
 def attractor_of_runs(runs: LongRuns, flow: Flow, scale: Floats) -> Attractor:
     """Return the attractor of long runs that all lie on it.
 
+    Its motion may repeat after very many periods: a body that rests on a stop forgets how it came there.
     Its class is quasi-periodic if the first runs have one rotation number. Otherwise most classes of the runs decide.
     The exponent decides where forces do not repeat: neighbours in the strobe section then part by phases of forces.
     """
@@ -50,6 +52,13 @@ def attractor_of_runs(runs: LongRuns, flow: Flow, scale: Floats) -> Attractor:
     kind = RunClass(OrbitClass.chaos if is_chaotic else OrbitClass.unknown)
     if rotation := _common([rotation_of(each, known) for each in runs.sections[:TURNING]]):
         kind = RunClass(OrbitClass.quasi_periodic, 0, rotation.curves, rotation=rotation)
+    repeats = {long_period(each) for each in runs.sections[:TURNING]}
+    if len(repeats) == 1 and (periods := repeats.pop()):
+        impacts = round(float(runs.features[0, :, :, Feature.impacts].mean(axis=0).sum()) * periods)
+        rests = parting.exponent == -np.inf
+        kind = RunClass(
+            OrbitClass.sticking if rests else OrbitClass.periodic, -1 if rests else impacts, periods
+        )
     extremes = np.array([runs.extremes[:, 0].min(), runs.extremes[:, 1].max()])
     features = Features(runs.features.mean(axis=(0, 1)), extremes, correlation_dimension(runs.sections[0]))
     return Attractor(

@@ -329,6 +329,12 @@ class _Search(OnTheirWay):
         if all(kind.kind is OrbitClass.chaos for kind in kinds):
             self._assign(left, chosen, kinds, states)
 
+    def _count_sample(self, places: Places, chosen: Places) -> None:
+        """Count the starts that a sample of them labelled, and the share that it may have missed."""
+        found = self._basins
+        found.told_by_sample += int((found.labels[places] >= 0).sum()) - chosen.size
+        found.undetected_share_below += missed_share(chosen.size) * places.size / found.possible
+
     @property
     def _transient(self) -> int:
         """Forcing periods after which chaos counts as permanent."""
@@ -366,7 +372,7 @@ class _Search(OnTheirWay):
     def _with_long_periods(self, kinds: list[RunClass], states: Floats) -> list[RunClass]:
         """Return the classes of runs; chaos and unknown ones get the period with which their section repeats."""
         unknown = np.flatnonzero(are_aperiodic(kinds, states))
-        if not unknown.size:
+        if not unknown.size or self._flow.turns is not None:  # no state has its phases of further sines again
             return kinds
         found, sections = list(kinds), self._flow.section(states[unknown], BLOCK * BLOCKS).states
         for place, section in zip(unknown.tolist(), sections, strict=True):
@@ -410,9 +416,7 @@ class _Search(OnTheirWay):
         labels[chosen] = own
         self._basins.labels[places] = np.append(self._basins.numbers, UNDECIDED)[labels[places]]
         if places.size > chosen.size:
-            self._basins.told_by_sample += int((self._basins.labels[places] >= 0).sum()) - chosen.size
-            missed = missed_share(chosen.size)
-            self._basins.undetected_share_below += missed * places.size / self._basins.possible
+            self._count_sample(places, chosen)
 
     def _grouped(self, runs: LongRuns, by_cells: Recurrence) -> NDArray[np.int64]:
         """Return the group of each of some long runs; a new group gets an attractor."""

@@ -169,10 +169,10 @@ class Attractor:
     def name(self) -> str:
         """`P(p,q)`, `no impacts`, `quasi-periodic`, `chaos`, `aperiodic`.
 
-        `chaotic, not told apart` means that there may be several.
+        `chaotic, not told apart` and `aperiodic, not told apart` mean that there may be several.
         """
         if not self.is_one:
-            return "chaotic, not told apart"
+            return f"{'chaotic' if self.is_chaotic else 'aperiodic'}, not told apart"
         return "aperiodic" if self.kind.kind is OrbitClass.unknown else self.kind.name
 
 

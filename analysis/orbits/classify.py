@@ -345,22 +345,31 @@ def class_of(
             reason = f"repeats after {periods} periods, or after {periods // 2}: it comes together too slowly to tell"
             return RunClass(OrbitClass.unknown, 0, periods, reason)
         return _repeating(impacts, periods, has_stuck)
+    return _without_period(scaled, turns, has_stuck)
+
+
+def _without_period(scaled: Floats, turns: Floats | None, has_stuck: bool) -> RunClass:
+    """Return the class of states that do not repeat; the arguments are those of `class_of`."""
     known = None if turns is None or turns.size != 1 else float(turns[0])
     if rotation := rotation_of(scaled, known):
         return RunClass(OrbitClass.quasi_periodic, 0, rotation.curves, rotation=rotation)
     fewest = FEWEST_OF_CHAOS if turns is None else FEWEST_STATES
-    if len(states) < fewest:
-        reason = f"no period up to {len(states) // 2}; {fewest} recorded periods tell chaos"
+    if len(scaled) < fewest:
+        reason = f"no period up to {len(scaled) // 2}; {fewest} recorded periods tell chaos"
         return RunClass(OrbitClass.unknown, reason=reason)
     if turns is not None and not turns.size:
         return RunClass(OrbitClass.unknown, reason="frequencies of the forces are unknown")
+    if turns is not None and has_stuck:
+        return RunClass(
+            OrbitClass.unknown, reason="rests on a stop, where neighbours meet, under several sines"
+        )
     if turns is not None:
         angles = 2.0 * np.pi * np.outer(np.arange(len(scaled)), turns)
         scaled = np.concatenate([scaled, np.cos(angles), np.sin(angles)], axis=1)
     if _growth(scaled) >= (GROWTH if turns is None else GROWTH_BESIDE_SINES):
         return RunClass(OrbitClass.chaos)
-    more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(states) < FEWEST_STATES)
-    reason = f"no period up to {len(states) // 2}, and neighbours do not part{more}"
+    more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(scaled) < FEWEST_STATES)
+    reason = f"no period up to {len(scaled) // 2}, and neighbours do not part{more}"
     return RunClass(OrbitClass.unknown, reason=reason)
 
 

@@ -144,7 +144,8 @@ class EdgeTracking:
         return Track(between, np.array(states), gap, orbit, of_rates(rates[TURNING:]))
 
     def _distance(self, pair: Floats) -> float:
-        return float((np.abs(pair[1] - pair[0]) / self._basins.scale).max())
+        counts = self._basins.scale > 0.0  # both sides share the phases of forces
+        return float((np.abs(pair[1] - pair[0])[counts] / self._basins.scale[counts]).max())
 
     def _bisected(self, pair: Floats, label: int) -> Floats | None:
         """Return two states next to each other between two states: one ends on `label`, one does not.

@@ -10,7 +10,7 @@ from vibroimpact.analysis.orbits.basins import Floats, Flow
 
 STEP = 1e-8
 """Distance of neighbours, over the size of the motion, at the beginning of each round."""
-PERIODS, ROUNDS, TURNING = 8, 80, 16
+PERIODS, ROUNDS, TURNING = 8, 200, 24
 """Forcing periods of a round; rounds; first rounds, in which the distance turns to the fastest direction."""
 BLOCKS = 8
 """Number of blocks of rounds whose scatter gives the error."""
@@ -38,6 +38,8 @@ class Separation(NamedTuple):
         >>> Separation(0.3111, 0.012).text
         'exponent 0.311 +- 0.01 a period'
         """
+        if self.exponent == -np.inf:
+            return "neighbours meet"
         return f"exponent {self.exponent:.3g} +- {self.error:.1g} a period"
 
 

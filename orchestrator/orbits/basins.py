@@ -313,8 +313,8 @@ def say_search(found: Basins) -> None:
         )
     if found.told_by_sample:
         say(
-            f"{found.told_by_sample} starts count as motions without a period because all of a sample of those "
-            "like them were."
+            f"{found.told_by_sample} starts count as ending where a sample of starts like them ends, as all of it is "
+            "chaotic, quasi-periodic, or of a long period."
         )
     if found.attractors:
         say(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen
 from vibroimpact.orchestrator.run.parameters import body_points, float_parameters
 from vibroimpact.orchestrator.scene import Scene
@@ -100,8 +101,6 @@ def strobed_body(scene: Scene) -> ImpactingBody:
     UsageError
         The scene has no orbits for another reason than its frequencies, or a stop moves with another frequency.
     """
-    from vibroimpact.orchestrator.orbits.bodies import impacting_body
-
     if scene.clock is None or scene.clock.is_common:
         return impacting_body(scene)
     found: list[Seen] = [each for each in seen(scene) if each.row != "quasi-periodic"]

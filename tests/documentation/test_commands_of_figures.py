@@ -16,6 +16,11 @@ from support.places import EXAMPLES, ROOT
 
 PAGES = ("thesis_figures", "orbits")
 BIFURCATION, CHAIN = "examples/bifurcation.toml", "examples/thesis/figure_6_13.toml"
+TORUS = (
+    f'run {CHAIN} --set "body.dampings=[0.063,0.063]" --set "forcing.amplitude=[0.42,0.0]" '
+    '--set forcing.angular_frequency=0.875 --set "stop[1].position=0.327" --set "stop[1].restitution=0.77" '
+    '--set "record={transient_periods=4000,recorded_periods=1000}" -o torus.nc'
+)
 FREQUENCY = "--parameter forcing.angular_frequency"
 ALONE = "--doublings 0 --grazes 0 "
 SECOND = "--second forcing.amplitude --second-from 0.02 --second-to 1.2 --doublings 0 --grazes 0"
@@ -112,6 +117,12 @@ COMMANDS = {
     ),
     "basins examples/basins.toml --points 500 --x=-5:1 --y=-6:6 -o basins.nc --figure basins.png": Shown(
         ("87.23 %", "12.77 %", "1.132 +- 0.025")
+    ),
+    TORUS: Shown(("1 run in",)),
+    "classify torus.nc": Shown(("rotation number 0.17404",)),
+    "plot torus.nc --kind strobe -o torus.png": Shown((), (1000,)),
+    "basins examples/two_frequencies.toml --points 60 --x=-0.8:0.8 --y=-1.5:1.5 --figure two_frequencies.png": Shown(
+        ("quasi-periodic, rotation number 0.4142135624", "no impacts"), is_long=True
     ),
     "basins examples/basins.toml --parameter forcing.angular_frequency --from 0.9 --to 1.6 --values 36 --points 40 "
     "--x=-2:1 --y=-3:3 --figure shares.png": Shown(("24.88 %", "0.19 % of the plane"), is_long=True),

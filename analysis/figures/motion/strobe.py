@@ -45,7 +45,7 @@ def _rotation_in_words(run: xr.Dataset) -> str:
     """Return the rotation number of a run whose section is made of closed curves; empty for other runs."""
     states = np.column_stack([run["strobe_displacement"].values, run["strobe_velocity"].values])
     found = rotation_of(states) if np.isfinite(states).all() and len(states) else None
-    return "" if found is None else f"quasi-periodic, {found.text}"
+    return "" if found is None else f"quasi-periodic\n{found.text}"
 
 
 def draw_section(axis: Axes, run: xr.Dataset) -> None:

@@ -48,9 +48,7 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             markersize=4.5,
             label=_label(names[place], _share(dataset, place)),
         )
-    if "section_displacement" in dataset:
-        x, y = (dataset[f"section_{what}"].values for what in ("displacement", "velocity"))
-        axis.plot(x.ravel(), y.ravel(), ".", color="black", markersize=1.0, markeredgewidth=0.0)
+    _draw_sections(axis, dataset)
     if "edge_orbit" in dataset:
         _draw_edges(axis, dataset)
     for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
@@ -65,6 +63,13 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     longest = max(map(len, axis.get_legend_handles_labels()[1]), default=0)
     legend_outside(figure, axis, ncols=2 if longest <= WIDE else 1)
     return figure
+
+
+def _draw_sections(axis: Axes, dataset: xr.Dataset) -> None:
+    """Draw the states at forcing phase 0 of attractors without a period, where the dataset has them."""
+    if "section_displacement" in dataset:
+        x, y = (dataset[f"section_{what}"].values for what in ("displacement", "velocity"))
+        axis.plot(x.ravel(), y.ravel(), ".", color="black", markersize=1.0, markeredgewidth=0.0)
 
 
 def _draw_edges(axis: Axes, dataset: xr.Dataset) -> None:
