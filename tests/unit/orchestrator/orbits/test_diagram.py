@@ -15,6 +15,7 @@ from support.scenes import FORCED
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_measured
 from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
+from vibroimpact.orchestrator.orbits import loci as loci_of_scenes
 from vibroimpact.orchestrator.orbits import swept_runs
 from vibroimpact.orchestrator.orbits.diagram import Diagram
 
@@ -96,14 +97,13 @@ def test_a_panel_has_branches_over_runs_and_names_special_points(found: xr.Datas
     assert len(set(limits)) == 1
 
 
-@pytest.mark.parametrize("parts", [["sweep"], ["shares"], ["branches", "shares"]])
+@pytest.mark.parametrize("parts", [["sweep"], ["shares"]])
 def test_only_the_parts_that_are_named_are_made_and_drawn(
     parts: list[str], scene: vi.Scene, found: xr.Dataset
 ) -> None:
     few = vi.diagram(scene, *RANGE, **FEW, parts=parts)
     assert str(few.attrs["parts"]).split() == parts
-    panels = 2 if parts[0] != "shares" else 0
-    assert len(vi.draw(few).axes) == panels + ("shares" in parts)
+    assert len(vi.draw(few).axes) == (2 if parts == ["sweep"] else 1)
     with pytest.raises(DatasetError, match="part: expected one of those there are"):
         few.vibroimpact.part("exponents")
 
@@ -131,6 +131,13 @@ def test_parts_that_a_stop_that_yields_cannot_have_are_named(tmp_path: Path) -> 
     assert {*made, *refused} == {"sweep", "branches", "shares", "exponents"}
     for part, reason in refused.items():
         assert f"No {part}: {reason}" in done.stdout
+
+
+def test_a_body_that_becomes_a_structure_is_swept_from_its_start(scene: vi.Scene) -> None:
+    found = vi.diagram(scene, "body.damping", -0.1, 0.1, values=3, parts=["sweep"])  # negative: a structure
+    sweep = found.vibroimpact.part("sweep")
+    assert sweep.outcome.dims == ("damping",)
+    assert vi.draw(found).axes[0].get_legend_handles_labels()[1] == ["runs"]
 
 
 def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
@@ -201,8 +208,11 @@ def test_ctrl_c_in_a_part_leaves_the_parts_before_it_and_what_that_part_has(scen
     assert isinstance(vi.draw(found), Figure)
 
 
-def test_loci_lie_on_a_map_of_classes_over_two_numbers(scene: vi.Scene) -> None:
-    given = {"values": 5, "second": POSITION, "second_range": (0.9, 1.1), "second_values": 3}
+def test_loci_lie_on_a_map_of_classes_over_two_numbers(
+    scene: vi.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loci_of_scenes, "SECOND_VALUES", 1)  # branches at few further values take less time
+    given: dict[str, Any] = {"values": 5, "second": POSITION, "second_range": (0.9, 1.1), "second_values": 3}
     found = vi.diagram(scene, FREQUENCY, 0.9, 1.0, doublings=0, grazes=0, **given)
     sweep, loci = (found.vibroimpact.part(part) for part in ("sweep", "loci"))
     assert sweep.class_kind.sizes == {"angular_frequency": 5, "position": 3}
