@@ -6,7 +6,7 @@ import io
 import os
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -180,9 +180,16 @@ class Page(Figure):
 class _GivenAxes(Figure):
     """Replaces the figure of a drawing whose panels are axes of another program's figure."""
 
+    _given: Sequence[Axes] = ()  # empty while the base class makes its figure, in which it clears all axes
+
     def __init__(self, axes: list[Axes]) -> None:
         super().__init__()
         self._given = axes
+
+    @property
+    def axes(self) -> list[Axes]:
+        """The given axes."""
+        return list(self._given)
 
     def subplots(self, nrows: int = 1, ncols: int = 1, *, squeeze: bool = True, **_others: Any) -> Any:
         """Return the given axes in the requested shape; their shared axes and heights stay."""
@@ -203,7 +210,8 @@ class _GivenAxes(Figure):
         """Put the legend above the first panel."""
         options |= {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
         first = self._given[0]
-        return first.legend(*(entries or first.get_legend_handles_labels()), **options)
+        named = entries or "handles" in options
+        return first.legend(*(entries if named else first.get_legend_handles_labels()), **options)
 
     def suptitle(self, t: str, **options: Any) -> Any:
         """Leave the title to the owner of the figure."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -66,7 +66,7 @@ class Diagram(Study[str]):
     def __post_init__(self) -> None:
         second = (self.second, *(self.second_range or (None, None)), self.second_values)
         self.axes = axes_of(self.scene, (self.parameter, self.start, self.stop, self.values), second)
-        self.scene = _within(self.scene.unswept([axis.key for axis in self.axes]), self.axes)
+        self.scene = _within(self.scene.unswept([axis.key for axis in self.axes]), self.axes[1:])
         self.names = _chosen(self.parts, OF_TWO if len(self.axes) > 1 else OF_ONE)
         self.studies = {name: self._study_of(name) for name in self.names if name != "exponents"}
         self.refused: dict[str, str] = {}
@@ -202,9 +202,10 @@ def _chosen(given: Sequence[str] | None, known: Sequence[str]) -> list[str]:
     return [name for name in known if name in names]
 
 
-def _within(scene: Scene, axes: Sequence[Axis]) -> Scene:
-    """Return a scene whose varied numbers lie in their ranges, moved to the middle where they do not."""
-    outside = {
-        axis.key: axis.middle for axis in axes if not axis.low <= float(scene.value(axis.key)) <= axis.high
-    }
-    return scene.with_values(outside) if outside else scene
+def _within(scene: Scene, second: Sequence[Axis]) -> Scene:
+    """Return a scene whose second number, if there is one, lies in its range: in the middle if it lay outside."""
+    for axis in second:
+        with suppress(UsageError):  # a key that the scene does not have is refused by its sweep
+            if not axis.low <= float(scene.value(axis.key)) <= axis.high:
+                return scene.with_values({axis.key: axis.middle})
+    return scene

@@ -138,7 +138,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    if figure.legends:
+    if on_classes:
         _name_loci_beside_classes(figure, panels[0])
     else:
         legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
@@ -147,7 +147,8 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
 
 def _name_loci_beside_classes(figure: Figure, panel: Axes) -> None:
     """Name loci and classes in one legend, for which the page becomes longer."""
-    legend = figure.legends[0]
+    legend = figure.legends[0] if figure.legends else panel.get_legend()  # of a figure, or of given axes
+    assert legend is not None
     legend.remove()
     handles = [*legend.legend_handles, *panel.get_legend_handles_labels()[0]]
     rows = math.ceil(len(handles) / 3)

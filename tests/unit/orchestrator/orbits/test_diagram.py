@@ -165,7 +165,7 @@ def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
         ((), {}, "expected a sweep of one or two keys, or a range, got neither"),
         (("forcing.frequencyy", 1.0, 2.0), {}, "expected a numeric key"),
         (("body.kind", 1.0, 2.0), {}, "expected a numeric key"),
-        (("stop[2].position", 1.0, 2.0), {}, "expected a number of this scene"),
+        (("stop[2].position", 1.0, 2.0), {}, "expected a numeric key of this scene"),
         ((FREQUENCY, -1.0, 2.0), {}, "expected a number >= 0"),
         (RANGE, {"values": 1}, "expected 2 to 1000000 values, got 1"),
         (RANGE, {"points": 1}, "points: expected 2 at least"),
@@ -222,6 +222,9 @@ def test_loci_lie_on_a_map_of_classes_over_two_numbers(
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"P(1,1)", "period doubling"} <= set(words)
     assert len(figure.legends) == 1
+    axis = Figure().subplots()
+    vi.figures.draw_into(axis, found)
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == words
 
 
 def test_a_second_number_outside_its_range_moves_to_the_middle(scene: vi.Scene) -> None:
