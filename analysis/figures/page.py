@@ -6,7 +6,7 @@ import io
 import os
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -180,16 +180,14 @@ class Page(Figure):
 class _GivenAxes(Figure):
     """Replaces the figure of a drawing whose panels are axes of another program's figure."""
 
-    _given: Sequence[Axes] = ()  # empty while the base class makes its figure, in which it clears all axes
-
     def __init__(self, axes: list[Axes]) -> None:
         super().__init__()
         self._given = axes
 
     @property
-    def axes(self) -> list[Axes]:
+    def given(self) -> list[Axes]:
         """The given axes."""
-        return list(self._given)
+        return self._given
 
     def subplots(self, nrows: int = 1, ncols: int = 1, *, squeeze: bool = True, **_others: Any) -> Any:
         """Return the given axes in the requested shape; their shared axes and heights stay."""
@@ -219,6 +217,11 @@ class _GivenAxes(Figure):
 
     def align_ylabels(self, axs: Any = None) -> None:
         """Leave the labels where they are."""
+
+
+def axes_of(figure: Figure) -> list[Axes]:
+    """Return the axes of a figure, or the given axes that replace it, see `drawing_into`."""
+    return figure.given if isinstance(figure, _GivenAxes) else figure.axes
 
 
 def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
-from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside, unit_symbol
+from vibroimpact.analysis.figures.page import MARK, axes_of, canvas, label, legend_outside, unit_symbol
 from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.sweep.classes import draw_classes
 from vibroimpact.analysis.figures.sweep.diagrams import (
@@ -115,7 +115,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
             raise DatasetError(wrong_sweep(f"a map of {' and '.join(names)} below", over))
         figure = draw_classes(over) if CLASS_KIND in over else draw_map(over)
         x, y = in_order_of_the_scene(over, varied(over))
-        panels = [axis for axis in figure.axes if axis.get_ylabel() == label(over[y])]
+        panels = [axis for axis in axes_of(figure) if axis.get_ylabel() == label(over[y])]
     else:
         figure = canvas(75)
         panels = [figure.subplots()]

@@ -224,7 +224,9 @@ def test_loci_lie_on_a_map_of_classes_over_two_numbers(
     assert len(figure.legends) == 1
     axis = Figure().subplots()
     vi.figures.draw_into(axis, found)
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == words
+    legend = axis.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == words
 
 
 def test_a_second_number_outside_its_range_moves_to_the_middle(scene: vi.Scene) -> None:
