@@ -57,6 +57,8 @@ class Diagram(Study[str]):
     parts: Sequence[str] | None = None
     points: int = 60
     share_values: int = 41
+    impacts: int | None = None
+    periods: int = 1
     doublings: int = 1
     grazes: int = 1
     second: str | None = None
@@ -83,6 +85,8 @@ class Diagram(Study[str]):
             parts=None if options.parts is None else options.parts.split(","),
             points=options.points,
             share_values=options.share_values,
+            impacts=options.impacts,
+            periods=options.periods,
             doublings=options.doublings,
             grazes=options.grazes,
             second=options.second,
@@ -130,12 +134,13 @@ class Diagram(Study[str]):
         if part == "shares":
             plane = Plane(points=(self.points, self.points))
             return BasinShares(self.scene, plane, axis.key, (axis.low, axis.high), self.share_values)
-        for name in ("doublings", "grazes"):
-            if getattr(self, name) < 0:
-                raise UsageError(f"--{name}: expected 0 or more, got {getattr(self, name)}.")
+        for name, least in (("impacts", 1), ("periods", 1), ("doublings", 0), ("grazes", 0)):
+            given = getattr(self, name)
+            if given is not None and given < least:
+                raise UsageError(f"--{name}: expected {least} or more, got {given}.")
         second = self.axes[1] if part == "loci" else None
         return Following(
-            *(self.scene, axis.key, axis.low, axis.high),
+            *(self.scene, axis.key, axis.low, axis.high, self.impacts, self.periods),
             doublings=self.doublings,
             grazes=self.grazes,
             second=None if second is None else second.key,

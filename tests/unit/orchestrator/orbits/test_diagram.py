@@ -21,7 +21,8 @@ from vibroimpact.orchestrator.orbits.diagram import Diagram
 
 FREQUENCY, POSITION = "forcing.angular_frequency", "stop[1].position"
 RANGE = (FREQUENCY, 0.9, 1.4)
-FEW: dict[str, Any] = {"values": 6, "points": 4, "share_values": 2, "doublings": 0, "grazes": 0}
+ALONE: dict[str, Any] = {"impacts": 1, "doublings": 0, "grazes": 0}
+FEW: dict[str, Any] = {"values": 6, "points": 4, "share_values": 2, **ALONE}
 YIELDING = FORCED.replace("restitution = 0.7", 'law = "kelvin_voigt"\nstiffness = 1000.0')
 
 
@@ -44,7 +45,7 @@ def _same(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 def test_branches_are_those_of_follow(found: xr.Dataset, scene: vi.Scene) -> None:
-    _same(found.vibroimpact.part("branches"), vi.follow(scene, *RANGE, doublings=0, grazes=0))
+    _same(found.vibroimpact.part("branches"), vi.follow(scene, *RANGE, **ALONE))
 
 
 def test_shares_are_those_of_basins(found: xr.Dataset, scene: vi.Scene) -> None:
@@ -170,6 +171,7 @@ def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
         (RANGE, {"values": 1}, "expected 2 to 1000000 values, got 1"),
         (RANGE, {"points": 1}, "points: expected 2 at least"),
         (RANGE, {"share_values": 1}, "values: expected 2 to 10000, got 1"),
+        (RANGE, {"impacts": 0}, "--impacts: expected 1 or more, got 0"),
         (RANGE, {"grazes": -1}, "--grazes: expected 0 or more, got -1"),
         (
             RANGE,
@@ -213,7 +215,7 @@ def test_loci_lie_on_a_map_of_classes_over_two_numbers(
 ) -> None:
     monkeypatch.setattr(loci_of_scenes, "SECOND_VALUES", 1)  # branches at few further values take less time
     given: dict[str, Any] = {"values": 5, "second": POSITION, "second_range": (0.9, 1.1), "second_values": 3}
-    found = vi.diagram(scene, FREQUENCY, 0.9, 1.0, doublings=0, grazes=0, **given)
+    found = vi.diagram(scene, FREQUENCY, 0.9, 1.0, **ALONE, **given)
     sweep, loci = (found.vibroimpact.part(part) for part in ("sweep", "loci"))
     assert sweep.class_kind.sizes == {"angular_frequency": 5, "position": 3}
     doubled = loci.vibroimpact.runs.orbit_special.values
