@@ -174,6 +174,8 @@ def diagram(
     parts: Sequence[str] | None = None,
     points: int = 60,
     share_values: int = 41,
+    impacts: int | None = None,
+    periods: int = 1,
     doublings: int = 1,
     grazes: int = 1,
     second: str | None = None,
@@ -201,7 +203,7 @@ def diagram(
         Starts along both axes of the planes in which basins are found.
     share_values : int
         Number of values at which shares are found.
-    doublings, grazes : int
+    impacts, periods, doublings, grazes : int
         See `follow`.
     second, second_range, second_values : optional
         Key, ends and number of values (81) of a second parameter.
@@ -232,6 +234,8 @@ def diagram(
         parts=parts,
         points=points,
         share_values=share_values,
+        impacts=impacts,
+        periods=periods,
         doublings=doublings,
         grazes=grazes,
         second=second,

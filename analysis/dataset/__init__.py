@@ -1,8 +1,10 @@
 """The door to the dataset: its schema, its writers and its readers.
 
 `schema` holds the table of names, dimensions, units and meanings; `checking` checks datasets against it.
+`results` has the datasets of analyses, `composed` several datasets in one.
 `naming` has the sampled variables and the names of quantities in files, `derived` the quantities of maps.
 `writing` builds and writes, `merging` joins parts in memory and `joining` on the disk, `reading` opens.
+
 `stores` holds the same for Zarr stores, and the conversion of either form into the other.
 `accessor` is `ds.vibroimpact`, which `registering` adds to xarray; `backend` is its engine. Everything public is
 importable from here.

@@ -184,6 +184,11 @@ class _GivenAxes(Figure):
         super().__init__()
         self._given = axes
 
+    @property
+    def given(self) -> list[Axes]:
+        """The given axes."""
+        return self._given
+
     def subplots(self, nrows: int = 1, ncols: int = 1, *, squeeze: bool = True, **_others: Any) -> Any:
         """Return the given axes in the requested shape; their shared axes and heights stay."""
         if len(self._given) != nrows * ncols:
@@ -203,7 +208,8 @@ class _GivenAxes(Figure):
         """Put the legend above the first panel."""
         options |= {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
         first = self._given[0]
-        return first.legend(*(entries or first.get_legend_handles_labels()), **options)
+        named = entries or "handles" in options
+        return first.legend(*(entries if named else first.get_legend_handles_labels()), **options)
 
     def suptitle(self, t: str, **options: Any) -> Any:
         """Leave the title to the owner of the figure."""
@@ -211,6 +217,11 @@ class _GivenAxes(Figure):
 
     def align_ylabels(self, axs: Any = None) -> None:
         """Leave the labels where they are."""
+
+
+def axes_of(figure: Figure) -> list[Axes]:
+    """Return the axes of a figure, or the given axes that replace it, see `drawing_into`."""
+    return figure.given if isinstance(figure, _GivenAxes) else figure.axes
 
 
 def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:

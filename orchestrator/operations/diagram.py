@@ -43,6 +43,8 @@ class MakeDiagram(Operation):
     share_values: Annotated[int, Option(help="Number of values at which the shares of basins are found.")] = (
         41
     )
+    impacts: Annotated[int | None, Option(help="Impacts of the first orbits that are followed (1).")] = None
+    periods: Annotated[int, Option(help="Forcing periods of the first orbits that are followed.")] = 1
     doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
     grazes: Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")] = 1
     second: Annotated[str | None, Option(metavar="KEY", help="Second varied number of the scene.")] = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -57,6 +57,8 @@ class Diagram(Study[str]):
     parts: Sequence[str] | None = None
     points: int = 60
     share_values: int = 41
+    impacts: int | None = None
+    periods: int = 1
     doublings: int = 1
     grazes: int = 1
     second: str | None = None
@@ -66,7 +68,7 @@ class Diagram(Study[str]):
     def __post_init__(self) -> None:
         second = (self.second, *(self.second_range or (None, None)), self.second_values)
         self.axes = axes_of(self.scene, (self.parameter, self.start, self.stop, self.values), second)
-        self.scene = _within(self.scene.unswept([axis.key for axis in self.axes]), self.axes)
+        self.scene = _within(self.scene.unswept([axis.key for axis in self.axes]), self.axes[1:])
         self.names = _chosen(self.parts, OF_TWO if len(self.axes) > 1 else OF_ONE)
         self.studies = {name: self._study_of(name) for name in self.names if name != "exponents"}
         self.refused: dict[str, str] = {}
@@ -83,6 +85,8 @@ class Diagram(Study[str]):
             parts=None if options.parts is None else options.parts.split(","),
             points=options.points,
             share_values=options.share_values,
+            impacts=options.impacts,
+            periods=options.periods,
             doublings=options.doublings,
             grazes=options.grazes,
             second=options.second,
@@ -130,12 +134,13 @@ class Diagram(Study[str]):
         if part == "shares":
             plane = Plane(points=(self.points, self.points))
             return BasinShares(self.scene, plane, axis.key, (axis.low, axis.high), self.share_values)
-        for name in ("doublings", "grazes"):
-            if getattr(self, name) < 0:
-                raise UsageError(f"--{name}: expected 0 or more, got {getattr(self, name)}.")
+        for name, least in (("impacts", 1), ("periods", 1), ("doublings", 0), ("grazes", 0)):
+            given = getattr(self, name)
+            if given is not None and given < least:
+                raise UsageError(f"--{name}: expected {least} or more, got {given}.")
         second = self.axes[1] if part == "loci" else None
         return Following(
-            *(self.scene, axis.key, axis.low, axis.high),
+            *(self.scene, axis.key, axis.low, axis.high, self.impacts, self.periods),
             doublings=self.doublings,
             grazes=self.grazes,
             second=None if second is None else second.key,
@@ -202,9 +207,10 @@ def _chosen(given: Sequence[str] | None, known: Sequence[str]) -> list[str]:
     return [name for name in known if name in names]
 
 
-def _within(scene: Scene, axes: Sequence[Axis]) -> Scene:
-    """Return a scene whose varied numbers lie in their ranges, moved to the middle where they do not."""
-    outside = {
-        axis.key: axis.middle for axis in axes if not axis.low <= float(scene.value(axis.key)) <= axis.high
-    }
-    return scene.with_values(outside) if outside else scene
+def _within(scene: Scene, second: Sequence[Axis]) -> Scene:
+    """Return a scene whose second number, if there is one, lies in its range: in the middle if it lay outside."""
+    for axis in second:
+        with suppress(UsageError):  # a key that the scene does not have is refused by its sweep
+            if not axis.low <= float(scene.value(axis.key)) <= axis.high:
+                return scene.with_values({axis.key: axis.middle})
+    return scene

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from vibroimpact.analysis.dataset.reading import opened_in_memory
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.orbits.classify import ClassesOfDataset, with_classes
 from vibroimpact.analysis.study import Study, whole
-from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.run.progress import Progress
@@ -131,7 +132,7 @@ class _StatusProgress(Progress):
 
 @dataclass(eq=False)
 class SweptRuns(Study[xr.Dataset]):
-    """Runs of a body over one axis up and down; over two, and of components, from the start. The only row has all."""
+    """Runs of a scene over one axis, up and down where states are carried, or over two. The only row has all runs."""
 
     name = "sweep"
     nothing = "a run"
@@ -141,13 +142,7 @@ class SweptRuns(Study[xr.Dataset]):
     recorded_periods: int = CLASSIFIED_PERIODS
 
     def __post_init__(self) -> None:
-        goes_both_ways = len(self.axes) == 1 and self.scene.is_one_body
-        path = {"path": "up-down"} if goes_both_ways else {}
-        sweep = {
-            axis.key: {"start": axis.low, "stop": axis.high, "points": axis.values, **path}
-            for axis in self.axes
-        }
-        self.scene = _recording(self.scene, self.recorded_periods).with_sweep(sweep)
+        self.scene = _swept(_recording(self.scene, self.recorded_periods), self.axes)
 
     @classmethod
     def prepare(cls, options: Any, stack: Any) -> None:
@@ -180,6 +175,17 @@ class SweptRuns(Study[xr.Dataset]):
             say(f"No classes of the runs: {self.unclassified}")
         else:
             self.classes.print_results()
+
+
+def _swept(scene: Scene, axes: Sequence[Axis]) -> Scene:
+    """Return a scene that sweeps one axis both ways, if it can carry states along it, or one or two from its start."""
+    sweep: dict[str, dict[str, Any]] = {
+        axis.key: {"start": axis.low, "stop": axis.high, "points": axis.values} for axis in axes
+    }
+    if len(axes) == 1:
+        with suppress(SceneError):  # components, and numbers that change the modes of a structure
+            return scene.with_sweep({key: axis | {"path": "up-down"} for key, axis in sweep.items()})
+    return scene.with_sweep(sweep)
 
 
 def _recording(scene: Scene, periods: int) -> Scene:

@@ -77,6 +77,7 @@ COMMANDS = {
     ),
     **{
         f"diagram {BIFURCATION} --set forcing.amplitude={amplitude} {FREQUENCY} {span} --parts sweep,branches "
+        "--impacts 1 "
         f"{alone}--figure figure_3_{name}.png": Shown(says, is_long=name != "11a")
         for name, amplitude, span, alone, says in (
             ("11a", "0.565", "--from 0.66 --to 0.665", "", ("0.66249338975", "0.66214571411")),
@@ -130,7 +131,7 @@ COMMANDS = {
         ("0.93649312074", "526 runs have exponents, of 15 the largest is positive."), is_long=True
     ),
     f"diagram {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second forcing.amplitude --second-from 0.02 "
-    "--second-to 0.8 --doublings 0 --grazes 0 --figure diagram_map.png": Shown(
+    "--second-to 0.8 --impacts 1 --doublings 0 --grazes 0 --figure diagram_map.png": Shown(
         ("fold: 0.66583281185, 0.56063456", "P(1,1)"), is_long=True
     ),
     f"control {BIFURCATION} --from 1 --to 0.7 -o kept.nc --keep parts": Shown(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
-from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside, unit_symbol
+from vibroimpact.analysis.figures.page import MARK, axes_of, canvas, label, legend_outside, unit_symbol
 from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.sweep.classes import draw_classes
 from vibroimpact.analysis.figures.sweep.diagrams import (
@@ -124,7 +124,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
             raise DatasetError(wrong_sweep(f"a map of {' and '.join(names)} below", over))
         figure = draw_classes(over) if CLASS_KIND in over else draw_map(over)
         x, y = in_order_of_the_scene(over, varied(over))
-        panels = [axis for axis in figure.axes if axis.get_ylabel() == label(over[y])]
+        panels = [axis for axis in axes_of(figure) if axis.get_ylabel() == label(over[y])]
     else:
         figure = canvas(75)
         panels = [figure.subplots()]
@@ -147,7 +147,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
         panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
-    if figure.legends:
+    if on_classes:
         _name_loci_beside_classes(figure, panels[0])
     else:
         legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
@@ -156,7 +156,8 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
 
 def _name_loci_beside_classes(figure: Figure, panel: Axes) -> None:
     """Name loci and classes in one legend, for which the page becomes longer."""
-    legend = figure.legends[0]
+    legend = figure.legends[0] if figure.legends else panel.get_legend()  # of a figure, or of given axes
+    assert legend is not None
     legend.remove()
     handles = [*legend.legend_handles, *panel.get_legend_handles_labels()[0]]
     rows = math.ceil(len(handles) / 3)

@@ -15,12 +15,14 @@ from support.scenes import FORCED
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_measured
 from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
+from vibroimpact.orchestrator.orbits import loci as loci_of_scenes
 from vibroimpact.orchestrator.orbits import swept_runs
 from vibroimpact.orchestrator.orbits.diagram import Diagram
 
 FREQUENCY, POSITION = "forcing.angular_frequency", "stop[1].position"
 RANGE = (FREQUENCY, 0.9, 1.4)
-FEW: dict[str, Any] = {"values": 6, "points": 4, "share_values": 2, "doublings": 0, "grazes": 0}
+ALONE: dict[str, Any] = {"impacts": 1, "doublings": 0, "grazes": 0}
+FEW: dict[str, Any] = {"values": 6, "points": 4, "share_values": 2, **ALONE}
 YIELDING = FORCED.replace("restitution = 0.7", 'law = "kelvin_voigt"\nstiffness = 1000.0')
 
 
@@ -43,7 +45,7 @@ def _same(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 def test_branches_are_those_of_follow(found: xr.Dataset, scene: vi.Scene) -> None:
-    _same(found.vibroimpact.part("branches"), vi.follow(scene, *RANGE, doublings=0, grazes=0))
+    _same(found.vibroimpact.part("branches"), vi.follow(scene, *RANGE, **ALONE))
 
 
 def test_shares_are_those_of_basins(found: xr.Dataset, scene: vi.Scene) -> None:
@@ -96,14 +98,13 @@ def test_a_panel_has_branches_over_runs_and_names_special_points(found: xr.Datas
     assert len(set(limits)) == 1
 
 
-@pytest.mark.parametrize("parts", [["sweep"], ["shares"], ["branches", "shares"]])
+@pytest.mark.parametrize("parts", [["sweep"], ["shares"]])
 def test_only_the_parts_that_are_named_are_made_and_drawn(
     parts: list[str], scene: vi.Scene, found: xr.Dataset
 ) -> None:
     few = vi.diagram(scene, *RANGE, **FEW, parts=parts)
     assert str(few.attrs["parts"]).split() == parts
-    panels = 2 if parts[0] != "shares" else 0
-    assert len(vi.draw(few).axes) == panels + ("shares" in parts)
+    assert len(vi.draw(few).axes) == (2 if parts == ["sweep"] else 1)
     with pytest.raises(DatasetError, match="part: expected one of those there are"):
         few.vibroimpact.part("exponents")
 
@@ -133,6 +134,13 @@ def test_parts_that_a_stop_that_yields_cannot_have_are_named(tmp_path: Path) -> 
         assert f"No {part}: {reason}" in done.stdout
 
 
+def test_a_body_that_becomes_a_structure_is_swept_from_its_start(scene: vi.Scene) -> None:
+    found = vi.diagram(scene, "body.damping", -0.1, 0.1, values=3, parts=["sweep"])  # negative: a structure
+    sweep = found.vibroimpact.part("sweep")
+    assert sweep.outcome.dims == ("damping",)
+    assert vi.draw(found).axes[0].get_legend_handles_labels()[1] == ["runs"]
+
+
 def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
     chirp = FORCED.replace("[forcing]", "[[forcing]]").replace(
         "angular_frequency = 0.8", 'signal = "constant"'
@@ -158,11 +166,12 @@ def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
         ((), {}, "expected a sweep of one or two keys, or a range, got neither"),
         (("forcing.frequencyy", 1.0, 2.0), {}, "expected a numeric key"),
         (("body.kind", 1.0, 2.0), {}, "expected a numeric key"),
-        (("stop[2].position", 1.0, 2.0), {}, "expected a number of this scene"),
+        (("stop[2].position", 1.0, 2.0), {}, "expected a numeric key of this scene"),
         ((FREQUENCY, -1.0, 2.0), {}, "expected a number >= 0"),
         (RANGE, {"values": 1}, "expected 2 to 1000000 values, got 1"),
         (RANGE, {"points": 1}, "points: expected 2 at least"),
         (RANGE, {"share_values": 1}, "values: expected 2 to 10000, got 1"),
+        (RANGE, {"impacts": 0}, "--impacts: expected 1 or more, got 0"),
         (RANGE, {"grazes": -1}, "--grazes: expected 0 or more, got -1"),
         (
             RANGE,
@@ -201,9 +210,12 @@ def test_ctrl_c_in_a_part_leaves_the_parts_before_it_and_what_that_part_has(scen
     assert isinstance(vi.draw(found), Figure)
 
 
-def test_loci_lie_on_a_map_of_classes_over_two_numbers(scene: vi.Scene) -> None:
-    given = {"values": 5, "second": POSITION, "second_range": (0.9, 1.1), "second_values": 3}
-    found = vi.diagram(scene, FREQUENCY, 0.9, 1.0, doublings=0, grazes=0, **given)
+def test_loci_lie_on_a_map_of_classes_over_two_numbers(
+    scene: vi.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loci_of_scenes, "SECOND_VALUES", 1)  # branches at few further values take less time
+    given: dict[str, Any] = {"values": 5, "second": POSITION, "second_range": (0.9, 1.1), "second_values": 3}
+    found = vi.diagram(scene, FREQUENCY, 0.9, 1.0, **ALONE, **given)
     sweep, loci = (found.vibroimpact.part(part) for part in ("sweep", "loci"))
     assert sweep.class_kind.sizes == {"angular_frequency": 5, "position": 3}
     doubled = loci.vibroimpact.runs.orbit_special.values
@@ -212,6 +224,11 @@ def test_loci_lie_on_a_map_of_classes_over_two_numbers(scene: vi.Scene) -> None:
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"P(1,1)", "period doubling"} <= set(words)
     assert len(figure.legends) == 1
+    axis = Figure().subplots()
+    vi.figures.draw_into(axis, found)
+    legend = axis.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == words
 
 
 def test_a_second_number_outside_its_range_moves_to_the_middle(scene: vi.Scene) -> None:
