@@ -145,7 +145,7 @@ def test_a_scene_that_can_have_none_of_the_parts_is_an_error() -> None:
     chirp = FORCED.replace("[forcing]", "[[forcing]]").replace(
         "angular_frequency = 0.8", 'signal = "constant"'
     )
-    with pytest.raises(UsageError, match="orbits|force|forcing"):
+    with pytest.raises(UsageError, match=r"orbits|force|forcing"):
         vi.diagram(
             vi.Scene.from_text(
                 chirp.replace("transient_periods = 10\nrecorded_periods = 5", "recorded_time = 5.0")
