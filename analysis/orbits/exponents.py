@@ -114,9 +114,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     means = sums / np.diff(edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
     shrinking = body.shrinking(impacts.contacts[first:], impacts.velocities[first:])
-    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * float(
-        (body.damping_ratios * body.frequencies).sum()
-    )
+    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * body.decay
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
     if not off <= SUM_RULE:
         raise ExponentError(

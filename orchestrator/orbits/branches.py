@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -118,6 +119,8 @@ def follow_branches(
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
     starts = first_orbits(body_at, scene, parameter, settings, impacts, periods, seed, looking)
+    if scene.period is None and impacts is None and seed is None:  # few bodies without a force have P(1,1)
+        starts = itertools.chain(starts, _ends_of_runs(scene, parameter, settings))
     for value, orbit in starts:
         if not _is_known(followed.branches, orbit, value, settings):
             yield from _both_ways(follower, orbit, value, followed)
@@ -170,7 +173,7 @@ def _ends_of_runs(
     with long_runs(scene) as impacts_at:
         for value in seed_values(settings):
             try:
-                body = impacting_body(scene.with_values({parameter: value}))
+                body = impacting_body(scene.with_values({parameter: value}), unforced=True)
             except SceneError:
                 continue  # the scene has no run there
             orbit = orbit_of_impacts(body, impacts_at({parameter: value}))
@@ -262,7 +265,9 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
             kept[value] = body_along(scene, {parameter: value})
         return kept[value]
 
-    impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
+    impacting_body(
+        scene.at({parameter: value}), unforced=True
+    )  # a wrong key is refused before any orbit is followed
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
@@ -274,7 +279,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
-        return impacting_body(scene.at(values))
+        return impacting_body(scene.at(values), unforced=True)
     except UsageError as problem:
         raise OrbitError(str(problem)) from problem
 
@@ -289,19 +294,19 @@ def _is_on_branch(
     branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings
 ) -> bool:
     """Return whether an orbit is on a branch, counted from any of its impacts and periods."""
-    whole = 2.0 * np.pi * orbit.periods
     for branch in branches:
         alike = branch.orbits[0].orbit
         if alike.periods != orbit.periods or alike.phases.size != orbit.phases.size:
             continue
         off = ((branch.values - value) / settings.span)[:, None]
-        rows = np.array([each.orbit.phases for each in branch.orbits])
+        rows = np.array([each.orbit.unknowns for each in branch.orbits])
         steps = np.diff(np.hstack([rows, off]), axis=0)
         for first in range(orbit.phases.size):
             if (np.roll(orbit.contacts, -first) != alike.contacts).any():
                 continue
-            apart = rows - np.append(orbit.phases[first:], orbit.phases[:first] + whole)
-            apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
+            apart = rows - orbit.counted_from(first).unknowns
+            if not orbit.body.has_own_period:
+                apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
             if _off_path(np.hstack([apart, off]), steps) < SAME_ORBIT:
                 return True
     return False

@@ -15,6 +15,7 @@ from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
+from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
 from vibroimpact.analysis.study import Study, whole
@@ -25,7 +26,7 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.bodies import impacting_body, refuse_without_energy
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.running.kept import opened_scene as kept_scene
@@ -37,6 +38,8 @@ LONGEST = 16
 """Most forcing periods of an orbit on which a run may end."""
 TRANSIENT = 2000
 """Forcing periods of a run before its orbit is read."""
+RECORDED_TURNS = 100
+"""Turns of the slowest mode that are recorded without a force."""
 LARGEST_PHASE = 1e6
 """Largest phase of a seed, rad; a larger phase has lost digits within its turn."""
 REPEATS = 1e-4
@@ -76,7 +79,8 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
         """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
-        body, counts = impacting_body(self.scene), (self.impacts, self.periods)
+        body, counts = impacting_body(self.scene, unforced=True), (self.impacts, self.periods)
+        refuse_without_energy(self.scene, body)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
             return
@@ -115,9 +119,10 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def print_results(self) -> None:
         """Print a row for each orbit."""
+        own = self.scene.period is None
         rows = table(
             f"Periodic orbits: {self.scene.title or self.scene.source}",
-            *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
+            *("<orbit", "<", *((">period",) if own else ()), "<phases, rad", "<stops", "<impact velocities"),
             *("<largest multipliers", ">determinant, off by", ">nearest maximum"),
             rows=map(_row, self.found),
         )
@@ -125,6 +130,9 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             wide_terminal().print(rows)
         many = counted(len(self._physical), "physical orbit")
         say(f"{many}." if self._physical else f"No physical orbit {self._called}.")
+        if own and self.found:
+            off = max(abs(orbit.multiplier_of_motion - 1.0) for orbit in self.found)
+            say(f"Each orbit has one more multiplier, 1, of the motion along itself; found to {off:.0e}.")
 
     @property
     def _called(self) -> str:
@@ -154,6 +162,11 @@ def find_orbits(
 
 
 def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
+    if body.has_own_period:
+        raise UsageError(
+            "orbit: seed: expected none of a body without a force, whose phases have no force to count from, got one. "
+            "Give the number of impacts, or a start that leads to the orbit."
+        )
     if impacts not in (None, len(seed)):
         raise UsageError(
             f"orbit: seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
@@ -176,21 +189,25 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
 @contextmanager
 def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats | None]]:
     """Yield a function that runs a scene long at values of its keys, and returns its last impacts (`RunRecord`)."""
-    long = scene.with_values(
-        {
-            "record.transient_periods": TRANSIENT,
-            "record.recorded_periods": 2 * LONGEST,
-            "record.impacts": True,
-        }
-    )
+    long = scene.with_values({**_long_record(scene), "record.impacts": True})
     with kept_scene(long) as opened:
         yield lambda values: opened.runner.run(values).impacts
+
+
+def _long_record(scene: Scene) -> dict[str, float]:
+    """Return the keys of a long record: of forcing periods, or of turns of the slowest mode without a force."""
+    names = ("record.transient_periods", "record.recorded_periods")
+    if scene.period is not None:
+        return dict(zip(names, (TRANSIENT, 2 * LONGEST), strict=True))
+    turn = 2.0 * np.pi / impacting_body(scene, unforced=True).slowest
+    names = ("record.transient_time", "record.recorded_time")
+    return dict(zip(names, (TRANSIENT * turn, RECORDED_TURNS * turn), strict=True))
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as impacts_at:
-        return orbit_of_impacts(impacting_body(scene), impacts_at({}))
+        return orbit_of_impacts(impacting_body(scene, unforced=True), impacts_at({}))
 
 
 def orbit_of_impacts(
@@ -199,6 +216,8 @@ def orbit_of_impacts(
     """Return the orbit of the last impacts of a run; None unless it has few periods."""
     if rows is None or not len(rows):
         return None
+    if body.has_own_period:
+        return own_orbit_of_impacts(body, rows[:, 0], rows[:, 2], rows[:, 4].astype(int) - 1, REPEATS)
     turns = np.floor(
         (rows[:, 0] - rows[0, 0] + (rows[0, 1] - rows[:, 1]) / body.angular_frequency) / body.period + 0.5
     )
@@ -223,6 +242,7 @@ def _row(orbit: PeriodicOrbit) -> tuple[str, ...]:
     return (
         orbit.name,
         "stable" if orbit.is_stable else "unstable",
+        *([f"{orbit.period:.10g}"] if orbit.body.has_own_period else []),
         ", ".join(f"{phase:.10g}" for phase in orbit.phases),
         ", ".join(str(contact + 1) for contact in orbit.contacts),
         ", ".join(f"{speed:.10g}" for speed in orbit.velocities),

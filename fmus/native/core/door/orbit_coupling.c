@@ -30,14 +30,24 @@ static bool fill_body(int modes, const double natural[], const double coupling[]
     body->coupled = 1;
     bool good = true;
     for (int j = 0; j < modes; ++j) {
-        body->square[j] = natural[j] * natural[j];
-        good = good && natural[j] > 0.0 && isfinite(body->square[j]);
+        body->square[j] = natural[j] * fabs(natural[j]);
+        good = good && natural[j] != 0.0 && isfinite(body->square[j]);
         for (int i = 0; i < modes; ++i) {
             body->coupling[j][i] = 0.5 * (coupling[j * modes + i] + coupling[i * modes + j]);
             good = good && isfinite(body->coupling[j][i]);
         }
     }
     return good;
+}
+
+/* Is a mode's stiffness negative? Series follow such a body: its terms need the root of each stiffness. */
+static bool has_negative_spring(const vi_pressed_body *body)
+{
+    bool found = false;
+    for (int j = 0; j < body->modes; ++j) {
+        found = found || body->square[j] < 0.0;
+    }
+    return found;
 }
 
 static double fastest_rate(const vi_pressed_body *body)
@@ -48,7 +58,7 @@ static double fastest_rate(const vi_pressed_body *body)
         for (int i = 0; i < body->modes; ++i) {
             row += fabs(body->coupling[j][i]);
         }
-        natural = fmax(natural, sqrt(body->square[j]));
+        natural = fmax(natural, sqrt(fabs(body->square[j])));
         drag = fmax(drag, row);
     }
     return natural + drag;
@@ -62,7 +72,7 @@ VI_DOOR int vi_door_orbit_couple(int modes, int harmonics, const double angular_
         || !fill_body(modes, natural, coupling, &found->body)) {
         return 1;
     }
-    if (!vi_coupled_modes_find(&found->terms, &found->body, work)
+    if (has_negative_spring(&found->body) || !vi_coupled_modes_find(&found->terms, &found->body, work)
         || (modes <= MANY_MODES && vi_coupled_modes_size(&found->terms, &found->body) > LARGEST_VECTOR)) {
         found->terms.terms = 0;
     }
@@ -153,10 +163,10 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     double left[VI_STATES][VI_STATES]; /* 1 - Phi(length), in (w x, v) */
     for (int c = 0; c < 2 * modes; ++c) {
         double moved[VI_STATES] = {0.0};
-        moved[c] = c < modes ? 1.0 / sqrt(coupling->body.square[c]) : 1.0;
+        moved[c] = c < modes ? 1.0 / sqrt(fabs(coupling->body.square[c])) : 1.0;
         vi_orbit_series(coupling, length, moved, moved + modes);
         for (int j = 0; j < modes; ++j) {
-            left[j][c] = (j == c ? 1.0 : 0.0) - sqrt(coupling->body.square[j]) * moved[j];
+            left[j][c] = (j == c ? 1.0 : 0.0) - sqrt(fabs(coupling->body.square[j])) * moved[j];
             left[modes + j][c] = (modes + j == c ? 1.0 : 0.0) - moved[modes + j];
         }
     }
@@ -169,7 +179,7 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     }
     for (int k = 0; k < contacts; ++k) {
         for (int j = 0; j < modes; ++j) {
-            state[k][j] /= sqrt(coupling->body.square[j]);
+            state[k][j] /= sqrt(fabs(coupling->body.square[j]));
         }
     }
     return true;

@@ -37,9 +37,8 @@ static bool is_body(const vi_orbit_body *body)
                && is_finite(body->contacts, body->stop_sine + (ptrdiff_t)k * body->contacts);
     }
     for (int j = 0; good && j < body->modes; ++j) {
-        good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
-               && isfinite(body->damping_ratio[j] + body->held[j])
-               && (body->natural[j] > 0.0
+        good = isfinite(body->natural[j]) && isfinite(body->damping_ratio[j] + body->held[j])
+               && (body->natural[j] != 0.0
                    || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
@@ -77,7 +76,7 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
     }
     /* an undamped mode after whole turns: only rounding is left of 1 - Phi */
     const double rounding = 4.0 * DBL_EPSILON * (1.0 + mode->natural * length);
-    if (!(whole > rounding * rounding)) {
+    if (!(fabs(whole) > rounding * rounding)) { /* negative where one of two rates grows */
         return false;
     }
     start[0] = phi[1] / whole;
@@ -117,7 +116,8 @@ static bool find_steady(vi_orbit_response *response, int j)
         } else {
             const double w = body->order[k] * body->angular_frequency;
             const double c = body->cosine[k * body->modes + j], s = body->sine[k * body->modes + j];
-            const double detuning = (natural - w) * (natural + w), drag = 2.0 * decay * w;
+            const double detuning = natural < 0.0 ? response->mode[j].stiffness - w * w : (natural - w) * (natural + w);
+            const double drag = 2.0 * decay * w;
             const double size = vi_magnitude(detuning, drag);
             const double in_phase = detuning / size / size, lagging = drag / size / size;
             *along = c == 0.0 && s == 0.0 ? 0.0 : c * in_phase - s * lagging;
@@ -142,9 +142,8 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
     for (int j = 0; j < body->modes; ++j) {
         response->loose += body->natural[j] == 0.0;
         vi_mode *mode = &response->mode[j];
-        const double natural = body->natural[j];
-        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0,
-                      body->angular_frequency);
+        const double natural = body->natural[j], size = fabs(natural);
+        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * size, natural * size, 0.0, body->angular_frequency);
         response->level[j] = j < response->loose ? 0.0 : body->held[j] / mode->stiffness;
         if (!find_steady(response, j)) {
             return VI_ORBIT_RESONANT;
