@@ -27,9 +27,11 @@ from vibroimpact.analysis.files.stores import Place
 from vibroimpact.analysis.operations.classify import Classify
 from vibroimpact.analysis.orbits.impact_classes import (
     has_named_contacts,
+    has_no_force,
     impacts_of_runs,
     own_period,
     states_of_periods,
+    states_of_section,
 )
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import DatasetError
@@ -163,10 +165,11 @@ class ClassesOfDataset(Study[RunClass]):
         runs = self.runs
         refuse_quasi_periodic(runs.attrs, "classify")
         columns = [name for name in _STATES if name in runs.variables]
-        if not columns and has_named_contacts(runs):
+        own = not columns and not has_named_contacts(runs) and has_no_force(runs)
+        if not columns and (own or has_named_contacts(runs)):
             ends = runs.vibroimpact.runs["outcome"].values
             for each, end in zip(impacts_of_runs(runs), ends, strict=True):
-                yield _by_impacts(*each, Outcome(int(end)))
+                yield _by_impacts(*each, Outcome(int(end)), by_section=own)
             return
         if not columns:
             raise DatasetError(
@@ -219,7 +222,8 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     dataset : xarray.Dataset
         A dataset from `open_dataset`, with the strobe or the extrema of each recorded period. Impacts, or their number
         in each period, are needed too; without them a motion may be periodic, but with an unknown number of impacts.
-        For components that hit each other impacts are enough, but do not show chaos.
+        For components that hit each other impacts are enough, but do not show chaos. For a body without a force impacts
+        are enough: those on the first contact take the place of the forcing periods.
 
     Returns
     -------
@@ -234,8 +238,10 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     return whole(ClassesOfDataset(dataset)).classes
 
 
-def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) -> RunClass:
-    """Return the class of a run from its impacts alone."""
+def _by_impacts(
+    impacts: xr.Dataset, frequency: float | None, outcome: Outcome, *, by_section: bool
+) -> RunClass:
+    """Return the class of a run from its impacts alone; a section of them shows the chaos of a body without a force."""
     if outcome is not Outcome.ok:
         return class_of(np.empty((0, 1)), None, outcome)
     if not impacts.sizes["impact"]:
@@ -246,13 +252,25 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
         if impacts.sizes["impact"] < FEWEST:
             return RunClass(OrbitClass.unknown, reason=f"fewer than {FEWEST} recorded impacts")
         count, why = own_period(impacts, SAME)
-        return RunClass(OrbitClass.periodic, count, 1) if count else RunClass(OrbitClass.unknown, reason=why)
+        if count:
+            return RunClass(OrbitClass.periodic, count, 1)
+        found = _of_section(impacts) if by_section and "die away" not in why else None
+        return RunClass(OrbitClass.unknown, reason=why) if found is None else found
     states, counts = states_of_periods(impacts, frequency)
     found = class_of(states, counts, has_stuck=bool(np.isinf(counts).any()))
     if found.kind is not OrbitClass.chaos:
         return found
     reason = f"no period up to {len(states) // 2}; impacts alone do not tell chaos"
     return RunClass(OrbitClass.unknown, reason=reason)
+
+
+def _of_section(impacts: xr.Dataset) -> RunClass | None:
+    """Return the class of a motion without a force by the impacts on one contact; None where they do not show it."""
+    states, counts = states_of_section(impacts)
+    found = class_of(states, counts)
+    if found.kind is OrbitClass.periodic:
+        return RunClass(OrbitClass.periodic, found.impacts, 1)
+    return found if found.kind is OrbitClass.chaos else None
 
 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:

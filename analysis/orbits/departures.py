@@ -119,8 +119,8 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
         if turns * (len(fast) + len(touching)) > MOST_IMPACTS or turns * len(touching) > MOST_TOUCHES:
             return
         later = [TURN * orbit.periods * turn for turn in range(turns)]
-        always = [(phase + more, *others) for more in later for phase, *others in fast]
-        sometimes = [(phase + more, *others) for more in later for phase, *others in touching]
+        always = [(phase + more, contact, speed) for more in later for phase, contact, speed in fast]
+        sometimes = [(phase + more, contact, speed) for more in later for phase, contact, speed in touching]
         for chosen in _subsets(sometimes):
             if not always and not chosen:
                 continue

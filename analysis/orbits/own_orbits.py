@@ -56,7 +56,7 @@ def find_own_orbit(
     at = unknowns_of(guess.body, guess.phases, velocities)
     found = tried(body, guess, at)
     for _ in range(MOST_NEWTON):
-        step = np.linalg.lstsq(found.slopes, found.errors, rcond=None)[0]
+        step = np.linalg.lstsq(found.slopes, found.errors, rcond=None)[0].astype(np.float64)
         nearer = _damped_step(body, guess, at, shortened(step, at, contacts.size), found)
         if nearer is None:
             break
@@ -119,8 +119,8 @@ def _balance(body: ImpactingBody, own: Contact, hit: NDArray[np.int32], period: 
     The distance gives the speed of equal impulse. The balance is the velocity over it less that of the motion.
     """
     end, errors, slopes = body.with_period(period).kernel.errors(hit, np.zeros(1), np.zeros(1))
-    if end is not OrbitEnd.done:
-        return float("nan"), 0.0
+    if end is not OrbitEnd.done or 0.0 in (errors[0], slopes[0, 1]):
+        return float("nan"), 0.0  # nothing fixes the speed: the impulse of one contact on a body without a spring
     equal = -errors[0] / slopes[0, 1]
     velocity = own.speed_of(equal)
     return velocity / equal - (1.0 - slopes[1, 1]), velocity

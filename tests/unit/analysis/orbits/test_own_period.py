@@ -151,6 +151,23 @@ def test_multipliers_of_coupled_modes_are_those_of_the_map_from_impact_to_impact
     np.testing.assert_allclose(after_a_round(orbit, orbit.states[0]), orbit.states[0], atol=1e-11)
 
 
+def test_a_ball_in_a_cavity_of_a_self_excited_frame_has_unstable_orbits() -> None:
+    frame, ball = np.array([0.0, 1.0]), np.array([np.sqrt(5.0), 0.0])  # masses 1 and .2
+    contacts = tuple(Contact(side * (frame - ball), 1.0, 0.5, 0.7) for side in (1.0, -1.0))
+    body = ImpactingBody(
+        np.array([0.0, 1.0]), np.array([0.0, -0.02]), np.zeros(2), np.zeros(2), 1.0, 0.0, contacts, frame,
+        has_own_period=True,
+    )  # fmt: skip
+    contacts_hit = np.array([0, 1], dtype=np.int32)
+    orbit = find_own_orbit(body, 5.8, np.array([0.0, 3.0]), np.array([0.2, 0.2]), contacts_hit)
+    assert is_symmetric(orbit)
+    assert orbit.is_physical
+    assert not orbit.is_stable
+    np.testing.assert_allclose(after_a_round(orbit, orbit.states[0]), orbit.states[0], atol=1e-11)
+    np.testing.assert_allclose(orbit.multipliers, multipliers_of_differences(orbit), atol=1e-5)
+    assert orbit.multiplier_of_motion == pytest.approx(1.0, abs=1e-11)
+
+
 def test_restitution_that_falls_with_speed_has_its_own_orbit() -> None:
     (orbit,) = orbits_of(oscillator(yields=0.3))
     assert orbit.falling.all()
@@ -192,7 +209,7 @@ def test_a_branch_ends_where_the_motion_touches_a_second_stop_and_meets_the_orbi
 
 def test_impacts_that_grow_without_bound_end_a_branch() -> None:
     (orbit,) = orbits_of(oscillator())
-    follower = Follower(lambda r: oscillator(restitution=r), FollowSettings(0.5, 0.99, 0.2))
+    follower = Follower(lambda r: oscillator(restitution=r), FollowSettings(0.5, 0.99, 0.5))
     branch = follower.branch(orbit, 0.6)
     # a fast impact is followed by half a turn: r e^(growth) = 1
     assert branch.values.max() == pytest.approx(np.exp(-0.05 * np.pi / np.sqrt(1.0 - 0.05**2)), abs=1e-3)
