@@ -120,7 +120,9 @@ def _balance(body: ImpactingBody, own: Contact, hit: NDArray[np.int32], period: 
     """
     end, errors, slopes = body.with_period(period).kernel.errors(hit, np.zeros(1), np.zeros(1))
     if end is not OrbitEnd.done or 0.0 in (errors[0], slopes[0, 1]):
-        return float("nan"), 0.0  # nothing fixes the speed: the impulse of one contact on a body without a spring
+        return float(
+            "nan"
+        ), 0.0  # nothing fixes the speed: the impulse of one contact on a body without a spring
     equal = -errors[0] / slopes[0, 1]
     velocity = own.speed_of(equal)
     return velocity / equal - (1.0 - slopes[1, 1]), velocity
@@ -132,10 +134,10 @@ def _between(
     """Return the orbit of one impact between two periods with opposite balances; None at a pole."""
     from scipy.optimize import brentq
 
-    period = float(brentq(lambda each: _balance(body, own, hit, each)[0], low, high, xtol=1e-6 * low))
     try:
+        period = float(brentq(lambda each: _balance(body, own, hit, each)[0], low, high, xtol=1e-6 * low))
         return find_own_orbit(body, period, np.zeros(1), np.array([_balance(body, own, hit, period)[1]]), hit)
-    except OrbitError:
+    except (OrbitError, ValueError):  # no number at the pole itself
         return None
 
 
