@@ -186,12 +186,14 @@ class ClassesOfDataset(Study[RunClass]):
             states = np.stack([block[name] for name in columns], axis=-1)
             counts, sticks = (block.get(name) for name in _BESIDE)
             for run, outcome in enumerate(block["outcome"]):
-                found = class_of(
-                    states[run],
+                beside = (
                     None if counts is None else counts[run],
                     Outcome(int(outcome)),
                     sticks is not None and bool(sticks[run] > 0),
                 )
+                found = class_of(states[run], *beside)
+                if found.kind in (OrbitClass.unknown, OrbitClass.chaos):
+                    found = _up_to_shift(states[run], columns, *beside) or found
                 yield known.setdefault(found, found)
 
     @property
@@ -343,6 +345,23 @@ def class_of(
     return RunClass(
         OrbitClass.unknown, reason=f"no period up to {len(states) // 2}, and neighbours do not part"
     )
+
+
+def _up_to_shift(
+    states: Floats, columns: Sequence[str], impacts: Floats | None, outcome: Outcome, has_stuck: bool
+) -> RunClass | None:
+    """Return the class of a motion that repeats up to a shift, as of a body that nothing ties; None for others."""
+    if not set(_STATES) <= set(columns) or not np.isfinite(states).all():
+        return None
+    place, velocity, highest, lowest = (states[:, columns.index(name)] for name in _STATES)
+    found = class_of(
+        np.column_stack([velocity, highest - place, lowest - place]), impacts, outcome, has_stuck
+    )
+    if found.kind is not OrbitClass.periodic:
+        return None
+    shifts = place[found.periods :] - place[: -found.periods]
+    size = max(float((highest - lowest).max()), float(np.abs(shifts).max()))
+    return found if np.ptp(shifts[-max(found.periods, 2) :]) <= SAME * size else None
 
 
 def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClass:

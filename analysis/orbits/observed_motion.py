@@ -12,7 +12,8 @@ def observed_motion(
 ) -> tuple[Floats, Floats]:
     """Return displacement, m, and velocity, m/s, of the observed point at phases from the first impact on.
 
-    Impacts are at their own phases, rad, and leave the modes in `states`, shape (impact, 2 modes).
+    Impacts are at their own phases, rad, and leave the modes in `states`, shape (impact, 2 modes). The drift of a body
+    that nothing ties to the ground is left out.
     """
     flight = np.clip(np.searchsorted(impacts, phases, side="right") - 1, 0, impacts.size - 1)
     u = ((phases - impacts[flight]) / body.angular_frequency)[:, None]
@@ -24,7 +25,11 @@ def observed_motion(
     moved, faster = _free(body, u, x, v)
     pushed = np.where(body.frequencies == 0.0, body.held, 0.0)
     moved, faster = moved + 0.5 * pushed * u**2, faster + pushed * u
-    return (moved + now[0]) @ body.observed, (faster + now[1]) @ body.observed
+    whole = np.zeros((2, phases.size))
+    for order, amplitude in body.unseen.items():
+        turned = amplitude * np.exp(1j * order * phases)
+        whole += turned.real, (1j * order * body.angular_frequency * turned).real
+    return (moved + now[0]) @ body.observed + whole[0], (faster + now[1]) @ body.observed + whole[1]
 
 
 def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -82,6 +82,11 @@ class PeriodicOrbit:
         return self.periods * self.body.period
 
     @property
+    def shift(self) -> float:
+        """Shift of the observed point over the orbit, m, where nothing ties the body to the ground; else 0."""
+        return self.period * (self.body.drift or 0.0)
+
+    @property
     def stability(self) -> str:
         """`stable` or `unstable`."""
         return "stable" if self.is_stable else "unstable"

@@ -128,6 +128,10 @@ class ImpactingBody:
         Complex modal amplitudes of further sines, N kg^(-1/2), by their harmonic n: Re(amplitude e^(i n phase)).
     has_own_period : bool
         Whether neither force nor stop sets the period: the clock is that of an orbit (equations.md 4.14).
+    drift : float or None
+        Mean velocity of the observed point with the whole body, m/s, where nothing ties it to the ground; else None.
+    unseen : mapping of int to complex
+        Complex amplitudes of the observed point by the motion of such a whole under the force, m, by their harmonic.
     """
 
     frequencies: Floats
@@ -141,6 +145,8 @@ class ImpactingBody:
     coupling: Floats | None = None
     further: Mapping[int, Complexes] = field(default_factory=dict)
     has_own_period: bool = False
+    drift: float | None = None
+    unseen: Mapping[int, complex] = field(default_factory=dict)
 
     @cached_property
     def harmonics(self) -> Mapping[int, Complexes]:

@@ -89,7 +89,7 @@ class OrbitBody:
         self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
         contacts, self.modes = self._arrays["shape"].shape
         addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
-        tied = self._arrays["natural"] > 0.0
+        tied = self._arrays["natural"] != 0.0
         self._terms = None
         if coupling is not None and tied.any():
             self._terms = self._coupled(angular_frequency, coupling, tied)

@@ -173,7 +173,7 @@ def _ends_of_runs(
     with long_runs(scene) as impacts_at:
         for value in seed_values(settings):
             try:
-                body = impacting_body(scene.with_values({parameter: value}), unforced=True)
+                body = impacting_body(scene.with_values({parameter: value}), free=True)
             except SceneError:
                 continue  # the scene has no run there
             orbit = orbit_of_impacts(body, impacts_at({parameter: value}))
@@ -266,7 +266,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
         return kept[value]
 
     impacting_body(
-        scene.at({parameter: value}), unforced=True
+        scene.at({parameter: value}), free=True
     )  # a wrong key is refused before any orbit is followed
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
@@ -279,7 +279,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
-        return impacting_body(scene.at(values), unforced=True)
+        return impacting_body(scene.at(values), free=True)
     except UsageError as problem:
         raise OrbitError(str(problem)) from problem
 

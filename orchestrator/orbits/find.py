@@ -79,7 +79,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
         """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
-        body, counts = impacting_body(self.scene, unforced=True), (self.impacts, self.periods)
+        body, counts = impacting_body(self.scene, free=True), (self.impacts, self.periods)
         refuse_without_energy(self.scene, body)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
@@ -130,6 +130,12 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             wide_terminal().print(rows)
         many = counted(len(self._physical), "physical orbit")
         say(f"{many}." if self._physical else f"No physical orbit {self._called}.")
+        drifts = [orbit.shift for orbit in self.found if orbit.body.drift is not None]
+        if drifts:
+            say(
+                f"Nothing ties the body to the ground: from the scene's start it drifts by {drifts[0]:.6g} over the "
+                "first orbit. Any other velocity of the whole gives the same impacts."
+            )
         if own and self.found:
             off = max(abs(orbit.multiplier_of_motion - 1.0) for orbit in self.found)
             say(f"Each orbit has one more multiplier, 1, of the motion along itself; found to {off:.0e}.")
@@ -199,7 +205,7 @@ def _long_record(scene: Scene) -> dict[str, float]:
     names = ("record.transient_periods", "record.recorded_periods")
     if scene.period is not None:
         return dict(zip(names, (TRANSIENT, 2 * LONGEST), strict=True))
-    turn = 2.0 * np.pi / impacting_body(scene, unforced=True).slowest
+    turn = 2.0 * np.pi / impacting_body(scene, free=True).slowest
     names = ("record.transient_time", "record.recorded_time")
     return dict(zip(names, (TRANSIENT * turn, RECORDED_TURNS * turn), strict=True))
 
@@ -207,7 +213,7 @@ def _long_record(scene: Scene) -> dict[str, float]:
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as impacts_at:
-        return orbit_of_impacts(impacting_body(scene, unforced=True), impacts_at({}))
+        return orbit_of_impacts(impacting_body(scene, free=True), impacts_at({}))
 
 
 def orbit_of_impacts(

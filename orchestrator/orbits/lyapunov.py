@@ -51,13 +51,13 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
     name = "lyapunov"
     nothing = "a run with exponents"
     named = (DatasetError,)
-    unforced = True
+    free = True
 
     def rows(self) -> Generator[Exponents | str, None, None]:
         """Find the exponents of run after run."""
         runs = self.runs.vibroimpact.runs
         self._bodies, impacts = (
-            Bodies(scene_of(self.runs, "lyapunov"), runs, unforced=True),
+            Bodies(scene_of(self.runs, "lyapunov"), runs, free=True),
             ImpactsOf(self.runs),
         )
         for place in range(runs.sizes["run"]):

@@ -10,6 +10,8 @@
  * terms cancel, and a series takes their place. Bodies of many modes keep their terms, since series take long. */
 static const double LARGEST_VECTOR = 10.0;
 enum { MANY_MODES = 16, SERIES_TERMS = 18 };
+/* Error of a state that recurs, over its size, above which a body that grows loses it. */
+static const double RECURRED = 1e-11;
 /* Step of the series times the fastest rate: the first term left out is .5^18 / 18!, far below rounding. */
 static const double SHORT = 0.5;
 
@@ -156,6 +158,21 @@ static bool solve(int n, double a[][VI_STATES], int sides, double b[][VI_STATES]
     return true;
 }
 
+/* Does a state come back after `length` seconds and an impulse? A body that grows multiplies rounding until then. */
+static bool recurs(const vi_orbit_coupling *coupling, const double impulse[], double length, const double state[])
+{
+    const int modes = coupling->body.modes;
+    double later[VI_STATES], off = 0.0, size = 0.0;
+    memcpy(later, state, 2 * (size_t)modes * sizeof *later);
+    vi_orbit_series(coupling, length, later, later + modes);
+    for (int j = 0; j < modes; ++j) {
+        const double natural = sqrt(fabs(coupling->body.square[j]));
+        off = fmax(off, fmax(natural * fabs(later[j] - state[j]), fabs(later[modes + j] + impulse[j] - state[modes + j])));
+        size = fmax(size, fmax(natural * fabs(state[j]), fabs(state[modes + j])));
+    }
+    return off <= RECURRED * size;
+}
+
 bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], int stride,
                                double length, double state[][VI_STATES])
 {
@@ -177,12 +194,14 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     if (!solve(2 * modes, left, contacts, state, 4.0 * DBL_EPSILON * (1.0 + coupling->fastest * length))) {
         return false;
     }
+    bool good = true;
     for (int k = 0; k < contacts; ++k) {
         for (int j = 0; j < modes; ++j) {
             state[k][j] /= sqrt(fabs(coupling->body.square[j]));
         }
+        good = good && recurs(coupling, impulse + (ptrdiff_t)k * stride, length, state[k]);
     }
-    return true;
+    return good;
 }
 
 /* ---- by terms ---- */

@@ -236,6 +236,21 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k)
     return i > k ? passed : response->length + passed;
 }
 
+/* e^(-rate u) / (1 - e^(-rate length)) for 0 <= u <= length: a part of a motion that recurs, growing or not. */
+static double recurring(double rate, double u, double length)
+{
+    return rate > 0.0 ? exp(-rate * u) / -expm1(-rate * length) : exp(rate * (length - u)) / expm1(rate * length);
+}
+
+/* Motion `u` seconds after a unit impulse that recurs, of a mode of negative stiffness. Each exponential is by itself:
+ * a propagator would multiply the rounding of the start by the growth. */
+static void recur_of_two_rates(const vi_mode *mode, double length, double u, double *x, double *v)
+{
+    const double slow = recurring(mode->slow, u, length), fast = recurring(mode->fast, u, length);
+    *x = (slow - fast) / (2.0 * mode->rate);
+    *v = (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate);
+}
+
 void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
@@ -258,6 +273,11 @@ void vi_orbit_train_answer(const vi_orbit_response *response, int contact, doubl
         } else if (body->coupling) {
             x[j] = -x[j];
             v[j] = -v[j];
+        } else if (response->mode[j].stiffness < 0.0) {
+            double moved, faster;
+            recur_of_two_rates(&response->mode[j], response->length, u, &moved, &faster);
+            x[j] = -moved * impulse;
+            v[j] = -faster * impulse;
         } else {
             vi_mode_propagator(&response->mode[j], u, phi);
             x[j] = -(phi[0] * start[0] + phi[1] * start[1]) * impulse;

@@ -11,8 +11,48 @@ from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import PeriodicOrbit
+from vibroimpact.fmus.errors import UsageError
 
 EXAMPLE = ROOT / "examples" / "self_excited.toml"
+
+
+BOX = """
+[scene]
+title = "A box on ice with a ball on a spring in it"
+units = "nondimensional"
+
+[[body]]
+name = "box"
+mass = 1.0
+stiffness = 0.0
+velocity_start = 0.1
+
+[[body]]
+name = "ball"
+mass = 0.5
+stiffness = 0.0
+
+[[link]]
+between = ["box", "ball"]
+stiffness = 1.0
+damping = 0.1
+
+[[contact]]
+between = ["box", "ball"]
+restitution = 0.7
+clearance = 0.4
+
+[forcing]
+at = "ball"
+amplitude = 0.5
+angular_frequency = 1.5
+phase = 0.3
+
+[record]
+transient_periods = 300
+recorded_periods = 20
+impacts = true
+"""
 
 
 def example(**changes: float) -> vi.Scene:
@@ -89,3 +129,28 @@ def test_studies_that_need_a_force_refuse_a_scene_without(tmp_path: Path) -> Non
     done = in_this_process("energies", EXAMPLE, "-o", tmp_path / "energies.nc")
     assert done.returncode == 2
     assert "forcing: expected a harmonic force, which this study needs, got none." in done.stderr
+
+
+def test_a_box_on_ice_repeats_up_to_the_shift_that_its_start_gives() -> None:
+    scene = vi.Scene.from_text(BOX)
+    (orbit,) = vi.find_orbits(scene)
+    run = vi.run(scene)
+    shifts = np.diff(run.strobe_displacement.values)
+    np.testing.assert_allclose(shifts, orbit.shift, rtol=1e-11)
+    assert orbit.shift == pytest.approx((0.1 + 0.5 / 1.5 * np.sin(-0.3)) / 1.5 * orbit.period, rel=1e-12)
+    np.testing.assert_allclose(run.vibroimpact.impacts().impact_velocity[-1], orbit.velocities[0], rtol=1e-12)
+    strobe = orbit.at(np.array([2.0 * np.pi]))[1][0] + orbit.shift / orbit.period
+    assert run.strobe_velocity.values[-1] == pytest.approx(strobe, abs=1e-12)
+    assert [each.name for each in vi.classify(run)] == ["P(1,1)"]
+    exponents = vi.lyapunov(run).lyapunov_exponent.values
+    np.testing.assert_allclose(exponents, np.log(np.abs(orbit.multipliers)), rtol=1e-9)
+
+
+def test_a_constant_force_on_a_box_on_ice_is_refused() -> None:
+    scene = BOX.replace(
+        "[forcing]", '[[forcing]]\nat = "box"\nsignal = "constant"\namplitude = 0.1\n\n[[forcing]]'
+    )
+    with pytest.raises(
+        UsageError, match="expected no constant force on a body that nothing ties to the ground"
+    ):
+        vi.find_orbits(vi.Scene.from_text(scene))
