@@ -52,6 +52,11 @@ def speed_unit(body: ImpactingBody) -> float:
     return body.scale * body.slowest
 
 
+def is_unbounded(body: ImpactingBody, velocities: Floats) -> bool:
+    """Tell whether an impact is faster than the search goes, m/s: the motion grows without bound."""
+    return not velocities.max() < MOST_SPEED * speed_unit(body)
+
+
 def unknowns_of(body: ImpactingBody, phases: Floats, velocities: Floats) -> Floats:
     """Return the unknowns of an orbit, shape (2 p,); the body has the period of the orbit as its clock."""
     period = np.log(TURN * body.slowest / body.angular_frequency)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits import own_period
 from vibroimpact.analysis.orbits.observed_motion import observed_motion
+from vibroimpact.analysis.orbits.own_period import equations, free_multipliers, is_unbounded, unknowns_of
 from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
@@ -30,6 +30,8 @@ _MOST_SHOWN = 4
 """Largest number of impacts listed in one line."""
 SLOW = 1e-8
 """Speed of an impact, over that of the force's motion, below which it grazes."""
+NEXT_TO_BOUND = 0.9
+"""Speed of an impact without a force, over the largest of the search, from which on it is next to that bound."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
 
@@ -137,7 +139,7 @@ class PeriodicOrbit:
         damping = 2.0 * body.damping_ratios * np.abs(body.frequencies)
         drag = damping * v if body.coupling is None else np.asarray(body.coupling) @ v
         flow = np.concatenate([v, body.held - body.stiffnesses * x - drag])
-        return own_period.free_multipliers(self.monodromy, flow, body.slowest)
+        return free_multipliers(self.monodromy, flow, body.slowest)
 
     @property
     def multiplier_of_motion(self) -> float:
@@ -181,12 +183,7 @@ class PeriodicOrbit:
     @property
     def is_beyond_bounds(self) -> bool:
         """Whether an impact without a force is next to the largest speed of the search."""
-        most = (
-            0.9 * own_period.MOST_SPEED * own_period.speed_unit(self.body)
-            if self.body.has_own_period
-            else np.inf
-        )
-        return bool(self.velocities.max() > most)
+        return self.body.has_own_period and is_unbounded(self.body, self.velocities / NEXT_TO_BOUND)
 
     @property
     def is_physical(self) -> bool:
@@ -244,7 +241,7 @@ class PeriodicOrbit:
     def unknowns(self) -> Floats:
         """Unknowns of its equations: the phases; without a force those of `own_period`."""
         if self.body.has_own_period:
-            return own_period.unknowns_of(self.body, self.phases, self.velocities)
+            return unknowns_of(self.body, self.phases, self.velocities)
         return self.phases
 
     def at(self, phases: Floats) -> tuple[Floats, Floats]:
@@ -297,8 +294,8 @@ class Trial(NamedTuple):
 def tried(body: ImpactingBody, like: PeriodicOrbit, unknowns: Floats) -> Trial:
     """Return an orbit of a body with the impacts of another one, for other unknowns; OrbitError where it has none."""
     if body.has_own_period:
-        own = own_period.equations(body, like.contacts, unknowns)
-        if not own.velocities.max() < own_period.MOST_SPEED * own_period.speed_unit(body):
+        own = equations(body, like.contacts, unknowns)
+        if is_unbounded(body, own.velocities):
             raise OrbitError("orbit: expected impacts of bounded speed, got ones that grow without bound.")
         _refuse_end(own.end, own.phases)
         if not (np.isfinite(own.errors).all() and np.isfinite(own.slopes).all()):
