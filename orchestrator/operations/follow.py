@@ -13,8 +13,8 @@ class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
     Folds, branch points, period doublings, tori and grazes are located and printed, and branches that begin there are
-    followed. The stops must be rigid, the force harmonic. First orbits are searched along the range. --seed gives one
-    for the scene as it is, --from-dataset one at the values of its run.
+    followed. The stops must be rigid, the force harmonic or absent. First orbits are searched along the range. --seed
+    gives one for the scene as it is, --from-dataset one at the values of its run.
 
     With --second, folds, period doublings, tori and grazes are curves over both numbers, also those that leave points
     where two curves meet. The curves are then written and drawn, and the branches are printed.
