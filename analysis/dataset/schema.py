@@ -255,6 +255,7 @@ _RULES = (
     VariableRule("drive_clock_error", ("run",), "1e-6", "relative error of the clock of the inputs"),
     VariableRule("orbit_branch", ("run",), "1", "branch that the periodic orbit is on", np.int32),
     VariableRule("orbit_periods", ("run",), "1", "forcing periods after which it repeats itself", np.int32),
+    VariableRule("orbit_period", ("run",), "s", "time after which it repeats itself"),
     VariableRule(
         "orbit_stable", ("run",), "1", "whether all its multipliers are within the unit circle", np.int8
     ),

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.following import CLOSED, SpecialPoint
-from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.own_period import alternating_slopes
+from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated, tried
 from vibroimpact.analysis.orbits.sign_changes import turning
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
@@ -20,20 +21,24 @@ DOUBLE = 1e-4
 
 
 def folding(orbit: PeriodicOrbit) -> float:
-    """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the distances' slopes."""
-    slopes = evaluated(orbit.body, orbit.contacts, orbit.phases, orbit.periods).distance_slopes
+    """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the errors' slopes."""
+    slopes = tried(orbit.body, orbit, orbit.unknowns).slopes
     return float(np.linalg.det(slopes / orbit.body.scale))
 
 
 def alternating(orbit: PeriodicOrbit) -> float:
     """Return a function that is 0 at a period doubling, and smooth through a graze: equations.md 4.7.
 
-    It is the determinant of the distances' slopes for changes of the phases that alternate from round to round.
+    It is the determinant of the errors' slopes for changes that alternate from round to round.
     """
+    body = orbit.body
+    if body.has_own_period:
+        own = alternating_slopes(body, orbit.contacts, orbit.phases, orbit.velocities)
+        return float(np.linalg.det(own / body.scale))
     count = orbit.phases.size
     phases = np.concatenate([orbit.phases, orbit.phases + TURN * orbit.periods])
-    slopes = evaluated(orbit.body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
-    return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / orbit.body.scale))
+    slopes = evaluated(body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
+    return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / body.scale))
 
 
 def beyond_stop(orbit: PeriodicOrbit) -> float:

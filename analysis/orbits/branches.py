@@ -93,7 +93,7 @@ def dataset_of_orbits(
 ) -> xr.Dataset:
     """Return orbits of one body, at least one, as the runs of a dataset over their forcing frequency.
 
-    Each orbit is a branch of its own; `attrs` are attributes of the file.
+    Each orbit is a branch of its own; `attrs` are attributes of the file. Without a force the frequency is the orbit's.
     """
     return _dataset(
         orbits,
@@ -157,6 +157,7 @@ def _dataset(
     largest = np.array([each.multipliers[0] for each in orbits])
     columns: dict[str, NDArray[Any]] = {
         "orbit_branch": np.array(numbers, dtype=np.int32),
+        "orbit_period": np.array([each.period for each in orbits]),
         "orbit_periods": np.array([each.periods for each in orbits], dtype=np.int32),
         "orbit_stable": np.array([each.is_stable for each in orbits], dtype=np.int8),
         "orbit_symmetric": np.array([is_symmetric(each) for each in orbits], dtype=np.int8),

@@ -27,9 +27,11 @@ from vibroimpact.analysis.files.stores import Place
 from vibroimpact.analysis.operations.classify import Classify
 from vibroimpact.analysis.orbits.impact_classes import (
     has_named_contacts,
+    has_no_force,
     impacts_of_runs,
     own_period,
     states_of_periods,
+    states_of_section,
 )
 from vibroimpact.analysis.orbits.rotation import FEWEST_STATES, Rotation, rotation_of, rotations_in_words
 from vibroimpact.analysis.study import Study, whole
@@ -179,10 +181,11 @@ class ClassesOfDataset(Study[RunClass]):
         runs = self.runs
         turns = turns_of_sines(runs, "classify")
         columns = [name for name in _STATES if name in runs.variables]
-        if not columns and has_named_contacts(runs):
+        own = not columns and not has_named_contacts(runs) and has_no_force(runs)
+        if not columns and (own or has_named_contacts(runs)):
             ends = runs.vibroimpact.runs["outcome"].values
             for each, end in zip(impacts_of_runs(runs), ends, strict=True):
-                yield _by_impacts(*each, Outcome(int(end)))
+                yield _by_impacts(*each, Outcome(int(end)), by_section=own)
             return
         if not columns:
             raise DatasetError(
@@ -200,13 +203,14 @@ class ClassesOfDataset(Study[RunClass]):
             counts, sticks = (block.get(name) for name in _BESIDE)
             for run, outcome in enumerate(block["outcome"]):
                 place += 1
-                found = class_of(
-                    states[run],
+                beside = (
                     None if counts is None else counts[run],
                     Outcome(int(outcome)),
                     sticks is not None and bool(sticks[run] > 0),
-                    None if turns is None else turns[place],
                 )
+                found = class_of(states[run], *beside, None if turns is None else turns[place])
+                if found.kind in (OrbitClass.unknown, OrbitClass.chaos):
+                    found = _up_to_shift(states[run], columns, *beside) or found
                 yield known.setdefault(found, found)
 
     @property
@@ -237,7 +241,8 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     dataset : xarray.Dataset
         A dataset from `open_dataset`, with the strobe or the extrema of each recorded period. Impacts, or their number
         in each period, are needed too; without them a motion may be periodic, but with an unknown number of impacts.
-        For components that hit each other impacts are enough, but do not show chaos.
+        For components that hit each other impacts are enough, but do not show chaos. For a body without a force impacts
+        are enough: those on the first contact take the place of the forcing periods.
 
     Returns
     -------
@@ -252,8 +257,10 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
     return whole(ClassesOfDataset(dataset)).classes
 
 
-def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) -> RunClass:
-    """Return the class of a run from its impacts alone."""
+def _by_impacts(
+    impacts: xr.Dataset, frequency: float | None, outcome: Outcome, *, by_section: bool
+) -> RunClass:
+    """Return the class of a run from its impacts alone; a section of them shows the chaos of a body without a force."""
     if outcome is not Outcome.ok:
         return class_of(np.empty((0, 1)), None, outcome)
     if not impacts.sizes["impact"]:
@@ -264,13 +271,25 @@ def _by_impacts(impacts: xr.Dataset, frequency: float | None, outcome: Outcome) 
         if impacts.sizes["impact"] < FEWEST:
             return RunClass(OrbitClass.unknown, reason=f"fewer than {FEWEST} recorded impacts")
         count, why = own_period(impacts, SAME)
-        return RunClass(OrbitClass.periodic, count, 1) if count else RunClass(OrbitClass.unknown, reason=why)
+        if count:
+            return RunClass(OrbitClass.periodic, count, 1)
+        found = _of_section(impacts) if by_section and "die away" not in why else None
+        return RunClass(OrbitClass.unknown, reason=why) if found is None else found
     states, counts = states_of_periods(impacts, frequency)
     found = class_of(states, counts, has_stuck=bool(np.isinf(counts).any()))
     if found.kind is not OrbitClass.chaos:
         return found
     reason = f"no period up to {len(states) // 2}; impacts alone do not tell chaos"
     return RunClass(OrbitClass.unknown, reason=reason)
+
+
+def _of_section(impacts: xr.Dataset) -> RunClass | None:
+    """Return the class of a motion without a force by the impacts on one contact; None where they do not show it."""
+    states, counts = states_of_section(impacts)
+    found = class_of(states, counts)
+    if found.kind is OrbitClass.periodic:
+        return RunClass(OrbitClass.periodic, found.impacts, 1)
+    return found if found.kind is OrbitClass.chaos else None
 
 
 def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
@@ -371,6 +390,23 @@ def _without_period(scaled: Floats, turns: Floats | None, has_stuck: bool) -> Ru
     more = f"; {FEWEST_STATES} recorded periods tell quasi-periodic motion" * (len(scaled) < FEWEST_STATES)
     reason = f"no period up to {len(scaled) // 2}, and neighbours do not part{more}"
     return RunClass(OrbitClass.unknown, reason=reason)
+
+
+def _up_to_shift(
+    states: Floats, columns: Sequence[str], impacts: Floats | None, outcome: Outcome, has_stuck: bool
+) -> RunClass | None:
+    """Return the class of a motion that repeats up to a shift, as of a body that nothing ties; None for others."""
+    if not set(_STATES) <= set(columns) or not np.isfinite(states).all():
+        return None
+    place, velocity, highest, lowest = (states[:, columns.index(name)] for name in _STATES)
+    found = class_of(
+        np.column_stack([velocity, highest - place, lowest - place]), impacts, outcome, has_stuck
+    )
+    if found.kind is not OrbitClass.periodic:
+        return None
+    shifts = place[found.periods :] - place[: -found.periods]
+    size = max(float((highest - lowest).max()), float(np.abs(shifts).max()))
+    return found if np.ptp(shifts[-max(found.periods, 2) :]) <= SAME * size else None
 
 
 def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClass:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.branch_points import bordered_determinant
-from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit, Trial
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 AT_YIELD_VELOCITY = "impact at the yield velocity"
@@ -38,19 +38,17 @@ class _Span(Protocol):
 
 
 class BranchEquations(Protocol):
-    """Equations of the orbits of a branch over their unknowns: phases, and the parameter over its range."""
+    """Equations of the orbits of a branch over their unknowns: those of an orbit, and the parameter over its range."""
 
     @property
     def settings(self) -> _Span:
         """The range of the parameter."""
 
-    def residual(
-        self, orbit: PeriodicOrbit, phases: Floats, value: float
-    ) -> tuple[Floats, Floats, PeriodicOrbit]:
-        """Return distances from the stops, their slopes by the phases, and the orbit."""
+    def residual(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Trial:
+        """Return errors, their slopes by the unknowns of an orbit, and the orbit."""
 
-    def matrix(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
-        """Return the derivatives of the distances by all unknowns."""
+    def matrix(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Floats:
+        """Return the derivatives of the errors by all unknowns."""
 
 
 class BranchPlace(Protocol):
@@ -160,13 +158,11 @@ def _excess(orbit: PeriodicOrbit) -> Floats:
 
 
 def _unknowns(follower: BranchEquations, at: BranchPlace) -> Floats:
-    return np.append(at.orbit.phases, at.value / follower.settings.span)
+    return np.append(at.orbit.unknowns, at.value / follower.settings.span)
 
 
-def _residual(
-    follower: BranchEquations, like: PeriodicOrbit, unknowns: Floats
-) -> tuple[Floats, Floats, PeriodicOrbit]:
-    """Return distances from the stops, their slopes by the phases, and the orbit."""
+def _residual(follower: BranchEquations, like: PeriodicOrbit, unknowns: Floats) -> Trial:
+    """Return errors, their slopes by the unknowns of an orbit, and the orbit."""
     return follower.residual(like, unknowns[:-1], float(unknowns[-1]) * follower.settings.span)
 
 

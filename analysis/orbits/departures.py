@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT, LEVEL, crossing_direction
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, split_orbit
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, Follower, SpecialPoint
-from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, ordered
+from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, grazes, ordered
 from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
-from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
-SLOW = 1e-8
-"""Speed of an impact, over that of the force's motion, below which it grazes."""
-BESIDE = 1e-4
-"""Step away from a graze, over the longest, after which an orbit is judged."""
+BESIDE, BESIDE_OWN = 1e-4, 1e-2
+"""Step away from a graze, over the longest, after which an orbit is judged; without a force, whose unknowns are speeds.
+
+A maximum beyond its stop grows with the square of the speed, and must exceed rounding.
+"""
 SAME_VALUE = 1e-7
 """Difference of two values, over the range, up to which they are one point."""
 MOST_TURNS = 3
@@ -28,8 +29,8 @@ MOST_TURNS = 3
 MOST_TOUCHES = 4
 """Number of touches of a stop, over all turns, up to which all choices of them are tried."""
 
-Impact = tuple[float, int]
-"""Phase, rad, and contact, from 0."""
+Impact = tuple[float, int, float]
+"""Phase, rad, contact, from 0, and speed, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +47,21 @@ class Departure:
         Whether the branch also leaves in the other direction, with orbits that are not those of the first one.
     is_stable : bool or None
         Whether the orbits next to a graze are stable; None for other points.
+    beside : float or None
+        Value of the parameter at an orbit next to a graze; None for other points.
     """
 
     start: BranchOrbit
     cause: str
     goes_both_ways: bool = False
     is_stable: bool | None = None
+    beside: float | None = None
 
     @property
     def side(self) -> str:
         """`higher` or `lower`: the values of the parameter at which the orbits next to a graze are."""
-        return "higher" if self.start.tangent[-1] > 0.0 else "lower"
+        ahead = self.start.tangent[-1] if self.beside is None else self.beside - self.start.value
+        return "higher" if ahead > 0.0 else "lower"
 
 
 def departures(follower: Follower, point: SpecialPoint) -> list[Departure]:
@@ -85,12 +90,12 @@ def _split(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
 
 def _twice(at: BranchOrbit) -> BranchOrbit:
     """Return an orbit that is counted twice, with the direction of its branch."""
-    once = at.orbit
-    phases = np.concatenate([once.phases, once.phases + TURN * once.periods])
-    orbit = PeriodicOrbit(
-        once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)
-    )
+    orbit = at.orbit.repeated(2)
     tangent = np.concatenate([at.tangent[:-1], at.tangent])
+    if orbit.body.has_own_period:
+        count = at.orbit.phases.size
+        later, faster = 0.5 * np.append(0.0, at.tangent[1:count]), at.tangent[count:-1]
+        tangent = np.concatenate([at.tangent[:1], np.tile(later, 2)[1:], np.tile(faster, 2), at.tangent[-1:]])
     return BranchOrbit(at.value, orbit, tangent / np.linalg.norm(tangent), 0.0)
 
 
@@ -101,7 +106,7 @@ def _crossing(follower: Follower, at: BranchOrbit, cause: str = "") -> Departure
     def matrix_at(unknowns: Floats) -> Floats:
         return follower.matrix(orbit, unknowns[:-1], float(unknowns[-1]) * span)
 
-    direction = crossing_direction(matrix_at, np.append(orbit.phases, at.value / span), at.tangent)
+    direction = crossing_direction(matrix_at, np.append(orbit.unknowns, at.value / span), at.tangent)
     is_level = abs(direction[-1]) < LEVEL
     cause = cause or (
         "pitchfork" if is_level or abs(at.tangent[-1]) < LEVEL else "transcritical branch point"
@@ -118,6 +123,8 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
     """
     orbit = at.orbit
     slow = grazes(orbit)
+    if orbit.body.has_own_period and slow.all():
+        return  # the motion vanishes
     fast = _impacts(orbit, ~slow)
     touching = _impacts(orbit, slow) or _touching_maxima(orbit)
     found = [orbit]
@@ -125,12 +132,12 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
         if turns * (len(fast) + len(touching)) > MOST_IMPACTS or turns * len(touching) > MOST_TOUCHES:
             return
         later = [TURN * orbit.periods * turn for turn in range(turns)]
-        always = [(phase + more, contact) for more in later for phase, contact in fast]
-        sometimes = [(phase + more, contact) for more in later for phase, contact in touching]
+        always = [(phase + more, contact, speed) for more in later for phase, contact, speed in fast]
+        sometimes = [(phase + more, contact, speed) for more in later for phase, contact, speed in touching]
         for chosen in _subsets(sometimes):
             if not always and not chosen:
                 continue
-            other = _orbit_of(orbit.body, turns * orbit.periods, always + chosen)
+            other = _orbit_of(orbit, turns, always + chosen)
             images = [other, mirror_image(other)]
             if other.turns > 1 or any(
                 are_alike(each, image) for each in found for image in images if image is not None
@@ -140,11 +147,6 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
             yield from _beside(follower, other, at.value)
 
 
-def grazes(orbit: PeriodicOrbit) -> NDArray[np.bool_]:
-    """Return whether each impact of an orbit has no speed, shape (p,)."""
-    return np.asarray(orbit.velocities < SLOW * orbit.body.scale * orbit.body.angular_frequency)
-
-
 def _subsets(touching: list[Impact]) -> Iterator[list[Impact]]:
     """Yield all choices of impacts, the smallest first."""
     for count in range(len(touching) + 1):
@@ -152,7 +154,10 @@ def _subsets(touching: list[Impact]) -> Iterator[list[Impact]]:
 
 
 def _impacts(orbit: PeriodicOrbit, which: NDArray[np.bool_]) -> list[Impact]:
-    return [(float(orbit.phases[k]), int(orbit.contacts[k])) for k in np.flatnonzero(which)]
+    return [
+        (float(orbit.phases[k]), int(orbit.contacts[k]), float(orbit.velocities[k]))
+        for k in np.flatnonzero(which)
+    ]
 
 
 def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
@@ -160,25 +165,31 @@ def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     _, phase, contact = orbit.highest
     contacts = mirrored_contacts(orbit.body)
     if contacts is None or not is_symmetric(orbit):
-        return [(phase, contact)]
-    return [(phase, contact), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]))]
+        return [(phase, contact, 0.0)]
+    return [(phase, contact, 0.0), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]), 0.0)]
 
 
-def _orbit_of(body: ImpactingBody, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
-    """Return the orbit with these impacts."""
-    phases, contacts = (np.array(each) for each in zip(*impacts, strict=True))
-    made = ordered(PeriodicOrbit(body, periods, phases, contacts.astype(np.int32), np.zeros(phases.size)))
+def _orbit_of(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> PeriodicOrbit:
+    """Return the orbit of some turns of another one that has these impacts."""
+    phases, hit, speeds = (np.array(each) for each in zip(*impacts, strict=True))
+    body, periods, contacts = like.body, turns * like.periods, hit.astype(np.int32)
+    if body.has_own_period:
+        order = np.argsort(phases)
+        phases = (phases[order] - phases[order][0]) / turns
+        return PeriodicOrbit(body.with_period(turns * like.period), 1, phases, contacts[order], speeds[order])
+    made = ordered(PeriodicOrbit(body, periods, phases, contacts, speeds))
     velocities = evaluated(body, made.contacts, made.phases, periods).velocities
     return PeriodicOrbit(body, periods, made.phases, made.contacts, velocities)
 
 
 def _beside(follower: Follower, orbit: PeriodicOrbit, value: float) -> Iterator[Departure]:
     """Yield the branch of an orbit at a graze in the direction of its physical orbits, if there are any."""
-    start = follower.on_branch(orbit, value, None)
+    start, away = follower.on_branch(orbit, value, None), BESIDE_OWN if orbit.body.has_own_period else BESIDE
     for each in (start, start.turned):
-        found = follower.step(each, BESIDE * follower.settings.longest)
+        found = follower.step(each, away * follower.settings.longest)
         if found is not None and found[0].orbit.is_physical:
-            yield Departure(each, "graze", is_stable=found[0].orbit.is_stable)
+            next_to = found[0]
+            yield Departure(each, "graze", is_stable=next_to.orbit.is_stable, beside=next_to.value)
             return
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.periodic import TURN, OrbitError
+from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.exponents import Stretching
@@ -38,7 +38,8 @@ class Exponents:
     Attributes
     ----------
     per_impact, standard_error : array, shape (2 modes,)
-        The largest first; the error is the standard error of the mean over 20 parts of the run.
+        The largest first; the error is the standard error of the mean over 20 parts of the run. Without a force the
+        shape is (2 modes - 1,): the exponent 0 of the motion along itself is left out.
     interval : float
         Mean time between impacts, s: per_impact / interval are exponents per second.
     impacts : int
@@ -87,6 +88,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
         raise ExponentError(
             "lyapunov: expected impacts with a speed, got a motion without, or at rest on a stop."
         )
+    if body.has_own_period:
+        return _without_force(body, impacts)
     elapsed = np.diff(impacts.times, prepend=impacts.times[0])
     first = _first_that_counts(body, impacts)
     if count - first < LEAST:
@@ -114,9 +117,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     means = sums / np.diff(edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
     shrinking = body.shrinking(impacts.contacts[first:], impacts.velocities[first:])
-    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * float(
-        (body.damping_ratios * body.frequencies).sum()
-    )
+    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * body.decay
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
     if not off <= SUM_RULE:
         raise ExponentError(
@@ -140,8 +141,19 @@ def _of_orbit(recorded: RecordedOrbit) -> Exponents:
     off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
     if not off <= SUM_RULE:
         raise OrbitError("its multipliers break the sum rule")
-    interval = orbit.periods * TURN / orbit.body.angular_frequency / count
+    interval = orbit.period / count
     return Exponents(per_impact, np.zeros(sizes.size), interval, count, off)
+
+
+def _without_force(body: ImpactingBody, impacts: Impacts) -> Exponents:
+    """Return the exponents of the periodic orbit of a body without a force: its modes grow, and forget no error."""
+    try:
+        return _of_orbit(recorded_orbit(body, impacts))
+    except OrbitError as problem:
+        reason = str(problem).removeprefix("orbit: ")
+        raise ExponentError(
+            f"lyapunov: expected a periodic orbit of a body without a force, got none: {reason}."
+        ) from None
 
 
 def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:

@@ -1,8 +1,8 @@
 """Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.13.
 
-The unknowns are the phases of the impacts and the parameter. A step goes along the branch (pseudo-arclength), so that
-a fold is an ordinary point. Each event is the sign change of a function along the branch; steps of partial length
-narrow it down to rounding.
+The unknowns are those of an orbit (with a force the phases of its impacts) and the parameter. A step goes along the
+branch (pseudo-arclength), so that a fold is an ordinary point. Each event is the sign change of a function along the
+branch; steps of partial length narrow it down to rounding.
 """
 
 from __future__ import annotations
@@ -22,9 +22,15 @@ from vibroimpact.analysis.orbits.branch_points import (
     interpolated_zeros,
 )
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, Corner, next_corner
-from vibroimpact.analysis.orbits.periodic import CLOSE, TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
-from vibroimpact.analysis.orbits.sign_changes import determinant, is_explained, turning, turns_round
-from vibroimpact.analysis.orbits.symmetry import is_symmetric, phase_differences
+from vibroimpact.analysis.orbits.periodic import CLOSE, TOUCHES, TURN, OrbitError, PeriodicOrbit, Trial, tried
+from vibroimpact.analysis.orbits.sign_changes import (
+    determinant,
+    is_explained,
+    is_of_graze,
+    turning,
+    turns_round,
+)
+from vibroimpact.analysis.orbits.symmetry import differences, is_symmetric
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 MOST_NEWTON = 12
@@ -84,7 +90,7 @@ class BranchOrbit:
     orbit : PeriodicOrbit
         Its phases need not lie in the first period: they continue from orbit to orbit.
     tangent : array, shape (p + 1,)
-        Direction of the branch: phases, then the parameter over its range.
+        Direction of the branch: unknowns of the orbit, then the parameter over its range.
     border : float
         Determinant of the equations and the tangent, which changes its sign at a branch point: equations.md 4.13.
     """
@@ -285,8 +291,12 @@ class Follower:
         gaps = np.diff(now.orbit.phases, append=now.orbit.phases[0] + TURN * now.orbit.periods)
         if gaps.min() < TOGETHER:
             return ": two impacts come together"
+        if now.orbit.is_beyond_bounds:
+            return ": its impacts grow without bound"
         try:
-            self.matrix(now.orbit, now.orbit.phases, now.value + 1e-6 * self.settings.span * now.tangent[-1])
+            self.matrix(
+                now.orbit, now.orbit.unknowns, now.value + 1e-6 * self.settings.span * now.tangent[-1]
+            )
         except OrbitError as problem:
             return f": {problem}"
         return ""
@@ -314,32 +324,24 @@ class Follower:
 
     # ---- one step ----
 
-    def residual(
-        self, orbit: PeriodicOrbit, phases: Floats, value: float
-    ) -> tuple[Floats, Floats, PeriodicOrbit]:
-        """Return distances from the stops, their slopes, and the orbit, for other phases and another parameter."""
-        body = self._body_at(value)
-        found = evaluated(body, orbit.contacts, phases, orbit.periods)
-        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
-        return found.distances, found.distance_slopes, made
+    def residual(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Trial:
+        """Return errors, their slopes, and the orbit, for other unknowns and another parameter."""
+        return tried(self._body_at(value), orbit, unknowns)
 
-    def _over_value(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
-        """Return the derivative of the distances by the parameter, measured in its range."""
+    def _over_value(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Floats:
+        """Return the derivative of the errors by the parameter, measured in its range."""
         change = 1e-6 * max(abs(value), 1e-3 * self.settings.span)
-        ends = [
-            evaluated(self._body_at(value + side * change), orbit.contacts, phases, orbit.periods).distances
-            for side in (1.0, -1.0)
-        ]
+        ends = [self.residual(orbit, unknowns, value + side * change).errors for side in (1.0, -1.0)]
         return (ends[0] - ends[1]) * (self.settings.span / (2.0 * change))
 
-    def matrix(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
-        """Return the derivatives of the distances by all unknowns, shape (p, p + 1)."""
-        slopes = evaluated(self._body_at(value), orbit.contacts, phases, orbit.periods).distance_slopes
-        return np.column_stack([slopes, self._over_value(orbit, phases, value)])
+    def matrix(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Floats:
+        """Return the derivatives of the errors by all unknowns, shape (p, p + 1)."""
+        slopes = self.residual(orbit, unknowns, value).slopes
+        return np.column_stack([slopes, self._over_value(orbit, unknowns, value)])
 
     def on_branch(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> BranchOrbit:
         """Return an orbit with the direction of its branch, which is near to a direction if there is one."""
-        matrix = self.matrix(orbit, orbit.phases, value)
+        matrix = self.matrix(orbit, orbit.unknowns, value)
         tangent: Floats = np.linalg.svd(matrix)[2][-1]
         if before is not None and tangent @ before < 0.0:
             tangent = -tangent
@@ -348,24 +350,25 @@ class Follower:
     def step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
         """Return the orbit a step further, and the number of Newton steps; None without an orbit that near."""
         span = self.settings.span
-        phases = now.orbit.phases + step * now.tangent[:-1]
+        before = now.orbit.unknowns
+        unknowns = before + step * now.tangent[:-1]
         value = now.value + step * now.tangent[-1] * span
         least = np.inf
         try:
-            across = self._over_value(now.orbit, phases, value)
+            across = self._over_value(now.orbit, unknowns, value)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                distances, slopes, orbit = self.residual(now.orbit, phases, value)
-                error = float(np.abs(distances).max())
+                errors, slopes, orbit = self.residual(now.orbit, unknowns, value)
+                error = float(np.abs(errors).max())
                 small = error <= CLOSE * orbit.body.scale
                 if small and error >= 0.5 * least:
                     break
                 least = min(least, error)
-                ahead = now.tangent @ np.append(phases - now.orbit.phases, (value - now.value) / span)
+                ahead = now.tangent @ np.append(unknowns - before, (value - now.value) / span)
                 matrix = np.vstack([np.column_stack([slopes, across]), now.tangent])
-                change = np.linalg.solve(matrix, np.append(-distances, step - ahead))
+                change = np.linalg.solve(matrix, np.append(-errors, step - ahead))
                 if not np.abs(change).max() < 1.0:
                     return None
-                phases = phases + change[:-1]
+                unknowns = unknowns + change[:-1]
                 value += change[-1] * span
             else:
                 if not least <= 1e3 * CLOSE * now.orbit.body.scale:
@@ -392,8 +395,8 @@ class Follower:
         return None if found is None else (step, found[0])
 
     def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
-        """Return the difference of two orbits in the unknowns of the branch."""
-        apart = phase_differences(one.orbit, other.orbit)
+        """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
+        apart = differences(one.orbit, other.orbit)
         assert apart is not None, "orbits of one branch hit their stops in one order"
         return np.append(apart, (other.value - one.value) / self.settings.span)
 
@@ -439,7 +442,7 @@ class Follower:
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch
-                if kind != "fold" or not is_level:
+                if (kind != "fold" or not is_level) and not is_of_graze(kind, found[1].orbit):
                     yield found[0], end_of(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
@@ -457,13 +460,13 @@ class Follower:
             found = (now, 0) if place == 0.0 else self.step(now, place)
             if found is None:
                 return None
-            moved = found[0].orbit.phases - now.orbit.phases
+            moved = found[0].orbit.unknowns - now.orbit.unknowns
             return np.append(moved, (found[0].value - now.value) / span), found[0].border
 
         for place, moved, slopes in interpolated_zeros(at, step):
             value = now.value + float(moved[-1]) * span
-            distances, _, orbit = self.residual(now.orbit, now.orbit.phases + moved[:-1], value)
-            if np.abs(distances).max() <= INTERPOLATED * CLOSE * orbit.body.scale:
+            errors, _, orbit = self.residual(now.orbit, now.orbit.unknowns + moved[:-1], value)
+            if np.abs(errors).max() <= INTERPOLATED * CLOSE * orbit.body.scale:
                 return place, BranchOrbit(value, orbit, slopes / np.linalg.norm(slopes), 0.0)
         return None
 

@@ -68,6 +68,24 @@ def _cut(phases: Floats) -> float:
     return float(ordered[widest] + 0.5 * gaps[widest])
 
 
+def has_no_force(dataset: xr.Dataset) -> bool:
+    """Tell whether runs of bodies without a force have recorded impacts."""
+    names = map(str, dataset.variables)
+    return "impact_time" in dataset.variables and not any(name.endswith(FREQUENCY) for name in names)
+
+
+def states_of_section(impacts: xr.Dataset) -> tuple[Floats, Floats]:
+    """Return the state at each impact on the first contact that is hit, and the number of impacts up to the next.
+
+    States, shape (impact, 2): time to the next impact on this contact, s, and speed, m/s. Without a force this contact
+    takes the place of the clock.
+    """
+    contact = impacts["impact_contact"].values
+    section = np.flatnonzero(contact == contact.min())
+    time, speed = impacts["impact_time"].values[section], impacts["impact_velocity"].values[section]
+    return np.column_stack([np.diff(time), speed[:-1]]), np.diff(section).astype(float)
+
+
 def own_period(impacts: xr.Dataset, same: float) -> tuple[int, str]:
     """Return the number of impacts after which a motion without forcing repeats, or 0, and the reason for 0."""
     speed = impacts["impact_velocity"].values

@@ -34,7 +34,7 @@ from vibroimpact.analysis.orbits.following import (
     FollowSettings,
     SpecialPoint,
 )
-from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, tried
 from vibroimpact.analysis.orbits.sign_changes import turns_round
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
@@ -152,13 +152,12 @@ class LocusFollower:
         path = np.array([self._unknowns(each.orbit, each.values) for each in locus.points])
         steps = np.diff(path, axis=0)
         lengths = np.sqrt((steps**2).sum(axis=1))
-        whole = TURN * orbit.periods
         for first in range(orbit.phases.size):
             if (np.roll(orbit.contacts, -first) != like.contacts).any():
                 continue
-            phases = np.append(orbit.phases[first:], orbit.phases[:first] + whole)
-            apart = path - np.concatenate([phases, np.array(start.values) / self._spans])
-            apart[:, :-2] -= TURN * np.round(apart[:, :1] / TURN)
+            apart = path - self._unknowns(orbit.counted_from(first), start.values)
+            if not orbit.body.has_own_period:
+                apart[:, :-2] -= TURN * np.round(apart[:, :1] / TURN)
             shares = -(apart[:-1] * steps).sum(axis=1) / np.maximum(lengths**2, np.finfo(np.float64).tiny)
             off = apart[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * steps
             near = np.flatnonzero(np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths)
@@ -172,22 +171,21 @@ class LocusFollower:
     # ---- equations ----
 
     def _unknowns(self, orbit: PeriodicOrbit, values: tuple[float, float]) -> Floats:
-        return np.concatenate([orbit.phases, np.array(values) / self._spans])
+        return np.concatenate([orbit.unknowns, np.array(values) / self._spans])
 
     def _made(self, orbit: PeriodicOrbit, unknowns: Floats) -> tuple[PeriodicOrbit, Floats]:
-        """Return the orbit of some unknowns, with its distances from the stops over the size of the motion."""
-        phases, values = unknowns[:-2], unknowns[-2:] * self._spans
+        """Return the orbit of some unknowns, with its errors over the size of the motion."""
+        values = unknowns[-2:] * self._spans
         body = self._body_at(float(values[0]), float(values[1]))
-        found = evaluated(body, orbit.contacts, phases, orbit.periods)
-        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
-        return made, found.distances / body.scale
+        found = tried(body, orbit, unknowns[:-2])
+        return found.orbit, found.errors / body.scale
 
     def _equations(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        made, distances = self._made(orbit, unknowns)
+        made, errors = self._made(orbit, unknowns)
         test = start.test(made)
         if not np.isfinite(test):
             raise OrbitError("loci: expected impacts with a speed, and a maximum between them; got none.")
-        return np.append(distances, test)
+        return np.append(errors, test)
 
     def _slopes(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
         columns = []

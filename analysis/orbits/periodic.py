@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.observed_motion import observed_motion
+from vibroimpact.analysis.orbits.own_period import equations, free_multipliers, is_unbounded, unknowns_of
 from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
@@ -25,6 +28,10 @@ SAME = 1e-7
 """Difference of phases, rad, below which they are equal."""
 _MOST_SHOWN = 4
 """Largest number of impacts listed in one line."""
+SLOW = 1e-8
+"""Speed of an impact, over that of the force's motion, below which it grazes."""
+NEXT_TO_BOUND = 0.9
+"""Speed of an impact without a force, over the largest of the search, from which on it is next to that bound."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
 
@@ -37,13 +44,15 @@ class OrbitError(VibroimpactError):
 class PeriodicOrbit:
     """An orbit of a body, P(p,q): p impacts in q periods of the force.
 
+    Without a force q is 1, and the clock of the body has the period of the orbit.
+
     Attributes
     ----------
     body : ImpactingBody
     periods : int
         q.
     phases : array, shape (p,)
-        Forcing phases of the impacts, rad, ascending, the first in [0, 2 pi).
+        Forcing phases of the impacts, rad, ascending, the first in [0, 2 pi); without a force the first is 0.
     contacts : array of int, shape (p,)
         Contact of each impact, from 0.
     velocities : array, shape (p,)
@@ -66,7 +75,18 @@ class PeriodicOrbit:
             ", ".join(f"{each:.6g}" for each in column[:_MOST_SHOWN]) + ", ..." * (column.size > _MOST_SHOWN)
             for column in (self.phases, self.velocities)
         )
-        return f"<{self.full_name}, {self.stability}: phases {phases}; velocities {speeds}>"
+        period = f"period {self.period:.6g}; " if self.body.has_own_period else ""
+        return f"<{self.full_name}, {self.stability}: {period}phases {phases}; velocities {speeds}>"
+
+    @property
+    def period(self) -> float:
+        """Time after which the orbit repeats, s."""
+        return self.periods * self.body.period
+
+    @property
+    def shift(self) -> float:
+        """Shift of the observed point over the orbit, m, where nothing ties the body to the ground; else 0."""
+        return self.period * (self.body.drift or 0.0)
 
     @property
     def stability(self) -> str:
@@ -101,11 +121,31 @@ class PeriodicOrbit:
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers, the largest first, shape (2 modes,); NaN for a graze."""
+        """Floquet multipliers, the largest first, shape (2 modes,); NaN for a graze.
+
+        Without a force the shape is (2 modes - 1,): the multiplier 1 of the motion along itself is left out.
+        """
+        own = self.body.has_own_period
         if not np.isfinite(self.monodromy).all():
-            return np.full(self.monodromy.shape[0], np.nan + 0j)
-        found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
+            return np.full(self.monodromy.shape[0] - own, np.nan + 0j)
+        found = self._split[0] if own else np.linalg.eigvals(self.monodromy).astype(np.complex128)
         return found[np.argsort(-np.abs(found), kind="stable")]
+
+    @cached_property
+    def _split(self) -> tuple[NDArray[np.complex128], float]:
+        """Multipliers across the motion, and the multiplier along it."""
+        body = self.body
+        x, v = np.split(self.states[0], 2)
+        damping = 2.0 * body.damping_ratios * np.abs(body.frequencies)
+        drag = damping * v if body.coupling is None else np.asarray(body.coupling) @ v
+        flow = np.concatenate([v, body.held - body.stiffnesses * x - drag])
+        return free_multipliers(self.monodromy, flow, body.slowest)
+
+    @property
+    def multiplier_of_motion(self) -> float:
+        """Multiplier of the motion along itself: 1 without a force, NaN with a force or for a graze."""
+        is_known = self.body.has_own_period and np.isfinite(self.monodromy).all()
+        return self._split[1] if is_known else float("nan")
 
     @property
     def determinant(self) -> float:
@@ -119,8 +159,7 @@ class PeriodicOrbit:
         """Product of r (r + r' V) of the impacts and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
         squared = np.prod(body.shrinking(self.contacts, self.velocities))
-        decay = float((body.damping_ratios * body.frequencies).sum())
-        return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
+        return float(squared * np.exp(-2.0 * self.period * body.decay))
 
     @property
     def falling(self) -> NDArray[np.bool_]:
@@ -142,6 +181,11 @@ class PeriodicOrbit:
         return self.body.kernel.maximum(self.contacts, self.phases, self.periods, self.states)
 
     @property
+    def is_beyond_bounds(self) -> bool:
+        """Whether an impact without a force is next to the largest speed of the search."""
+        return self.body.has_own_period and is_unbounded(self.body, self.velocities / NEXT_TO_BOUND)
+
+    @property
     def is_physical(self) -> bool:
         """Whether it hits its stops from inside, and never lies beyond one."""
         return (
@@ -152,12 +196,12 @@ class PeriodicOrbit:
     @cached_property
     def turns(self) -> int:
         """Number of times that the orbit repeats a shorter orbit; 1 if it does not."""
-        p, q = self.phases.size, self.periods
-        for turns in range(min(p, q), 1, -1):
-            if p % turns or q % turns:
+        p, q, own = self.phases.size, self.periods, self.body.has_own_period
+        for turns in range(p if own else min(p, q), 1, -1):
+            if p % turns or (q % turns and not own):
                 continue
             shifted = np.roll(self.phases, -(p // turns)) + TURN * q * (np.arange(p) >= p - p // turns)
-            same = np.abs(shifted - self.phases - TURN * (q // turns)).max() < SAME
+            same = np.abs(shifted - self.phases - TURN * q / turns).max() < SAME
             if same and (np.roll(self.contacts, -(p // turns)) == self.contacts).all():
                 return turns
         return 1
@@ -165,8 +209,40 @@ class PeriodicOrbit:
     @property
     def once(self) -> PeriodicOrbit:
         """The shortest orbit of the same motion."""
-        p, q = self.phases.size // self.turns, self.periods // self.turns
-        return PeriodicOrbit(self.body, q, self.phases[:p], self.contacts[:p], self.velocities[:p])
+        p, q, body, phases = (
+            self.phases.size // self.turns,
+            self.periods // self.turns,
+            self.body,
+            self.phases,
+        )
+        if body.has_own_period:
+            q, body, phases = 1, body.with_period(self.period / self.turns), phases * self.turns
+        return PeriodicOrbit(body, q, phases[:p], self.contacts[:p], self.velocities[:p])
+
+    def repeated(self, turns: int) -> PeriodicOrbit:
+        """Return the orbit counted several times, as one orbit."""
+        later = [self.phases + TURN * self.periods * turn for turn in range(turns)]
+        phases, body, periods = np.concatenate(later), self.body, turns * self.periods
+        if body.has_own_period:
+            phases, body, periods = phases / turns, body.with_period(turns * self.period), 1
+        return PeriodicOrbit(
+            body, periods, phases, np.tile(self.contacts, turns), np.tile(self.velocities, turns)
+        )
+
+    def counted_from(self, impact: int) -> PeriodicOrbit:
+        """Return the same orbit counted from another of its impacts, from 0; without a force this impact is at 0."""
+        phases = np.append(self.phases[impact:], self.phases[:impact] + TURN * self.periods)
+        if self.body.has_own_period:
+            phases = phases - phases[0]
+        contacts, velocities = np.roll(self.contacts, -impact), np.roll(self.velocities, -impact)
+        return PeriodicOrbit(self.body, self.periods, phases, contacts, velocities)
+
+    @cached_property
+    def unknowns(self) -> Floats:
+        """Unknowns of its equations: the phases; without a force those of `own_period`."""
+        if self.body.has_own_period:
+            return unknowns_of(self.body, self.phases, self.velocities)
+        return self.phases
 
     def at(self, phases: Floats) -> tuple[Floats, Floats]:
         """Return displacement and velocity of the observed point at phases from the first impact on.
@@ -181,7 +257,12 @@ class PeriodicOrbit:
         tuple of array
             m, m/s; at an impact the values after it.
         """
-        return _observed(self, phases)
+        return observed_motion(self.body, self.phases, self.states, phases)
+
+
+def grazes(orbit: PeriodicOrbit, slow: float = SLOW) -> NDArray[np.bool_]:
+    """Return whether each impact of an orbit has no speed, shape (p,): less than `slow` of that of the motion."""
+    return np.asarray(orbit.velocities < slow * orbit.body.scale * orbit.body.angular_frequency)
 
 
 def least_speed(body: ImpactingBody) -> float:
@@ -191,6 +272,42 @@ def least_speed(body: ImpactingBody) -> float:
     """
     fastest = max(body.harmonics) * body.angular_frequency
     return TOUCHES * body.scale * fastest if body.loose else 0.0
+
+
+class Trial(NamedTuple):
+    """An orbit for unknowns that need not solve its equations.
+
+    Attributes
+    ----------
+    errors : array, shape (n,)
+        Distances from the stops, m; without a force speeds that do not fit follow them.
+    slopes : array, shape (n, n)
+        Derivatives of the errors over the unknowns.
+    orbit : PeriodicOrbit
+    """
+
+    errors: Floats
+    slopes: Floats
+    orbit: PeriodicOrbit
+
+
+def tried(body: ImpactingBody, like: PeriodicOrbit, unknowns: Floats) -> Trial:
+    """Return an orbit of a body with the impacts of another one, for other unknowns; OrbitError where it has none."""
+    if body.has_own_period:
+        own = equations(body, like.contacts, unknowns)
+        if is_unbounded(body, own.velocities):
+            raise OrbitError("orbit: expected impacts of bounded speed, got ones that grow without bound.")
+        _refuse_end(own.end, own.phases)
+        if not (np.isfinite(own.errors).all() and np.isfinite(own.slopes).all()):
+            raise OrbitError(
+                f"orbit: expected a motion of bounded size, got a period of {own.body.period:.3g}."
+            )
+        return Trial(
+            own.errors, own.slopes, PeriodicOrbit(own.body, 1, own.phases, like.contacts, own.velocities)
+        )
+    found = evaluated(body, like.contacts, unknowns, like.periods)
+    made = PeriodicOrbit(body, like.periods, unknowns, like.contacts, found.velocities)
+    return Trial(found.distances, found.distance_slopes, made)
 
 
 def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
@@ -303,7 +420,9 @@ def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
 
 
 def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return an orbit counted from its first impact in the first period."""
+    """Return an orbit counted from its first impact in the first period; without a force as it is."""
+    if orbit.body.has_own_period:
+        return orbit
     whole = TURN * orbit.periods
     phases = np.mod(orbit.phases, whole)
     order = np.argsort(phases, kind="stable")
@@ -377,50 +496,3 @@ def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.i
         )
     if not ((contacts >= 0) & (contacts < len(body.contacts))).all():
         raise UsageError(f"orbit: contacts: expected 0 to {len(body.contacts) - 1}, got {contacts.tolist()}.")
-
-
-def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
-    body = orbit.body
-    flight = np.clip(np.searchsorted(orbit.phases, phases, side="right") - 1, 0, orbit.phases.size - 1)
-    u = ((phases - orbit.phases[flight]) / body.angular_frequency)[:, None]
-    modes = body.frequencies.size
-    after = orbit.states[flight]
-    start = _steady(body, orbit.phases[flight])
-    now = _steady(body, phases)
-    x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
-    moved, faster = _free(body, u, x, v)
-    pushed = np.where(body.frequencies == 0.0, body.held, 0.0)
-    moved, faster = moved + 0.5 * pushed * u**2, faster + pushed * u
-    return (moved + now[0]) @ body.observed, (faster + now[1]) @ body.observed
-
-
-def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return displacements and velocities of the modes, free from (x, v) for u seconds, shape (time, mode)."""
-    w, z = body.frequencies, body.damping_ratios
-    if body.coupling is not None:
-        loose, w = body.loose, w[body.loose :]
-        rates, vectors = body.complex_modes
-        parts = np.linalg.solve(vectors, np.concatenate([w * x[:, loose:], v[:, loose:]], axis=1).T)
-        later = (vectors @ (parts * np.exp(rates * u).T)).real.T
-        moved = np.concatenate([x[:, :loose] + v[:, :loose] * u, later[:, : w.size] / w], axis=1)
-        return moved, np.concatenate([v[:, :loose], later[:, w.size :]], axis=1)
-    decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w
-    # exponentials that decay, never a cosh that overflows: equations.md 1.2
-    fast = np.where(z > 1.0, -(decay + rate), -decay - 1j * rate)
-    slow = np.where(z > 1.0, -(w**2) / np.where(z > 1.0, decay + rate, 1.0), -decay + 1j * rate)
-    left, gone = np.exp(slow * u), np.exp(fast * u)
-    apart = np.where(rate == 0.0, 1.0, slow - fast)
-    c = 0.5 * (left + gone)
-    s = np.where(rate == 0.0, u * left, (left - gone) / apart)
-    return ((c + decay * s) * x + s * v).real, (-(w**2) * s * x + (c - decay * s) * v).real
-
-
-def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
-    """Return the steady displacements and velocities of the modes, shape (phase, mode)."""
-    moved, faster = np.broadcast_to(body.levels, (phases.size, body.levels.size)), np.zeros(1)
-    for order, force in body.harmonics.items():
-        if force.any():
-            w = order * body.angular_frequency
-            turned = body.steady(w, force) * np.exp(1j * order * phases)[:, None]
-            moved, faster = moved + turned.real, faster + (1j * w * turned).real
-    return moved, faster

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.own_orbits import orbit_of_round, repeating_round
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
@@ -62,6 +63,8 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
     """
     if not impacts.times.size:
         raise OrbitError(NO_IMPACTS)
+    if body.has_own_period:
+        return _own_orbit(body, impacts)
     phases = _unwrapped(impacts, body.angular_frequency)
     count, periods = _round(phases, impacts)
     last = slice(phases.size - count, None)
@@ -79,6 +82,26 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
             f"no orbit {found.name} of this body next to the recorded impacts: nearest {max(away, distance):.2g} away"
         )
     return RecordedOrbit(_once(found), distance)
+
+
+def _own_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
+    """Return the orbit of a body without a force that recorded impacts repeat."""
+    times, velocities, contacts = impacts.times, impacts.velocities, impacts.contacts
+    for close in REPEATS:
+        count = repeating_round(times, velocities, contacts, MOST_IMPACTS, close)
+        if count is not None:
+            found = orbit_of_round(body, times, velocities, contacts, count)
+            distance = float(np.abs(found.velocities - velocities[-count:]).max() / velocities.max())
+            if distance > NEAR:
+                raise OrbitError(
+                    f"no orbit {found.name} of this body next to the recorded impacts: {distance:.2g} away"
+                )
+            return RecordedOrbit(found.once, distance)
+    raise OrbitError(_not_periodic(times.size))
+
+
+def _not_periodic(count: int) -> str:
+    return f"not periodic: {count} recorded impacts do not repeat within half of them, {MOST_IMPACTS} at most"
 
 
 def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -112,9 +135,7 @@ def _round(phases: Floats, impacts: Impacts) -> tuple[int, int]:
         for count, difference in off.items():
             if difference <= close:
                 return count, round(float((phases[count] - phases[0]) / TURN))
-    raise OrbitError(
-        f"not periodic: {phases.size} recorded impacts do not repeat within half of them, {MOST_IMPACTS} at most"
-    )
+    raise OrbitError(_not_periodic(phases.size))
 
 
 def _same_order(found: Floats, recorded: Floats, periods: int) -> NDArray[np.intp]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.own_orbits import own_closed_form, own_starts
 from vibroimpact.analysis.orbits.periodic import (
     SAME,
     TURN,
@@ -15,6 +16,7 @@ from vibroimpact.analysis.orbits.periodic import (
     closed_form,
     find_orbit,
 )
+from vibroimpact.analysis.orbits.symmetry import differences
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
@@ -65,16 +67,24 @@ def fastest_first(orbit: PeriodicOrbit) -> float:
 def each_orbit(
     body: ImpactingBody, impacts: int, periods: int, *, starts: int = STARTS, penetrating: bool = False
 ) -> Iterator[PeriodicOrbit]:
-    """Yield the orbits of `orbits_of` as they are found."""
+    """Yield the orbits of `orbits_of` as they are found.
+
+    Bodies without a force have P(p,1) only; orbits of one impact are complete up to `own_orbits.LONGEST`.
+    """
     if not (1 <= impacts <= MOST_IMPACTS and periods >= 1):
         raise UsageError(
             f"orbit: expected 1 to {MOST_IMPACTS} impacts in 1 or more periods, got {impacts} in {periods}."
         )
-    found: Iterator[PeriodicOrbit]
-    if impacts == 1:
-        found = (
-            orbit for contact in range(len(body.contacts)) for orbit in closed_form(body, periods, contact)
+    if body.has_own_period and periods > 1:
+        raise UsageError(
+            f"orbit: periods: expected 1 of a body without a force, whose orbits set it, got {periods}."
         )
+    found: Iterator[PeriodicOrbit]
+    contacts = range(len(body.contacts))
+    if impacts == 1 and body.has_own_period:
+        found = (orbit for contact in contacts for orbit in own_closed_form(body, contact))
+    elif impacts == 1:
+        found = (orbit for contact in contacts for orbit in closed_form(body, periods, contact))
     else:
         found = _from_starts(body, impacts, periods, starts)
     for orbit in found:
@@ -86,6 +96,9 @@ def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     """Tell whether two orbits are equal, apart from the impact or period with which they begin."""
     if one.name != other.name or one.phases.size != other.phases.size:
         return False
+    if one.body.has_own_period:
+        apart = differences(one, other)
+        return apart is not None and bool(np.abs(apart).max() < SAME)
     p, whole = one.phases.size, TURN * one.periods
     for shift in range(p):
         turned = np.roll(np.arange(p), -shift)
@@ -101,15 +114,20 @@ def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
 
 def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -> Iterator[PeriodicOrbit]:
     found: list[PeriodicOrbit] = []
-    for phases, contacts in _trains(impacts, periods, len(body.contacts), starts):
-        try:
-            orbit = find_orbit(body, phases, contacts.tolist(), periods)
-        except OrbitError:
-            continue
+    own = body.has_own_period
+    for orbit in own_starts(body, impacts, starts) if own else _near_trains(body, impacts, periods, starts):
         hits = orbit.velocities.min() > MOST_SPEEDS * float(np.abs(orbit.velocities).max())
         if hits and not any(same_orbit(orbit, other) for other in found):
             found.append(orbit)
             yield orbit
+
+
+def _near_trains(body: ImpactingBody, impacts: int, periods: int, starts: int) -> Iterator[PeriodicOrbit]:
+    for phases, contacts in _trains(impacts, periods, len(body.contacts), starts):
+        try:
+            yield find_orbit(body, phases, contacts.tolist(), periods)
+        except OrbitError:
+            continue
 
 
 def _trains(impacts: int, periods: int, contacts: int, starts: int) -> list[tuple[Floats, NDArray[np.int32]]]:

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit, grazes
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
+SLOWEST = 1e-6
+"""Speed of an impact, over the size of the motion, below which a fold without a force is the graze of this impact."""
 MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2, "branch point": 1}
 """Number of multipliers that pass the unit circle at a point of each kind."""
 
@@ -34,6 +36,11 @@ def turns_round(multipliers: NDArray[np.complex128]) -> bool:
     """Tell whether two complex multipliers are on the unit circle, not two real ones with the product 1."""
     nearest = multipliers[np.argmin(np.abs(np.abs(multipliers) - 1.0))]
     return bool(abs(nearest.imag) > 1e-6 and abs(abs(nearest) - 1.0) < 1e-6)
+
+
+def is_of_graze(kind: str, at: PeriodicOrbit) -> bool:
+    """Tell whether a zero without a force is that of a speed: the parameter is even in the speed of an impact there."""
+    return at.body.has_own_period and not kind.startswith("graze") and bool(grazes(at, SLOWEST).any())
 
 
 def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:

@@ -11,7 +11,7 @@ from vibroimpact.fmus.bodies.impacting_body import Complexes, Contact, Floats, I
 EQUAL = 1e-12
 """Difference, over the larger size, up to which numbers of a body and of its mirror image are equal."""
 ALIKE = 1e-6
-"""Difference of phases, rad, up to which two orbits at one value of the parameter are the same."""
+"""Difference of the unknowns (phases, rad) up to which two orbits at one value of the parameter are the same."""
 
 
 def mirrored_contacts(body: ImpactingBody) -> NDArray[np.int32] | None:
@@ -49,11 +49,14 @@ def _equal(one: Floats | Complexes, other: Floats | Complexes) -> bool:
 
 
 def mirror_image(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """Return the mirror image of an orbit, half a period later; None if its body has no mirror symmetry."""
+    """Return the mirror image of an orbit, half a period later; None if its body has no mirror symmetry.
+
+    Without a force the image need not be later.
+    """
     contacts = mirrored_contacts(orbit.body)
     if contacts is None:
         return None
-    later = orbit.phases + 0.5 * TURN
+    later = orbit.phases if orbit.body.has_own_period else orbit.phases + 0.5 * TURN
     return ordered(
         PeriodicOrbit(orbit.body, orbit.periods, later, contacts[orbit.contacts], orbit.velocities)
     )
@@ -65,21 +68,21 @@ def is_symmetric(orbit: PeriodicOrbit) -> bool:
     return image is not None and are_alike(orbit, image)
 
 
-def phase_differences(one: PeriodicOrbit, other: PeriodicOrbit) -> Floats | None:
-    """Return the phases of an orbit less those of another, counted from the impact and period that fit best.
+def differences(one: PeriodicOrbit, other: PeriodicOrbit) -> Floats | None:
+    """Return the unknowns of another orbit less those of one, counted from the impact and period that fit best.
 
     None if their stops are hit in another order.
     """
     if one.contacts.size != other.contacts.size or one.periods != other.periods:
         return None
-    whole = TURN * one.periods
     shifts = [k for k in range(one.contacts.size) if (np.roll(other.contacts, -k) == one.contacts).all()]
-    turned = [np.append(other.phases[k:], other.phases[:k] + whole) - one.phases for k in shifts]
-    differences = [each - TURN * np.round(each.mean() / TURN) for each in turned]
-    return min(differences, key=lambda each: float(np.abs(each).max()), default=None)
+    apart = [other.counted_from(k).unknowns - one.unknowns for k in shifts]
+    if not one.body.has_own_period:
+        apart = [each - TURN * np.round(each.mean() / TURN) for each in apart]
+    return min(apart, key=lambda each: float(np.abs(each).max()), default=None)
 
 
 def are_alike(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     """Tell whether two orbits of one body are the same, from whichever impact and period they are counted."""
-    apart = phase_differences(one, other)
+    apart = differences(one, other)
     return apart is not None and bool(np.abs(apart).max() < ALIKE)

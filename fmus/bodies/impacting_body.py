@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ DIRECTIONS = {1: 1.0, 2: -1.0}
 """Direction of a stop by the number of its side in FMUs: 1 is above, 2 below."""
 FALLING = 0.75
 """Derivative of r(V) V over r(V) above the yield velocity, where r falls as V^(-1/4)."""
+
+MOST_STEPS_OF_SPEED = 50
+"""Largest number of Newton steps from the speed of equal impulse to the speed of an impact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,20 @@ class Contact:
             else slow
         )
 
+    def speed_of(self, equal: float) -> float:
+        """Return the speed whose impulse is that of another speed at the restitution of slow impacts, m/s: 4.7."""
+        whole = 1.0 + self.restitution
+        if not 0.0 < self.yield_velocity < equal:
+            return equal
+        speed = equal
+        for _ in range(MOST_STEPS_OF_SPEED):  # Newton's method on a concave function converges from below
+            over = (1.0 + float(self.restitution_at(speed))) * speed - whole * equal
+            slope = 1.0 + float(self.restitution_slope(speed))
+            speed -= over / slope
+            if abs(over) <= 1e-15 * whole * equal:
+                break
+        return speed
+
     def stop_at(self, phase: float) -> float:
         """Return the position of the stop at a phase of the clock, m."""
         moved = sum((each * cmath.exp(1j * order * phase)).real for order, each in self.motion.items())
@@ -95,7 +113,8 @@ class ImpactingBody:
     Attributes
     ----------
     frequencies, damping_ratios : array, shape (modes,)
-        Natural angular frequencies, rad/s; damping ratios, of the diagonal where the damping couples the modes.
+        Natural angular frequencies, rad/s, negative where the stiffness is; damping ratios, of the diagonal where the
+        damping couples the modes.
     force, held : array, shape (modes,)
         Modal amplitude of the harmonic force, and modal constant force, N kg^(-1/2).
     angular_frequency, phase : float
@@ -107,6 +126,12 @@ class ImpactingBody:
         Damping that couples the modes, 1/s, symmetric; None where each mode has its own.
     further : mapping of int to array, shape (modes,)
         Complex modal amplitudes of further sines, N kg^(-1/2), by their harmonic n: Re(amplitude e^(i n phase)).
+    has_own_period : bool
+        Whether neither force nor stop sets the period: the clock is that of an orbit (equations.md 4.14).
+    drift : float or None
+        Mean velocity of the observed point with the whole body, m/s, where nothing ties it to the ground; else None.
+    unseen : mapping of int to complex
+        Complex amplitudes of the observed point by the motion of such a whole under the force, m, by their harmonic.
     """
 
     frequencies: Floats
@@ -119,6 +144,9 @@ class ImpactingBody:
     observed: Floats
     coupling: Floats | None = None
     further: Mapping[int, Complexes] = field(default_factory=dict)
+    has_own_period: bool = False
+    drift: float | None = None
+    unseen: Mapping[int, complex] = field(default_factory=dict)
 
     @cached_property
     def harmonics(self) -> Mapping[int, Complexes]:
@@ -149,7 +177,28 @@ class ImpactingBody:
     def levels(self) -> Floats:
         """Displacements of the modes under the constant force, kg^(1/2) m; 0 without a spring."""
         found = np.zeros(self.frequencies.size)
-        found[self.loose :] = self.held[self.loose :] / self.frequencies[self.loose :] ** 2
+        found[self.loose :] = self.held[self.loose :] / self.stiffnesses[self.loose :]
+        return found
+
+    @cached_property
+    def stiffnesses(self) -> Floats:
+        """Stiffnesses of the modes, 1/s^2: their frequencies squared, with the signs of these."""
+        return self.frequencies * np.abs(self.frequencies)
+
+    @property
+    def decay(self) -> float:
+        """Sum of the decays of all modes, 1/s: free motion shrinks volumes of states at twice this rate."""
+        return float((self.damping_ratios * np.abs(self.frequencies)).sum())
+
+    @cached_property
+    def slowest(self) -> float:
+        """Smallest natural angular frequency of the modes with a spring, rad/s."""
+        return float(np.abs(self.frequencies[self.loose :]).min())
+
+    def with_period(self, period: float) -> Self:
+        """Return the body with the period of an orbit, s, as its clock; no force and no stop has a period."""
+        found = replace(self, angular_frequency=2.0 * np.pi / period)
+        found.__dict__["kernel"] = self.kernel.with_frequency(found.angular_frequency)
         return found
 
     @property
@@ -186,20 +235,23 @@ class ImpactingBody:
     def rates(self) -> Complexes:
         """Rates of the free motions e^(rate t) of the modes with springs, 1/s: equations.md 1.2, 4.7."""
         if self.coupling is None:
-            natural, ratios = self.frequencies[self.loose :], self.damping_ratios[self.loose :]
+            natural, ratios = np.abs(self.frequencies[self.loose :]), self.damping_ratios[self.loose :]
             decay = natural * ratios
-            swing = natural * np.sqrt(ratios.astype(np.complex128) ** 2 - 1.0)
+            swing = natural * np.sqrt(
+                ratios.astype(np.complex128) ** 2 - np.sign(self.frequencies[self.loose :])
+            )
             # the slow rate of an overdamped mode from the fast one: their difference would cancel
-            fast = -decay - swing
-            return np.concatenate([fast, natural**2 / fast])
+            fast = np.where(decay < 0.0, -decay + swing, -decay - swing)
+            return np.concatenate([fast, self.stiffnesses[self.loose :] / fast])
         return self.complex_modes[0]
 
     @cached_property
     def complex_modes(self) -> tuple[Complexes, Complexes]:
         """Rates, 1/s, and vectors (w q, q') in columns, of modes with springs that the damping couples."""
-        spring = np.diag(self.frequencies[self.loose :])
+        spring = np.diag(np.abs(self.frequencies[self.loose :]))
         damping = np.asarray(self.coupling)[self.loose :, self.loose :]
-        motion = np.block([[np.zeros_like(spring), spring], [-spring, -damping]])
+        back = np.diag(self.frequencies[self.loose :])
+        motion = np.block([[np.zeros_like(spring), spring], [-back, -damping]])
         rates, vectors = np.linalg.eig(motion)
         return rates.astype(np.complex128), vectors.astype(np.complex128)
 
@@ -230,9 +282,9 @@ class ImpactingBody:
         force = np.asarray(self.force if force is None else force)
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.coupling is None:
-                drag = 2j * self.damping_ratios * self.frequencies * w
-                return np.asarray(force / (self.frequencies**2 - w**2 + drag))
-        stiffness = (self.frequencies**2 - w**2)[..., None] * np.eye(self.frequencies.size)
+                drag = 2j * self.damping_ratios * np.abs(self.frequencies) * w
+                return np.asarray(force / (self.stiffnesses - w**2 + drag))
+        stiffness = (self.stiffnesses - w**2)[..., None] * np.eye(self.frequencies.size)
         try:
             answer = np.linalg.solve(stiffness + 1j * w[..., None] * self.coupling, force[:, None])
         except np.linalg.LinAlgError:
@@ -262,6 +314,8 @@ class ImpactingBody:
         size = sum(np.abs(self.steady(n * w, force)) for n, force in self.harmonics.items() if force.any())
         # a constant force moves a mode without a spring by about this much within a period
         size = size + np.where(self.frequencies == 0.0, np.abs(self.held), 0.0) / w**2
+        if self.has_own_period:  # a constant force alone may set the size of a motion
+            size = size + np.abs(self.levels)
         of_contacts = [
             abs(each.position) + sum(map(abs, each.motion.values())) + float(np.abs(each.shape * size).sum())
             for each in self.contacts

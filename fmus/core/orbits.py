@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 from ctypes import POINTER, Structure, byref, c_double, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +68,8 @@ class OrbitBody:
     angular_frequency : float
         Angular frequency of the clock, rad/s. Force and stops move with its period.
     natural, damping_ratio, held : array, shape (modes,)
-        Natural angular frequencies (rad/s; modes of 0 first), damping ratios, constant modal forces.
+        Natural angular frequencies (rad/s; modes of 0 first; negative: of a negative spring), damping ratios, constant
+        modal forces.
     order : array, shape (harmonics,)
         Whole numbers of turns of the sines in a period of the clock.
     cosine, sine : array, shape (harmonics, modes)
@@ -86,13 +89,20 @@ class OrbitBody:
         self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
         contacts, self.modes = self._arrays["shape"].shape
         addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
-        tied = self._arrays["natural"] > 0.0
+        tied = self._arrays["natural"] != 0.0
         self._terms = None
         if coupling is not None and tied.any():
             self._terms = self._coupled(angular_frequency, coupling, tied)
         terms = None if self._terms is None else self._terms.ctypes.data
         self.harmonics = self._arrays["order"].size
         self.address = BODY(self.modes, contacts, self.harmonics, angular_frequency, *addresses, terms)
+
+    def with_frequency(self, angular_frequency: float) -> Self:
+        """Return the same body with another frequency of its clock, rad/s; no sine turns with the clock."""
+        found = copy.copy(self)
+        found.address = BODY.from_buffer_copy(self.address)
+        found.address.angular_frequency = angular_frequency
+        return found
 
     def _coupled(self, angular_frequency: float, coupling: Array, tied: NDArray[np.bool_]) -> Array:
         """Return the complex modes of the modes with springs in the form of C, as bytes in an array of numbers."""
@@ -127,6 +137,32 @@ class OrbitBody:
         filled = (velocities, distances, slopes, faster)
         end = _library().vi_door_orbit(self.address, train, *(each.ctypes.data for each in filled))
         return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
+
+    def errors(
+        self, contacts: NDArray[np.int32], phases: Array, velocities: Array
+    ) -> tuple[OrbitEnd, Array, Array]:
+        """Return the errors of impacts of a body without a force, whose clock has the period of the orbit: 4.14.
+
+        Parameters
+        ----------
+        contacts : array, shape (impacts,)
+            Contact of each impact, from 0.
+        phases, velocities : array, shape (impacts,)
+            rad, ascending, within 2 pi; speeds towards the stops before the impacts, m/s.
+
+        Returns
+        -------
+        tuple of OrbitEnd, array, array
+            Distances beyond the stops, m, then speeds less those of the motion, m/s, shape (2 impacts,). Their
+            derivatives over the phases, the velocities, and the logarithm of the period, shape (2 impacts, 2 impacts +
+            1). The arrays are valid if the end is `done`.
+        """
+        n = phases.size
+        train, speeds = _train(contacts, phases, 1), _numbers(velocities, phases.shape)
+        errors, slopes = np.empty(2 * n), np.empty((2 * n, 2 * n + 1))
+        arrays = (speeds, errors, slopes)
+        end = _library().vi_door_orbit_errors(self.address, train, *(each.ctypes.data for each in arrays))
+        return OrbitEnd(end), errors, slopes
 
     def wave(self, contact: int, periods: int) -> Wave:
         """Return the distance of P(1,q) beyond its stop over the phase of its impact: equations.md 4.3.
@@ -249,6 +285,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_orbit_couple.argtypes = [c_int32, c_int32, *[c_void_p] * 7]
     # plain addresses: converting arrays runs Python code, where Ctrl-C would turn into an error of an argument
     library.vi_door_orbit.argtypes = [body, train, *[c_void_p] * 4]
+    library.vi_door_orbit_errors.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_wave.argtypes = [body, train, POINTER(_Wave)]
     library.vi_door_orbit_motion.argtypes = [body, train, *[c_void_p] * 3]
     library.vi_door_orbit_maximum.argtypes = [body, train, *[c_void_p] * 2]

@@ -14,7 +14,7 @@ class FindOrbits(Operation):
 
     Without --impacts and --periods the result is all orbits of one impact a period, and the orbit on which a long run
     ends. With --seed or --from-dataset it is the orbit near the seed. No orbit passes a stop: all maxima between its
-    impacts are found, and the nearest to a stop is printed.
+    impacts are found, and the nearest to a stop is printed. Without a force the period is the orbit's own.
 
     Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
     """

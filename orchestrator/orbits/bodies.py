@@ -7,30 +7,41 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.bodies import ImpactingBody
-from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen, seen_of_drag
-from vibroimpact.orchestrator.run.parameters import body_points
+from vibroimpact.fmus.bodies import BodyPoints, ImpactingBody
+from vibroimpact.fmus.bodies.adrift import loose_first, without_drift
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.limits import OF_OWN_PERIOD, Seen, refuse_orbits, seen, seen_of_drag
+from vibroimpact.orchestrator.run.parameters import body_points, float_parameters
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
+SLIGHT = 1e-12
+"""Negative damping, over the largest, below which it is rounding."""
 
 
-def impacting_body(scene: Scene) -> ImpactingBody:
+def impacting_body(scene: Scene, *, free: bool = False) -> ImpactingBody:
     """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on rigid stops.
 
     Parameters
     ----------
     scene : Scene
         In the short form; its sweep is ignored.
+    free : bool
+        Whether the scene may be without a force: negative dashpots then keep the body moving (equations.md 4.14). And
+        whether nothing need tie the body to the ground: its drift is then told apart.
 
     Raises
     ------
     UsageError
         The scene is not a body of modes between restitution stops under one harmonic force.
     """
-    refuse_orbits(scene, seen(scene))
-    body = body_points(scene)
-    found = body.mass_normalised()
+    own = free and scene.period is None
+    refuse_orbits(scene, seen(scene), OF_OWN_PERIOD if own else ())
+    found = (_without_force(scene) if own else body_points(scene)).mass_normalised()
+    order = np.argsort(found.frequencies != 0.0, kind="stable")
+    found = replace(loose_first(found, order), has_own_period=own)
+    if free and found.loose and not found.is_dragged:
+        found = without_drift(found, _velocities(scene)[order])
     if found.is_dragged:
         refuse_orbits(scene, [seen_of_drag(scene)])
     for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
@@ -41,6 +52,32 @@ def impacting_body(scene: Scene) -> ImpactingBody:
         named = [replace(each, name=name) for each, name in zip(found.contacts, keys, strict=True)]
         return replace(found, contacts=tuple(named))
     return found
+
+
+def _velocities(scene: Scene) -> Floats:
+    """Return the modal velocities at the start of a scene, kg^(1/2) m/s."""
+    names = scene.body.start_names
+    floats = float_parameters(scene, None)
+    velocities = [floats[name] for name in names[len(names) // 2 :]]
+    return np.asarray(modal_displacements(scene, np.array([velocities]))[0])
+
+
+def _without_force(scene: Scene) -> BodyPoints:
+    """Return the body of a scene without a force; its clock has any period until an orbit sets it."""
+    clock = {"forcing.angular_frequency": 1.0, "forcing.amplitude": 0.0, "forcing.phase": 0.0}
+    return body_points(scene, clock | float_parameters(scene, None))
+
+
+def refuse_without_energy(scene: Scene, body: ImpactingBody) -> None:
+    """Raise UsageError for a body without a force that no dashpot gives energy: no orbit of it is isolated."""
+    if not body.has_own_period:
+        return
+    damping = np.diag(body.damping_ratios) if body.coupling is None else body.coupling
+    if not (np.linalg.eigvalsh(damping) < -SLIGHT * np.abs(damping).max()).any():
+        raise UsageError(
+            f"{scene.source}: forcing: expected a force, or a negative dashpot that gives energy, got neither: the "
+            "motion dies away, or keeps any energy that it has."
+        )
 
 
 def modal_displacements(scene: Scene, displacements: Floats) -> Floats:

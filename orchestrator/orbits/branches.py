@@ -174,7 +174,7 @@ def follow_branches(
     if seed is None and impacts is None:
         followed.most_begun_impacts = MOST_BEGUN_IMPACTS
     yield from _departed(follower, followed, doublings, grazes)
-    if seed is None and impacts is None and periods == 1:
+    if seed is None and impacts is None and periods == 1 and scene.period is not None:
         followed.check = IndexCheck(scene, parameter, settings, starts)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
     if required:
@@ -293,7 +293,9 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
             kept[value] = body_along(scene, {parameter: value})
         return kept[value]
 
-    impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
+    impacting_body(
+        scene.at({parameter: value}), free=True
+    )  # a wrong key is refused before any orbit is followed
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
@@ -305,7 +307,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
-        return impacting_body(scene.at(values))
+        return impacting_body(scene.at(values), free=True)
     except UsageError as problem:
         raise OrbitError(str(problem)) from problem
 
@@ -320,19 +322,19 @@ def _is_on_branch(
     branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings
 ) -> bool:
     """Return whether an orbit is on a branch, counted from any of its impacts and periods."""
-    whole = 2.0 * np.pi * orbit.periods
     for branch in branches:
         alike = branch.orbits[0].orbit
         if alike.periods != orbit.periods or alike.phases.size != orbit.phases.size:
             continue
         off = ((branch.values - value) / settings.span)[:, None]
-        rows = np.array([each.orbit.phases for each in branch.orbits])
+        rows = np.array([each.orbit.unknowns for each in branch.orbits])
         steps = np.diff(np.hstack([rows, off]), axis=0)
         for first in range(orbit.phases.size):
             if (np.roll(orbit.contacts, -first) != alike.contacts).any():
                 continue
-            apart = rows - np.append(orbit.phases[first:], orbit.phases[:first] + whole)
-            apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
+            apart = rows - orbit.counted_from(first).unknowns
+            if not orbit.body.has_own_period:
+                apart = apart - 2.0 * np.pi * np.round(apart[:, :1] / (2.0 * np.pi))
             if _off_path(np.hstack([apart, off]), steps) < SAME_ORBIT:
                 return True
     return False

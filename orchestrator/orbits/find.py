@@ -16,6 +16,7 @@ from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
+from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
 from vibroimpact.analysis.study import Study, whole
@@ -26,7 +27,7 @@ from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.operations.orbit import FindOrbits
 from vibroimpact.orchestrator.orbits.beginning import files_of, orbit_start, refuse_contradictions
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.bodies import impacting_body, refuse_without_energy
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.provenance import scene_attributes
@@ -41,6 +42,8 @@ TRANSIENT = 2000
 """Forcing periods of a run before its orbit is read."""
 RECORDED = 64
 """Forcing periods in which its orbit is read: chaos takes 40 periods to recognise, an orbit twice its own."""
+RECORDED_TURNS = 100
+"""Turns of the slowest mode that are recorded without a force."""
 LARGEST_PHASE = 1e6
 """Largest phase of a seed, rad; a larger phase has lost digits within its turn."""
 REPEATS = 1e-4
@@ -80,7 +83,8 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
         """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
-        body, counts = impacting_body(self.scene), (self.impacts, self.periods)
+        body, counts = impacting_body(self.scene, free=True), (self.impacts, self.periods)
+        refuse_without_energy(self.scene, body)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
             return
@@ -119,9 +123,10 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def print_results(self) -> None:
         """Print a row for each orbit."""
+        own = self.scene.period is None
         rows = table(
             f"Periodic orbits: {self.scene.title or self.scene.source}",
-            *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
+            *("<orbit", "<", *((">period",) if own else ()), "<phases, rad", "<stops", "<impact velocities"),
             *("<largest multipliers", ">determinant, off by", ">nearest maximum"),
             rows=map(_row, self.found),
         )
@@ -129,6 +134,15 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             wide_terminal().print(rows)
         many = counted(len(self._physical), "physical orbit")
         say(f"{many}." if self._physical else f"No physical orbit {self._called}.")
+        drifts = [orbit.shift for orbit in self.found if orbit.body.drift is not None]
+        if drifts:
+            say(
+                f"Nothing ties the body to the ground: from the scene's start it drifts by {drifts[0]:.6g} over the "
+                "first orbit. Any other velocity of the whole gives the same impacts."
+            )
+        if own and self.found:
+            off = max(abs(orbit.multiplier_of_motion - 1.0) for orbit in self.found)
+            say(f"Each orbit has one more multiplier, 1, of the motion along itself; found to {off:.0e}.")
 
     @property
     def _called(self) -> str:
@@ -158,6 +172,11 @@ def find_orbits(
 
 
 def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
+    if body.has_own_period:
+        raise UsageError(
+            "orbit: seed: expected none of a body without a force, whose phases have no force to count from, got one. "
+            "Give the number of impacts, or a start that leads to the orbit."
+        )
     if impacts not in (None, len(seed)):
         raise UsageError(
             f"orbit: seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
@@ -180,17 +199,26 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
 @contextmanager
 def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float], State | None], RunRecord]]:
     """Yield a function that runs a scene long at values of its keys, from a carried state or from its own start."""
-    record = {"extrema": True, "strobe": True, "impacts": True, "each_period": True}
-    periods = {"transient_periods": TRANSIENT, "recorded_periods": RECORDED}
-    values = {f"record.{name}": value for name, value in {**record, **periods}.items()}
-    with kept_scene(scene.with_values(values)) as opened:
+    kept = ("impacts",) if scene.period is None else ("extrema", "strobe", "impacts", "each_period")
+    values = {f"record.{name}": True for name in kept}
+    with kept_scene(scene.with_values({**_long_record(scene), **values})) as opened:
         yield opened.runner.record_of
+
+
+def _long_record(scene: Scene) -> dict[str, float]:
+    """Return the keys of a long record: of forcing periods, or of turns of the slowest mode without a force."""
+    names = ("record.transient_periods", "record.recorded_periods")
+    if scene.period is not None:
+        return dict(zip(names, (TRANSIENT, RECORDED), strict=True))
+    turn = 2.0 * np.pi / impacting_body(scene, free=True).slowest
+    names = ("record.transient_time", "record.recorded_time")
+    return dict(zip(names, (TRANSIENT * turn, RECORDED_TURNS * turn), strict=True))
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as record_of:
-        return orbit_of_impacts(impacting_body(scene), record_of({}, None).impacts)
+        return orbit_of_impacts(impacting_body(scene, free=True), record_of({}, None).impacts)
 
 
 def orbit_of_impacts(
@@ -199,6 +227,8 @@ def orbit_of_impacts(
     """Return the orbit of the last impacts of a run; None unless it has few periods."""
     if rows is None or not len(rows):
         return None
+    if body.has_own_period:
+        return own_orbit_of_impacts(body, rows[:, 0], rows[:, 2], rows[:, 4].astype(int) - 1, REPEATS)
     turns = np.floor(
         (rows[:, 0] - rows[0, 0] + (rows[0, 1] - rows[:, 1]) / body.angular_frequency) / body.period + 0.5
     )
@@ -223,6 +253,7 @@ def _row(orbit: PeriodicOrbit) -> tuple[str, ...]:
     return (
         orbit.name,
         "stable" if orbit.is_stable else "unstable",
+        *([f"{orbit.period:.10g}"] if orbit.body.has_own_period else []),
         ", ".join(f"{phase:.10g}" for phase in orbit.phases),
         ", ".join(str(contact + 1) for contact in orbit.contacts),
         ", ".join(f"{speed:.10g}" for speed in orbit.velocities),

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit, closed_form
+from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.following import BodyAt, FollowSettings
-from vibroimpact.analysis.orbits.search import STARTS, orbits_of
+from vibroimpact.analysis.orbits.search import STARTS, each_orbit, orbits_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_of_runs
 from vibroimpact.orchestrator.orbits.find import find_orbits
@@ -61,13 +61,11 @@ def _of_one_impact(
     body_at: BodyAt, settings: FollowSettings, periods: int
 ) -> Iterator[tuple[float, PeriodicOrbit]]:
     for value in seed_values(settings):
-        body = body_at(value)
-        for contact in range(len(body.contacts)):
-            try:
-                found = closed_form(body, periods, contact)
-            except OrbitError:
-                continue  # a resonance at this very value
-            yield from ((value, orbit) for orbit in found if orbit.is_physical and orbit.turns == 1)
+        try:
+            found = list(each_orbit(body_at(value), 1, periods))
+        except OrbitError:
+            continue  # a resonance at this very value
+        yield from ((value, orbit) for orbit in found)
 
 
 def _of_runs(

@@ -15,8 +15,8 @@ import xarray as xr
 
 from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
-from vibroimpact.analysis.orbits.departures import grazes
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
+from vibroimpact.analysis.orbits.periodic import grazes
 from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
@@ -226,7 +226,7 @@ class Following(Study[str]):
             others.setdefault(words, []).append(each.start.orbit.full_name)
         parts = [f"{', '.join(names)} ({words})" for words, names in others.items()]
         if grazes(orbit).all():
-            parts.insert(0, "motion without impacts")
+            parts.insert(0, "rest" if orbit.body.has_own_period else "motion without impacts")
         return (
             f"{number}  {orbit.full_name}: its {meeting.point.kind} at {value} meets "
             f"{'; '.join(parts) or 'no other orbit'}."

@@ -10,6 +10,8 @@
  * terms cancel, and a series takes their place. Bodies of many modes keep their terms, since series take long. */
 static const double LARGEST_VECTOR = 10.0;
 enum { MANY_MODES = 16, SERIES_TERMS = 18 };
+/* Error of a state that recurs, over its size, above which a body that grows loses it. */
+static const double RECURRED = 1e-11;
 /* Step of the series times the fastest rate: the first term left out is .5^18 / 18!, far below rounding. */
 static const double SHORT = 0.5;
 
@@ -30,14 +32,24 @@ static bool fill_body(int modes, const double natural[], const double coupling[]
     body->coupled = 1;
     bool good = true;
     for (int j = 0; j < modes; ++j) {
-        body->square[j] = natural[j] * natural[j];
-        good = good && natural[j] > 0.0 && isfinite(body->square[j]);
+        body->square[j] = natural[j] * fabs(natural[j]);
+        good = good && natural[j] != 0.0 && isfinite(body->square[j]);
         for (int i = 0; i < modes; ++i) {
             body->coupling[j][i] = 0.5 * (coupling[j * modes + i] + coupling[i * modes + j]);
             good = good && isfinite(body->coupling[j][i]);
         }
     }
     return good;
+}
+
+/* Is a mode's stiffness negative? Series follow such a body: its terms need the root of each stiffness. */
+static bool has_negative_spring(const vi_pressed_body *body)
+{
+    bool found = false;
+    for (int j = 0; j < body->modes; ++j) {
+        found = found || body->square[j] < 0.0;
+    }
+    return found;
 }
 
 static double fastest_rate(const vi_pressed_body *body)
@@ -48,7 +60,7 @@ static double fastest_rate(const vi_pressed_body *body)
         for (int i = 0; i < body->modes; ++i) {
             row += fabs(body->coupling[j][i]);
         }
-        natural = fmax(natural, sqrt(body->square[j]));
+        natural = fmax(natural, sqrt(fabs(body->square[j])));
         drag = fmax(drag, row);
     }
     return natural + drag;
@@ -62,7 +74,7 @@ VI_DOOR int vi_door_orbit_couple(int modes, int harmonics, const double angular_
         || !fill_body(modes, natural, coupling, &found->body)) {
         return 1;
     }
-    if (!vi_coupled_modes_find(&found->terms, &found->body, work)
+    if (has_negative_spring(&found->body) || !vi_coupled_modes_find(&found->terms, &found->body, work)
         || (modes <= MANY_MODES && vi_coupled_modes_size(&found->terms, &found->body) > LARGEST_VECTOR)) {
         found->terms.terms = 0;
     }
@@ -146,6 +158,21 @@ static bool solve(int n, double a[][VI_STATES], int sides, double b[][VI_STATES]
     return true;
 }
 
+/* Does a state come back after `length` seconds and an impulse? A body that grows multiplies rounding until then. */
+static bool recurs(const vi_orbit_coupling *coupling, const double impulse[], double length, const double state[])
+{
+    const int modes = coupling->body.modes;
+    double later[VI_STATES], off = 0.0, size = 0.0;
+    memcpy(later, state, 2 * (size_t)modes * sizeof *later);
+    vi_orbit_series(coupling, length, later, later + modes);
+    for (int j = 0; j < modes; ++j) {
+        const double natural = sqrt(fabs(coupling->body.square[j]));
+        off = fmax(off, fmax(natural * fabs(later[j] - state[j]), fabs(later[modes + j] + impulse[j] - state[modes + j])));
+        size = fmax(size, fmax(natural * fabs(state[j]), fabs(state[modes + j])));
+    }
+    return off <= RECURRED * size;
+}
+
 bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], int stride,
                                double length, double state[][VI_STATES])
 {
@@ -153,10 +180,10 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     double left[VI_STATES][VI_STATES]; /* 1 - Phi(length), in (w x, v) */
     for (int c = 0; c < 2 * modes; ++c) {
         double moved[VI_STATES] = {0.0};
-        moved[c] = c < modes ? 1.0 / sqrt(coupling->body.square[c]) : 1.0;
+        moved[c] = c < modes ? 1.0 / sqrt(fabs(coupling->body.square[c])) : 1.0;
         vi_orbit_series(coupling, length, moved, moved + modes);
         for (int j = 0; j < modes; ++j) {
-            left[j][c] = (j == c ? 1.0 : 0.0) - sqrt(coupling->body.square[j]) * moved[j];
+            left[j][c] = (j == c ? 1.0 : 0.0) - sqrt(fabs(coupling->body.square[j])) * moved[j];
             left[modes + j][c] = (modes + j == c ? 1.0 : 0.0) - moved[modes + j];
         }
     }
@@ -167,12 +194,14 @@ bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, 
     if (!solve(2 * modes, left, contacts, state, 4.0 * DBL_EPSILON * (1.0 + coupling->fastest * length))) {
         return false;
     }
+    bool good = true;
     for (int k = 0; k < contacts; ++k) {
         for (int j = 0; j < modes; ++j) {
-            state[k][j] /= sqrt(coupling->body.square[j]);
+            state[k][j] /= sqrt(fabs(coupling->body.square[j]));
         }
+        good = good && recurs(coupling, impulse + (ptrdiff_t)k * stride, length, state[k]);
     }
-    return true;
+    return good;
 }
 
 /* ---- by terms ---- */

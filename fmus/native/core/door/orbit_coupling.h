@@ -34,7 +34,7 @@ VI_DOOR int vi_door_orbit_couple(int modes, int harmonics, const double angular_
 void vi_orbit_series(const vi_orbit_coupling *coupling, double u, double x[], double v[]);
 
 /* Find displacements and velocities just after a unit impulse that recurs after each `length` seconds, by the series;
- * impulse[contacts][stride]. False where an undamped motion grows without bound. */
+ * impulse[contacts][stride]. False where an undamped motion grows without bound, or any grows beyond the digits. */
 bool vi_orbit_recurring_states(const vi_orbit_coupling *coupling, int contacts, const double impulse[], int stride,
                                double length, double state[][VI_STATES]);
 

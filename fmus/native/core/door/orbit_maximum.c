@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "modes/growth.h"
 #include "motion/majorant.h"
 
 /* Least step of the search for maxima, as a share of the flight's length. */
@@ -11,6 +12,7 @@ static const double LEAST_STEP = 1e-13;
 /* A contact in a flight: distance beyond its stop, the first two derivatives, and a bound of the third from here on. */
 typedef struct {
     double beyond, velocity, acceleration, bound;
+    double horizon; /* time for which the bound holds, s */
 } seen;
 
 /* A contact in a flight: the free motion of the modes, which adds to the steady one, at its start. */
@@ -18,6 +20,7 @@ typedef struct {
     const vi_orbit_response *response;
     int contact;
     double phase;
+    double growth; /* rate above which no motion of the modes grows, 1/s: equations.md 1.9 */
     vi_orbit_gap steady;
     double x[VI_MODES], v[VI_MODES];
     vi_complex weight[VI_TERMS]; /* coupled: displacement of the contact by each term */
@@ -31,6 +34,11 @@ static void begin(flight *own, const vi_orbit_response *response, int contact, c
     own->response = response;
     own->contact = contact;
     own->phase = phase;
+    own->growth = vi_growth_of(body->coupling ? 0 : body->modes, response->mode, NULL);
+    if (body->coupling) {
+        const vi_pressed_body *coupled = &body->coupling->body;
+        own->growth = vi_growth_of(coupled->modes, response->mode + response->loose, coupled->coupling);
+    }
     vi_orbit_steady_gap(response, contact, &own->steady);
     vi_orbit_steady(response, phase, own->x, own->v);
     for (int j = 0; j < body->modes; ++j) {
@@ -52,12 +60,12 @@ static void begin(flight *own, const vi_orbit_response *response, int contact, c
     }
 }
 
-/* Free motion of the contact by coupled modes `u` seconds after the start, by terms e^(rate u) that never grow. */
+/* Free motion of the contact by coupled modes `u` seconds after the start, by terms e^(rate u). */
 static seen coupled_motion(const flight *own, double u)
 {
     const vi_orbit_coupling *coupling = own->response->body->coupling;
     vi_complex turn[VI_TERMS];
-    seen sum = {0.0, 0.0, 0.0, 0.0};
+    seen sum = {0.0, 0.0, 0.0, 0.0, HUGE_VAL};
     vi_orbit_turns(coupling, u, turn);
     for (int m = 0; m < coupling->terms.terms; ++m) {
         const vi_complex rate = coupling->terms.rate[m], x = vi_complex_multiply(own->weight[m], turn[m]);
@@ -71,7 +79,7 @@ static seen coupled_motion(const flight *own, double u)
 }
 
 /* The same next to critical damping, by series. The third derivative is (D D s - W s).v + (D s).W x at the contact's
- * shape s, and v.v + x.W x never grows. */
+ * shape s. The sum v.v + x.|W| x grows at most at the rate of the modes. */
 static seen series_motion(const flight *own, double u)
 {
     const vi_orbit_response *response = own->response;
@@ -84,14 +92,14 @@ static seen series_motion(const flight *own, double u)
     vi_orbit_drag(response, v, drag);
     vi_orbit_drag(response, shape, once);
     vi_orbit_drag(response, once, twice);
-    seen sum = {0.0, 0.0, 0.0, 0.0};
+    seen sum = {0.0, 0.0, 0.0, 0.0, HUGE_VAL};
     for (int j = response->loose; j < body->modes; ++j) {
         const double stiffness = response->mode[j].stiffness, along = twice[j] - stiffness * shape[j];
         sum.beyond += shape[j] * x[j];
         sum.velocity += shape[j] * v[j];
         sum.acceleration -= shape[j] * (stiffness * x[j] + drag[j]);
-        square += along * along + stiffness * once[j] * once[j];
-        energy += v[j] * v[j] + stiffness * x[j] * x[j];
+        square += along * along + fabs(stiffness) * once[j] * once[j];
+        energy += v[j] * v[j] + fabs(stiffness) * x[j] * x[j];
     }
     sum.bound = sqrt(square * energy);
     return sum;
@@ -103,7 +111,7 @@ static seen free_motion(const flight *own, int modes, double u)
 {
     const vi_orbit_body *body = own->response->body;
     const double *shape = body->shape + (ptrdiff_t)own->contact * body->modes;
-    seen sum = {0.0, 0.0, 0.0, 0.0};
+    seen sum = {0.0, 0.0, 0.0, 0.0, HUGE_VAL};
     for (int j = 0; j < own->response->loose; ++j) {
         sum.beyond += shape[j] * 0.5 * u * u * body->held[j];
         sum.velocity += shape[j] * u * body->held[j];
@@ -119,9 +127,9 @@ static seen free_motion(const flight *own, int modes, double u)
         sum.beyond += shape[j] * moved;
         sum.velocity += shape[j] * faster;
         sum.acceleration -= shape[j] * (mode->stiffness * moved + drag * faster);
-        /* |x'''| = |(4 c^2 - w^2) v + 2 c w^2 x|, and v^2 + w^2 x^2 never grows */
-        sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + drag * mode->natural)
-                     * sqrt(faster * faster + mode->stiffness * moved * moved);
+        /* |x'''| = |(4 c^2 - k) v + 2 c k x|; v^2 + |k| x^2 grows at most at the rate of the modes */
+        sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + fabs(drag) * mode->natural)
+                     * sqrt(faster * faster + mode->natural * mode->natural * moved * moved);
     }
     return sum;
 }
@@ -136,7 +144,11 @@ static seen look(const flight *own, double u)
     if (body->coupling) {
         const seen more = body->coupling->terms.terms == 0 ? series_motion(own, u) : coupled_motion(own, u);
         sum = (seen){sum.beyond + more.beyond, sum.velocity + more.velocity, sum.acceleration + more.acceleration,
-                     sum.bound + more.bound};
+                     sum.bound + more.bound, HUGE_VAL};
+    }
+    if (own->growth > 0.0) { /* the bound is multiplied by e^(growth horizon) */
+        sum.horizon = 1.0 / own->growth;
+        sum.bound *= exp(1.0);
     }
     sum.beyond += own->steady.level;
     for (int k = 0; k < body->harmonics; ++k) {
@@ -177,7 +189,7 @@ static double search(const vi_orbit_response *response, int contact, const doubl
     for (int evaluation = 0; u < length; ++evaluation) {
         const double away = now.velocity > 0.0 ? -now.acceleration : now.acceleration;
         const double certain = vi_parabola_root(fabs(now.velocity), away, now.bound);
-        u = fmin(u + fmax(certain, vi_least_step(length, LEAST_STEP, evaluation)), length);
+        u = fmin(u + fmax(fmin(certain, now.horizon), vi_least_step(length, LEAST_STEP, evaluation)), length);
         const seen next = look(&own, u);
         if (now.velocity > 0.0 && next.velocity <= 0.0) {
             keep(what, fmax(now.beyond, next.beyond), phase + w * u, contact);

@@ -37,9 +37,8 @@ static bool is_body(const vi_orbit_body *body)
                && is_finite(body->contacts, body->stop_sine + (ptrdiff_t)k * body->contacts);
     }
     for (int j = 0; good && j < body->modes; ++j) {
-        good = body->natural[j] >= 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
-               && isfinite(body->damping_ratio[j] + body->held[j])
-               && (body->natural[j] > 0.0
+        good = isfinite(body->natural[j]) && isfinite(body->damping_ratio[j] + body->held[j])
+               && (body->natural[j] != 0.0
                    || ((j == 0 || body->natural[j - 1] == 0.0) && body->damping_ratio[j] == 0.0));
     }
     for (int k = 0; good && k < body->contacts; ++k) {
@@ -77,7 +76,7 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
     }
     /* an undamped mode after whole turns: only rounding is left of 1 - Phi */
     const double rounding = 4.0 * DBL_EPSILON * (1.0 + mode->natural * length);
-    if (!(whole > rounding * rounding)) {
+    if (!(fabs(whole) > rounding * rounding)) { /* negative where one of two rates grows */
         return false;
     }
     start[0] = phi[1] / whole;
@@ -117,7 +116,8 @@ static bool find_steady(vi_orbit_response *response, int j)
         } else {
             const double w = body->order[k] * body->angular_frequency;
             const double c = body->cosine[k * body->modes + j], s = body->sine[k * body->modes + j];
-            const double detuning = (natural - w) * (natural + w), drag = 2.0 * decay * w;
+            const double detuning = natural < 0.0 ? response->mode[j].stiffness - w * w : (natural - w) * (natural + w);
+            const double drag = 2.0 * decay * w;
             const double size = vi_magnitude(detuning, drag);
             const double in_phase = detuning / size / size, lagging = drag / size / size;
             *along = c == 0.0 && s == 0.0 ? 0.0 : c * in_phase - s * lagging;
@@ -142,9 +142,8 @@ int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
     for (int j = 0; j < body->modes; ++j) {
         response->loose += body->natural[j] == 0.0;
         vi_mode *mode = &response->mode[j];
-        const double natural = body->natural[j];
-        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0,
-                      body->angular_frequency);
+        const double natural = body->natural[j], size = fabs(natural);
+        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * size, natural * size, 0.0, body->angular_frequency);
         response->level[j] = j < response->loose ? 0.0 : body->held[j] / mode->stiffness;
         if (!find_steady(response, j)) {
             return VI_ORBIT_RESONANT;
@@ -237,6 +236,21 @@ double vi_orbit_since(const vi_orbit_response *response, int i, int k)
     return i > k ? passed : response->length + passed;
 }
 
+/* e^(-rate u) / (1 - e^(-rate length)) for 0 <= u <= length: a part of a motion that recurs, growing or not. */
+static double recurring(double rate, double u, double length)
+{
+    return rate > 0.0 ? exp(-rate * u) / -expm1(-rate * length) : exp(rate * (length - u)) / expm1(rate * length);
+}
+
+/* Motion `u` seconds after a unit impulse that recurs, of a mode of negative stiffness. Each exponential is by itself:
+ * a propagator would multiply the rounding of the start by the growth. */
+static void recur_of_two_rates(const vi_mode *mode, double length, double u, double *x, double *v)
+{
+    const double slow = recurring(mode->slow, u, length), fast = recurring(mode->fast, u, length);
+    *x = (slow - fast) / (2.0 * mode->rate);
+    *v = (mode->fast * fast - mode->slow * slow) / (2.0 * mode->rate);
+}
+
 void vi_orbit_train_answer(const vi_orbit_response *response, int contact, double u, double x[], double v[])
 {
     const vi_orbit_body *body = response->body;
@@ -259,6 +273,11 @@ void vi_orbit_train_answer(const vi_orbit_response *response, int contact, doubl
         } else if (body->coupling) {
             x[j] = -x[j];
             v[j] = -v[j];
+        } else if (response->mode[j].stiffness < 0.0) {
+            double moved, faster;
+            recur_of_two_rates(&response->mode[j], response->length, u, &moved, &faster);
+            x[j] = -moved * impulse;
+            v[j] = -faster * impulse;
         } else {
             vi_mode_propagator(&response->mode[j], u, phi);
             x[j] = -(phi[0] * start[0] + phi[1] * start[1]) * impulse;

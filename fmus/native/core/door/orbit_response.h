@@ -28,7 +28,7 @@ enum {
 typedef struct {
     int32_t modes, contacts, harmonics;
     double angular_frequency;     /* of the clock, rad/s */
-    const double *natural;        /* [modes] rad/s, >= 0; modes of 0 (no spring) come first */
+    const double *natural;        /* [modes] rad/s; modes of 0 (no spring) come first; < 0: of a negative spring */
     const double *damping_ratio;  /* [modes]; from the diagonal of a damping that couples the modes; 0: no spring */
     const double *order;          /* [harmonics] whole numbers >= 1 */
     const double *cosine, *sine;  /* [harmonics][modes] modal force */

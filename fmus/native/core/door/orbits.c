@@ -5,8 +5,8 @@
 #include <stdbool.h>
 #include <string.h>
 
-/* Share of a mode's displacement that no other mode gives to the contacts, below which its position is not known. */
-static const double ADRIFT = 1e-9;
+#include "door/orbit_placing.h"
+
 /* Most Newton steps for the velocities where restitution falls with speed, and most halvings of a step. */
 enum { MOST_STEPS = 60, MOST_HALVINGS = 30 };
 /* Error of the velocities' equations, over the size of their terms, at which they are solved; and largest error where
@@ -58,26 +58,6 @@ static bool solve(int n, double a[][VI_ORBIT_IMPACTS], int sides, double b[][VI_
         }
     }
     return true;
-}
-
-/* Displacement at the contact of impact i for a unit speed of impact k, with its first and second time derivatives. */
-static void answer(const vi_orbit_response *response, int i, int k, double g[3])
-{
-    const vi_orbit_body *body = response->body;
-    const int32_t *contact = response->train->contact;
-    const double *shape = body->shape + (ptrdiff_t)contact[i] * body->modes;
-    double x[VI_MODES], v[VI_MODES], drag[VI_MODES];
-    vi_orbit_train_answer(response, contact[k], vi_orbit_since(response, i, k), x, v);
-    vi_orbit_drag(response, v, drag);
-    const double factor = (1.0 + body->restitution[contact[k]]) * body->direction[contact[i]]
-                          * body->direction[contact[k]];
-    g[0] = g[1] = g[2] = 0.0;
-    for (int j = 0; j < body->modes; ++j) {
-        const double weight = factor * shape[j];
-        g[0] += weight * x[j];
-        g[1] += weight * v[j];
-        g[2] += weight * (vi_orbit_evening(response, contact[k], j) - response->mode[j].stiffness * x[j] - drag[j]);
-    }
 }
 
 /* ---- velocities where restitution falls with speed: equations.md 4.7 ---- */
@@ -155,92 +135,6 @@ static int find_falling(const vi_orbit_response *response, speeds *s, double vel
     return largest <= ROUNDING * size ? VI_ORBIT_DONE : VI_ORBIT_UNSOLVED;
 }
 
-/* ---- modes without a spring ---- */
-
-/* Displacements that the modes without a spring give to the contacts of the impacts: q r, with orthonormal columns q. */
-typedef struct {
-    double q[VI_MODES][VI_ORBIT_IMPACTS], r[VI_MODES][VI_MODES];
-} placing;
-
-/* Find the displacements; false where no impact tells the position of a mode, or two modes move all contacts alike. */
-static bool find_placing(const vi_orbit_response *response, placing *found)
-{
-    const vi_orbit_body *body = response->body;
-    const int n = response->train->impacts;
-    for (int l = 0; l < response->loose; ++l) {
-        double *column = found->q[l], size = 0.0, left = 0.0;
-        for (int i = 0; i < n; ++i) {
-            const int32_t contact = response->train->contact[i];
-            column[i] = body->direction[contact] * body->shape[(ptrdiff_t)contact * body->modes + l];
-            size += column[i] * column[i];
-        }
-        for (int before = 0; before < l; ++before) {
-            double along = 0.0;
-            for (int i = 0; i < n; ++i) {
-                along += found->q[before][i] * column[i];
-            }
-            for (int i = 0; i < n; ++i) {
-                column[i] -= along * found->q[before][i];
-            }
-            found->r[before][l] = along;
-        }
-        for (int i = 0; i < n; ++i) {
-            left += column[i] * column[i];
-        }
-        if (!(left > ADRIFT * ADRIFT * size)) {
-            return false;
-        }
-        found->r[l][l] = sqrt(left);
-        for (int i = 0; i < n; ++i) {
-            column[i] /= found->r[l][l];
-        }
-    }
-    return true;
-}
-
-/* Put the modes where the squares of the distances[impact][stride] have their least sum. `place`: their displacements. */
-static void put_in_place(const vi_orbit_response *response, const placing *placed, double distance[], int stride,
-                         double place[])
-{
-    const int n = response->train->impacts;
-    for (int l = 0; l < response->loose; ++l) {
-        place[l] = 0.0;
-        for (int i = 0; i < n; ++i) {
-            place[l] -= placed->q[l][i] * distance[i * stride];
-        }
-        for (int i = 0; i < n; ++i) {
-            distance[i * stride] += placed->q[l][i] * place[l];
-        }
-    }
-    for (int l = response->loose - 1; l >= 0; --l) {
-        for (int later = l + 1; later < response->loose; ++later) {
-            place[l] -= placed->r[l][later] * place[later];
-        }
-        place[l] /= placed->r[l][l];
-    }
-}
-
-/* Let the modes drift for one radian by the momentum that a train adds. The momentum follows from the
- * speeds[impact] of equal impulse, and from `held` times the constant forces. The drift is 0 for an orbit. */
-static void drift(const vi_orbit_response *response, const double speed[], double held, double distance[], int stride)
-{
-    const vi_orbit_body *body = response->body;
-    const int n = response->train->impacts;
-    for (int l = 0; l < response->loose; ++l) {
-        double momentum = held * response->length * body->held[l];
-        for (int k = 0; k < n; ++k) {
-            const int32_t contact = response->train->contact[k];
-            momentum -= (1.0 + body->restitution[contact]) * body->direction[contact] * speed[k]
-                        * body->impulse[(ptrdiff_t)contact * body->modes + l];
-        }
-        for (int i = 0; i < n; ++i) {
-            const int32_t contact = response->train->contact[i];
-            distance[i * stride] += body->direction[contact] * body->shape[(ptrdiff_t)contact * body->modes + l]
-                                    * momentum / body->angular_frequency;
-        }
-    }
-}
-
 /* Find the equations of the velocities, and the velocities; `matrix` and `right` are overwritten. */
 static int find_velocities(const vi_orbit_response *response, speeds *s, double velocity[],
                            double matrix[][VI_ORBIT_IMPACTS], double right[][VI_ORBIT_IMPACTS + 1])
@@ -251,7 +145,7 @@ static int find_velocities(const vi_orbit_response *response, speeds *s, double 
         const int32_t contact = response->train->contact[i];
         vi_orbit_steady_at(response, i, s->steady[i]);
         for (int k = 0; k < n; ++k) {
-            answer(response, i, k, s->g[i][k]);
+            vi_orbit_answer(response, i, k, s->g[i][k]);
         }
         right[i][0] = s->steady[i][1];
         /* an impact without restitution: with a restitution of 1 an undamped body might have no velocities */
@@ -277,8 +171,8 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
     if (refused != VI_ORBIT_DONE) {
         return refused;
     }
-    placing placed;
-    if (!find_placing(&response, &placed)) {
+    vi_orbit_placing placed;
+    if (!vi_orbit_find_placing(&response, &placed)) {
         return VI_ORBIT_ADRIFT;
     }
     const int n = train->impacts;
@@ -320,14 +214,14 @@ VI_DOOR int vi_door_orbit(const vi_orbit_body *body, const vi_orbit_train *train
         }
     }
     double place[VI_MODES], faster[VI_ORBIT_IMPACTS];
-    put_in_place(&response, &placed, distance, 1, place);
-    drift(&response, s.equal, 1.0, distance, 1);
+    vi_orbit_put_in_place(&response, &placed, distance, 1, place);
+    vi_orbit_drift(&response, s.equal, 1.0, distance, 1);
     for (int m = 0; m < n; ++m) {
         for (int i = 0; i < n; ++i) {
             faster[i] = s.share[i] * velocity_slope[i * n + m];
         }
-        put_in_place(&response, &placed, distance_slope + m, n, place);
-        drift(&response, faster, 0.0, distance_slope + m, n);
+        vi_orbit_put_in_place(&response, &placed, distance_slope + m, n, place);
+        vi_orbit_drift(&response, faster, 0.0, distance_slope + m, n);
     }
     return VI_ORBIT_DONE;
 }
@@ -339,12 +233,12 @@ VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *
     if (refused != VI_ORBIT_DONE) {
         return refused;
     }
-    placing placed;
-    if (!find_placing(&response, &placed)) {
+    vi_orbit_placing placed;
+    if (!vi_orbit_find_placing(&response, &placed)) {
         return VI_ORBIT_ADRIFT;
     }
     double g[3], place[VI_MODES];
-    answer(&response, 0, 0, g);
+    vi_orbit_answer(&response, 0, 0, g);
     const int32_t contact = train->contact[0];
     if (!(fabs(1.0 - g[1]) > (body->yield_velocity[contact] > 0.0 ? ELASTIC : 0.0))) {
         return VI_ORBIT_SINGULAR;
@@ -353,12 +247,12 @@ VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *
     vi_orbit_gap gap;
     vi_orbit_steady_gap(&response, contact, &gap);
     wave->level = direction * (gap.level - body->position[contact]);
-    put_in_place(&response, &placed, &wave->level, 1, place);
-    drift(&response, &none, 1.0, &wave->level, 1);
+    vi_orbit_put_in_place(&response, &placed, &wave->level, 1, place);
+    vi_orbit_drift(&response, &none, 1.0, &wave->level, 1);
     wave->answer[0] = g[0];
     wave->answer[1] = g[1];
-    put_in_place(&response, &placed, wave->answer, 1, place);
-    drift(&response, &one, 0.0, wave->answer, 1);
+    vi_orbit_put_in_place(&response, &placed, wave->answer, 1, place);
+    vi_orbit_drift(&response, &one, 0.0, wave->answer, 1);
     for (int k = 0; k < body->harmonics; ++k) {
         const double w = body->order[k] * body->angular_frequency;
         const double x[2] = {direction * gap.cosine[k], direction * gap.sine[k]};
@@ -368,8 +262,8 @@ VI_DOOR int vi_door_orbit_wave(const vi_orbit_body *body, const vi_orbit_train *
         wave->steady_sine[k] = x[1];
         for (int side = 0; side < 2; ++side) {
             *part[side] = x[side] + g[0] * speed[side];
-            put_in_place(&response, &placed, part[side], 1, place);
-            drift(&response, &speed[side], 0.0, part[side], 1);
+            vi_orbit_put_in_place(&response, &placed, part[side], 1, place);
+            vi_orbit_drift(&response, &speed[side], 0.0, part[side], 1);
         }
     }
     return VI_ORBIT_DONE;
@@ -397,30 +291,6 @@ static void after_impact(const vi_orbit_response *response, const double velocit
     }
 }
 
-/* Put the modes without a spring where the impacts are at their stops. */
-static void place_states(const vi_orbit_response *response, const placing *placed, double state[])
-{
-    const vi_orbit_body *body = response->body;
-    const int n = response->train->impacts;
-    double distance[VI_ORBIT_IMPACTS], place[VI_MODES];
-    for (int i = 0; i < n; ++i) {
-        const int32_t contact = response->train->contact[i];
-        double stop[3];
-        vi_orbit_stop(body, contact, response->train->phase[i], stop);
-        double at = -body->position[contact] - stop[0];
-        for (int j = 0; j < body->modes; ++j) {
-            at += body->shape[(ptrdiff_t)contact * body->modes + j] * state[(ptrdiff_t)i * 2 * body->modes + j];
-        }
-        distance[i] = body->direction[contact] * at;
-    }
-    put_in_place(response, placed, distance, 1, place);
-    for (int i = 0; i < n; ++i) {
-        for (int l = 0; l < response->loose; ++l) {
-            state[(ptrdiff_t)i * 2 * body->modes + l] += place[l];
-        }
-    }
-}
-
 VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train *train, const double velocity[],
                                  double state[], double monodromy[])
 {
@@ -430,15 +300,15 @@ VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train
     if (refused != VI_ORBIT_DONE) {
         return refused;
     }
-    placing placed;
-    if (!find_placing(&response, &placed)) {
+    vi_orbit_placing placed;
+    if (!vi_orbit_find_placing(&response, &placed)) {
         return VI_ORBIT_ADRIFT;
     }
     const int modes = body->modes, states = 2 * modes, n = train->impacts;
     for (int i = 0; i < n; ++i) {
         after_impact(&response, velocity, i, state + (ptrdiff_t)i * states);
     }
-    place_states(&response, &placed, state);
+    vi_orbit_place_states(&response, &placed, state);
     for (int row = 0; row < states; ++row) {
         for (int c = 0; c < states; ++c) {
             change[row][c] = row == c ? 1.0 : 0.0;

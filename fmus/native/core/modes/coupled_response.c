@@ -15,9 +15,10 @@ static void fill(vi_coupled_equations *equations, const vi_pressed_body *body, v
         for (int i = 0; i < n && body->coupled; ++i) {
             row[i] = vi_complex_scale(body->coupling[j][i], s);
         }
-        const double natural = sqrt(body->square[j]);
-        const double detuning = s.re == 0.0 ? (natural - s.im) * (natural + s.im)
-                                            : body->square[j] + (s.re - s.im) * (s.re + s.im);
+        const double natural = sqrt(fabs(body->square[j]));
+        const double detuning = s.re == 0.0 && body->square[j] >= 0.0
+                                    ? (natural - s.im) * (natural + s.im)
+                                    : body->square[j] + (s.re - s.im) * (s.re + s.im);
         const vi_complex own = {detuning, 2.0 * s.re * s.im};
         const vi_complex drag = vi_complex_scale(body->coupled ? 0.0 : 2.0 * body->decay[j], s);
         row[j] = vi_complex_add(row[j], vi_complex_add(own, drag));
