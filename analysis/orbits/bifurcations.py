@@ -21,7 +21,7 @@ DOUBLE = 1e-4
 
 def folding(orbit: PeriodicOrbit) -> float:
     """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the distances' slopes."""
-    slopes = evaluated(orbit.body, orbit.contacts, orbit.phases, orbit.periods).distance_slopes
+    slopes = evaluated(orbit.body, orbit.contacts, orbit.phases, orbit.periods, orbit.start).distance_slopes
     return float(np.linalg.det(slopes / orbit.body.scale))
 
 
@@ -32,7 +32,8 @@ def alternating(orbit: PeriodicOrbit) -> float:
     """
     count = orbit.phases.size
     phases = np.concatenate([orbit.phases, orbit.phases + TURN * orbit.periods])
-    slopes = evaluated(orbit.body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
+    twice = np.tile(orbit.contacts, 2)
+    slopes = evaluated(orbit.body, twice, phases, 2 * orbit.periods, orbit.start).distance_slopes
     return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / orbit.body.scale))
 
 

@@ -13,13 +13,15 @@ from vibroimpact.analysis.orbits.branch_points import LEVEL, crossing_direction
 from vibroimpact.analysis.orbits.following import BRANCH_POINT, Branch, BranchOrbit, Follower, SpecialPoint
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, ordered
 from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
-from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
 SLOW = 1e-8
 """Speed of an impact, over that of the force's motion, below which it grazes."""
 BESIDE = 1e-4
 """Step away from a graze, over the longest, after which an orbit is judged."""
+BESIDE_YIELDING = 1e-2
+"""The same step where stops yield: there the parameter changes with the square of the speed of a contact."""
 SAME_VALUE = 1e-7
 """Difference of two values, over the range, up to which they are one point."""
 MOST_TURNS = 3
@@ -45,17 +47,20 @@ class Departure:
         Whether the branch also leaves in the other direction, with orbits that are not those of the first one.
     is_stable : bool or None
         Whether the orbits next to a graze are stable; None for other points.
+    is_higher : bool
+        Whether the orbits next to a graze are at higher values of the parameter.
     """
 
     start: BranchOrbit
     cause: str
     goes_both_ways: bool = False
     is_stable: bool | None = None
+    is_higher: bool = False
 
     @property
     def side(self) -> str:
         """`higher` or `lower`: the values of the parameter at which the orbits next to a graze are."""
-        return "higher" if self.start.tangent[-1] > 0.0 else "lower"
+        return "higher" if self.is_higher else "lower"
 
 
 def departures(follower: Follower, point: SpecialPoint) -> list[Departure]:
@@ -75,7 +80,8 @@ def _twice(at: BranchOrbit) -> BranchOrbit:
     once = at.orbit
     phases = np.concatenate([once.phases, once.phases + TURN * once.periods])
     orbit = PeriodicOrbit(
-        once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)
+        *(once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)),
+        once.start,
     )
     tangent = np.concatenate([at.tangent[:-1], at.tangent])
     return BranchOrbit(at.value, orbit, tangent / np.linalg.norm(tangent), 0.0)
@@ -117,7 +123,7 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
         for chosen in _subsets(sometimes):
             if not always and not chosen:
                 continue
-            other = _orbit_of(orbit.body, turns * orbit.periods, always + chosen)
+            other = _orbit_of(orbit, turns * orbit.periods, always + chosen)
             images = [other, mirror_image(other)]
             if other.turns > 1 or any(
                 are_alike(each, image) for each in found for image in images if image is not None
@@ -151,21 +157,25 @@ def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     return [(phase, contact), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]))]
 
 
-def _orbit_of(body: ImpactingBody, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
-    """Return the orbit with these impacts."""
+def _orbit_of(orbit: PeriodicOrbit, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
+    """Return the orbit of the same motion with these impacts."""
+    body = orbit.body
     phases, contacts = (np.array(each) for each in zip(*impacts, strict=True))
     made = ordered(PeriodicOrbit(body, periods, phases, contacts.astype(np.int32), np.zeros(phases.size)))
-    velocities = evaluated(body, made.contacts, made.phases, periods).velocities
-    return PeriodicOrbit(body, periods, made.phases, made.contacts, velocities)
+    start = orbit.state_at(float(made.phases[0])) if body.yields else None
+    found = evaluated(body, made.contacts, made.phases, periods, start)
+    return PeriodicOrbit(body, periods, made.phases, made.contacts, found.velocities, found.start)
 
 
 def _beside(follower: Follower, orbit: PeriodicOrbit, value: float) -> Iterator[Departure]:
     """Yield the branch of an orbit at a graze in the direction of its physical orbits, if there are any."""
     start = follower.on_branch(orbit, value, None)
+    step = (BESIDE_YIELDING if orbit.body.yields else BESIDE) * follower.settings.longest
     for each in (start, start.turned):
-        found = follower.step(each, BESIDE * follower.settings.longest)
+        found = follower.step(each, step)
         if found is not None and found[0].orbit.is_physical:
-            yield Departure(each, "graze", is_stable=found[0].orbit.is_stable)
+            at, is_stable = found[0].value, found[0].orbit.is_stable
+            yield Departure(each, "graze", is_stable=is_stable, is_higher=at > value)
             return
 
 

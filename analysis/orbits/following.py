@@ -15,7 +15,13 @@ import numpy as np
 
 from vibroimpact.analysis.orbits.branch_points import LEVEL, NEAR, bordered_determinant, interpolated_zeros
 from vibroimpact.analysis.orbits.periodic import CLOSE, TOUCHES, TURN, OrbitError, PeriodicOrbit, evaluated
-from vibroimpact.analysis.orbits.sign_changes import determinant, is_explained, turning, turns_round
+from vibroimpact.analysis.orbits.sign_changes import (
+    determinant,
+    is_explained,
+    turning,
+    turns_at_graze,
+    turns_round,
+)
 from vibroimpact.analysis.orbits.symmetry import is_symmetric, phase_differences
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
@@ -100,7 +106,7 @@ class BranchOrbit:
         """Functions whose sign changes at a special point, by kind."""
         orbit = self.orbit
         size = orbit.monodromy.shape[0]
-        fast = float(np.prod(np.minimum(orbit.velocities, 1.0)))
+        fast = float(np.prod(np.minimum(orbit.velocities[orbit.is_rigid], 1.0)))
         scale = orbit.body.scale
         tests = {
             BRANCH_POINT: self.border,
@@ -294,22 +300,19 @@ class Follower:
     ) -> tuple[Floats, Floats, PeriodicOrbit]:
         """Return distances from the stops, their slopes, and the orbit, for other phases and another parameter."""
         body = self._body_at(value)
-        found = evaluated(body, orbit.contacts, phases, orbit.periods)
-        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
+        found = evaluated(body, orbit.contacts, phases, orbit.periods, orbit.start)
+        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities, found.start)
         return found.distances, found.distance_slopes, made
 
     def _over_value(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
         """Return the derivative of the distances by the parameter, measured in its range."""
         change = 1e-6 * max(abs(value), 1e-3 * self.settings.span)
-        ends = [
-            evaluated(self._body_at(value + side * change), orbit.contacts, phases, orbit.periods).distances
-            for side in (1.0, -1.0)
-        ]
+        ends = [self.residual(orbit, phases, value + side * change)[0] for side in (1.0, -1.0)]
         return (ends[0] - ends[1]) * (self.settings.span / (2.0 * change))
 
     def matrix(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
         """Return the derivatives of the distances by all unknowns, shape (p, p + 1)."""
-        slopes = evaluated(self._body_at(value), orbit.contacts, phases, orbit.periods).distance_slopes
+        slopes = self.residual(orbit, phases, value)[1]
         return np.column_stack([slopes, self._over_value(orbit, phases, value)])
 
     def on_branch(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> BranchOrbit:
@@ -325,14 +328,14 @@ class Follower:
         span = self.settings.span
         phases = now.orbit.phases + step * now.tangent[:-1]
         value = now.value + step * now.tangent[-1] * span
-        least = np.inf
+        least, orbit = np.inf, now.orbit
         try:
             across = self._over_value(now.orbit, phases, value)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                distances, slopes, orbit = self.residual(now.orbit, phases, value)
+                distances, slopes, orbit = self.residual(orbit, phases, value)
                 error = float(np.abs(distances).max())
                 small = error <= CLOSE * orbit.body.scale
-                if small and error >= 0.5 * least:
+                if small and (error >= 0.5 * least or orbit.body.yields):
                     break
                 least = min(least, error)
                 ahead = now.tangent @ np.append(phases - now.orbit.phases, (value - now.value) / span)
@@ -417,7 +420,7 @@ class Follower:
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch
-                if kind != "fold" or not is_level:
+                if kind != "fold" or not (is_level or turns_at_graze(found[1].orbit)):
                     yield found[0], _as_end(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:

@@ -178,8 +178,8 @@ class LocusFollower:
         """Return the orbit of some unknowns, with its distances from the stops over the size of the motion."""
         phases, values = unknowns[:-2], unknowns[-2:] * self._spans
         body = self._body_at(float(values[0]), float(values[1]))
-        found = evaluated(body, orbit.contacts, phases, orbit.periods)
-        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
+        found = evaluated(body, orbit.contacts, phases, orbit.periods, orbit.start)
+        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities, found.start)
         return made, found.distances / body.scale
 
     def _equations(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:

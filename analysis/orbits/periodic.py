@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.errors import OrbitError as OrbitError
+from vibroimpact.analysis.orbits.flights import observed_flights
 from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
+from vibroimpact.analysis.orbits.yielding import Train, yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
-from vibroimpact.fmus.errors import UsageError, VibroimpactError
+from vibroimpact.fmus.errors import UsageError
 
 TURN = 2.0 * np.pi
 MOST_STEPS = 60
@@ -25,12 +28,10 @@ SAME = 1e-7
 """Difference of phases, rad, below which they are equal."""
 _MOST_SHOWN = 4
 """Largest number of impacts listed in one line."""
+GUESSED = 1e-3
+"""Difference of a guess from a known orbit, rad and over the size of the state, below which it leads to that orbit."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
-
-
-class OrbitError(VibroimpactError):
-    """An orbit was not found, or not followed further."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +49,8 @@ class PeriodicOrbit:
         Contact of each impact, from 0.
     velocities : array, shape (p,)
         Speeds towards the stops, relative to them, before the impacts, m/s.
+    start : array, shape (2 modes,), or None
+        Where stops yield, the state before the first impact, or one near to it: a search begins there.
     """
 
     body: ImpactingBody
@@ -55,6 +58,7 @@ class PeriodicOrbit:
     phases: Floats
     contacts: NDArray[np.int32]
     velocities: Floats
+    start: Floats | None = None
 
     @property
     def name(self) -> str:
@@ -87,7 +91,15 @@ class PeriodicOrbit:
 
     @cached_property
     def _motion(self) -> tuple[Floats, Floats]:
+        if self.body.yields:
+            return np.array([each.after for each in self.train.passages]), self.train.monodromy
         return self.body.kernel.motion(self.contacts, self.phases, self.periods, self.velocities)
+
+    @cached_property
+    def train(self) -> Train:
+        """The contacts of an orbit on stops that yield: equations.md 4.14."""
+        motion = yielding_motion(self.body)
+        return motion.periodic(self.contacts, self.phases, self.periods, self.start)
 
     @property
     def states(self) -> Floats:
@@ -118,9 +130,43 @@ class PeriodicOrbit:
     def exact_determinant(self) -> float:
         """Product of r (r + r' V) of the impacts and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
-        squared = np.prod(body.shrinking(self.contacts, self.velocities))
+        squared = np.prod(
+            self.train.values("shrinking") if body.yields else body.shrinking(self.contacts, self.velocities)
+        )
         decay = float((body.damping_ratios * body.frequencies).sum())
         return float(squared * np.exp(-2.0 * self.periods * body.period * decay))
+
+    def state_at(self, phase: float) -> Floats:
+        """Return modal displacements and velocities at a phase of an orbit on stops that yield, shape (2 modes,)."""
+        first = float(self.phases[0])
+        later = first + np.mod(phase - first, TURN * self.periods)
+        return yielding_motion(self.body).states(self.train, np.array([later]), first)[:, 0]
+
+    @property
+    def durations(self) -> Floats:
+        """Durations of the contacts, s; 0 on rigid stops, shape (p,)."""
+        return self.train.values("duration") if self.body.yields else np.zeros(self.phases.size)
+
+    @property
+    def restitutions(self) -> Floats:
+        """Speeds after the contacts over speeds before them, shape (p,)."""
+        if self.body.yields:
+            return self.train.values("rebound") / self.velocities
+        hit = zip(self.contacts, self.velocities, strict=True)
+        return np.array([float(self.body.contacts[k].restitution_at(speed)) for k, speed in hit])
+
+    @property
+    def impulses(self) -> Floats:
+        """Impulses of the contacts, N s, shape (p,)."""
+        if self.body.yields:
+            return self.train.values("impulse")
+        masses = np.array([each.mass for each in self.body.contacts])[self.contacts]
+        return np.asarray((1.0 + self.restitutions) * masses * self.velocities)
+
+    @property
+    def is_rigid(self) -> NDArray[np.bool_]:
+        """Whether the stop of each impact is rigid, shape (p,)."""
+        return np.array([each.press is None for each in self.body.contacts])[self.contacts]
 
     @property
     def falling(self) -> NDArray[np.bool_]:
@@ -139,6 +185,8 @@ class PeriodicOrbit:
 
         All maxima at all contacts are found: a bound of the third derivative certifies the search.
         """
+        if self.body.yields:
+            return yielding_motion(self.body).highest(self.phases, self.train)
         return self.body.kernel.maximum(self.contacts, self.phases, self.periods, self.states)
 
     @property
@@ -166,7 +214,9 @@ class PeriodicOrbit:
     def once(self) -> PeriodicOrbit:
         """The shortest orbit of the same motion."""
         p, q = self.phases.size // self.turns, self.periods // self.turns
-        return PeriodicOrbit(self.body, q, self.phases[:p], self.contacts[:p], self.velocities[:p])
+        return PeriodicOrbit(
+            self.body, q, self.phases[:p], self.contacts[:p], self.velocities[:p], self.start
+        )
 
     def at(self, phases: Floats) -> tuple[Floats, Floats]:
         """Return displacement and velocity of the observed point at phases from the first impact on.
@@ -181,7 +231,9 @@ class PeriodicOrbit:
         tuple of array
             m, m/s; at an impact the values after it.
         """
-        return _observed(self, phases)
+        if self.body.yields:
+            return yielding_motion(self.body).observed(self.train, phases, float(self.phases[0]))
+        return observed_flights(self.body, self.phases, self.states, phases)
 
 
 def least_speed(body: ImpactingBody) -> float:
@@ -193,8 +245,19 @@ def least_speed(body: ImpactingBody) -> float:
     return TOUCHES * body.scale * fastest if body.loose else 0.0
 
 
-def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
-    """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them."""
+def evaluated(
+    body: ImpactingBody,
+    contacts: NDArray[np.int32],
+    phases: Floats,
+    periods: int,
+    start: Floats | None = None,
+) -> Evaluation:
+    """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them.
+
+    Where stops yield, the search begins at a state before the first impact if one is given.
+    """
+    if body.yields:
+        return yielding_motion(body).evaluate(contacts, phases, periods, start)
     found = body.kernel.evaluate(contacts, phases, periods)
     _refuse_end(found.end, phases)
     return found
@@ -234,6 +297,8 @@ def find_orbit(
     phases: Sequence[float] | Floats,
     contacts: Sequence[int] | None = None,
     periods: int = 1,
+    *,
+    start: Floats | None = None,
 ) -> PeriodicOrbit:
     """Find the orbit near given phases of impacts, stable or not, by Newton's method: equations.md 4.7.
 
@@ -246,6 +311,8 @@ def find_orbit(
         Contact of each impact, from 0; by default the first contact.
     periods : int
         q.
+    start : array, shape (2 modes,), optional
+        Where stops yield, a state near to that before the first impact.
 
     Raises
     ------
@@ -257,18 +324,20 @@ def find_orbit(
     at: Floats = np.array(phases, dtype=np.float64)
     hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
     _refuse_no_train(body, at, hit, periods)
-    found = evaluated(body, hit, at, periods)
+    found = evaluated(body, hit, at, periods, start)
     for _ in range(MOST_STEPS):
         error = float(np.abs(found.distances).max())
+        if body.yields and error <= CLOSE * body.scale:
+            break  # rounding decides nothing more
         step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
-        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, error)
+        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, found)
         if nearer is None:
             break
         at, found = nearer
     # next to a fold, phases are known only to the square root of rounding
     error = float(np.abs(found.distances).max())
     if error <= 1e3 * CLOSE * body.scale:
-        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
+        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities, found.start))
     raise OrbitError(
         f"orbit: expected an orbit P({at.size},{periods}) near to the phases "
         f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none: Newton's method ends {error:.2g} m "
@@ -277,12 +346,18 @@ def find_orbit(
 
 
 def _damped_step(
-    body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, step: Floats, periods: int, error: float
+    body: ImpactingBody,
+    contacts: NDArray[np.int32],
+    phases: Floats,
+    step: Floats,
+    periods: int,
+    now: Evaluation,
 ) -> tuple[Floats, Evaluation] | None:
     """Return phases nearer to an orbit, a part of a step away; None if there are none."""
+    error = float(np.abs(now.distances).max())
     for _ in range(MOST_HALVINGS):
         tried = phases - step
-        found = evaluated(body, contacts, tried, periods)
+        found = evaluated(body, contacts, tried, periods, now.start)
         if float(np.abs(found.distances).max()) < error:
             return tried, found
         step = 0.5 * step
@@ -309,7 +384,12 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
     order = np.argsort(phases, kind="stable")
     first = int(np.floor(phases[order[0]] / TURN))
     phases = phases[order] - TURN * first
-    return PeriodicOrbit(orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order])
+    start = orbit.start
+    if orbit.body.yields and order[0] != 0 and start is not None:
+        start = orbit.train.entries[order[0]]
+    return PeriodicOrbit(
+        orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order], start
+    )
 
 
 def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
@@ -323,6 +403,8 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
     OrbitError
         An undamped mode gives infinitely many orbits.
     """
+    if body.yields:
+        return _single_contacts(body, periods, contact)
     hit = np.array([contact], dtype=np.int32)
     is_linear = body.has_one_sine and not body.contacts[contact].yield_velocity > 0.0
     phases = _phases_of_one_sine if is_linear else _phases_of_sines
@@ -332,6 +414,37 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
         if velocity[0] > least_speed(body):
             orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
     return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _single_contacts(body: ImpactingBody, periods: int, contact: int) -> tuple[PeriodicOrbit, ...]:
+    """Return the orbits P(1,q) of a contact of a body whose stops yield: equations.md 4.14."""
+    if body.contacts[contact].press is None:
+        alone = closed_form(replace(body, contacts=(body.contacts[contact],)), periods)
+        starts: list[tuple[float, Floats | None]] = [(float(each.phases[0]), None) for each in alone]
+    else:
+        starts = [*yielding_motion(body).single_contacts(contact, periods)]
+    found: list[PeriodicOrbit] = []
+    for phase, start in starts:
+        if any(_is_near(orbit, phase, start) for orbit in found):
+            continue
+        try:
+            orbit = find_orbit(body, [phase], [contact], periods, start=start)
+        except OrbitError:
+            continue
+        apart = [abs(np.mod(orbit.phases - each.phases + np.pi, TURN) - np.pi).max() for each in found]
+        if orbit.velocities[0] > least_speed(body) and min(apart, default=1.0) > SAME:
+            found.append(orbit)
+    return tuple(sorted(found, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _is_near(orbit: PeriodicOrbit, phase: float, start: Floats | None) -> bool:
+    """Tell whether a guess of an orbit with one contact leads to a known one."""
+    apart = abs(np.mod(float(orbit.phases[0]) - phase + np.pi, TURN) - np.pi)
+    if start is None or orbit.start is None:
+        return False
+    return bool(
+        apart < GUESSED and np.linalg.norm(orbit.start - start) < GUESSED * np.linalg.norm(orbit.start)
+    )
 
 
 def _phases_of_one_sine(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
@@ -377,50 +490,3 @@ def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.i
         )
     if not ((contacts >= 0) & (contacts < len(body.contacts))).all():
         raise UsageError(f"orbit: contacts: expected 0 to {len(body.contacts) - 1}, got {contacts.tolist()}.")
-
-
-def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
-    body = orbit.body
-    flight = np.clip(np.searchsorted(orbit.phases, phases, side="right") - 1, 0, orbit.phases.size - 1)
-    u = ((phases - orbit.phases[flight]) / body.angular_frequency)[:, None]
-    modes = body.frequencies.size
-    after = orbit.states[flight]
-    start = _steady(body, orbit.phases[flight])
-    now = _steady(body, phases)
-    x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
-    moved, faster = _free(body, u, x, v)
-    pushed = np.where(body.frequencies == 0.0, body.held, 0.0)
-    moved, faster = moved + 0.5 * pushed * u**2, faster + pushed * u
-    return (moved + now[0]) @ body.observed, (faster + now[1]) @ body.observed
-
-
-def _free(body: ImpactingBody, u: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return displacements and velocities of the modes, free from (x, v) for u seconds, shape (time, mode)."""
-    w, z = body.frequencies, body.damping_ratios
-    if body.coupling is not None:
-        loose, w = body.loose, w[body.loose :]
-        rates, vectors = body.complex_modes
-        parts = np.linalg.solve(vectors, np.concatenate([w * x[:, loose:], v[:, loose:]], axis=1).T)
-        later = (vectors @ (parts * np.exp(rates * u).T)).real.T
-        moved = np.concatenate([x[:, :loose] + v[:, :loose] * u, later[:, : w.size] / w], axis=1)
-        return moved, np.concatenate([v[:, :loose], later[:, w.size :]], axis=1)
-    decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w
-    # exponentials that decay, never a cosh that overflows: equations.md 1.2
-    fast = np.where(z > 1.0, -(decay + rate), -decay - 1j * rate)
-    slow = np.where(z > 1.0, -(w**2) / np.where(z > 1.0, decay + rate, 1.0), -decay + 1j * rate)
-    left, gone = np.exp(slow * u), np.exp(fast * u)
-    apart = np.where(rate == 0.0, 1.0, slow - fast)
-    c = 0.5 * (left + gone)
-    s = np.where(rate == 0.0, u * left, (left - gone) / apart)
-    return ((c + decay * s) * x + s * v).real, (-(w**2) * s * x + (c - decay * s) * v).real
-
-
-def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
-    """Return the steady displacements and velocities of the modes, shape (phase, mode)."""
-    moved, faster = np.broadcast_to(body.levels, (phases.size, body.levels.size)), np.zeros(1)
-    for order, force in body.harmonics.items():
-        if force.any():
-            w = order * body.angular_frequency
-            turned = body.steady(w, force) * np.exp(1j * order * phases)[:, None]
-            moved, faster = moved + turned.real, faster + (1j * w * turned).real
-    return moved, faster

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
+SLOW = 1e-7
+"""Speed of a contact, over that of the force's motion, below which its orbit counts as the one at a graze."""
 MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2, "branch point": 1}
 """Number of multipliers that pass the unit circle at a point of each kind."""
 
@@ -34,6 +36,12 @@ def turns_round(multipliers: NDArray[np.complex128]) -> bool:
     """Tell whether two complex multipliers are on the unit circle, not two real ones with the product 1."""
     nearest = multipliers[np.argmin(np.abs(np.abs(multipliers) - 1.0))]
     return bool(abs(nearest.imag) > 1e-6 and abs(abs(nearest) - 1.0) < 1e-6)
+
+
+def turns_at_graze(orbit: PeriodicOrbit) -> bool:
+    """Tell whether a branch turns because a contact with a stop that yields has no speed: the branch ends there."""
+    speeds = np.abs(orbit.velocities[~orbit.is_rigid])
+    return bool(speeds.min(initial=np.inf) < SLOW * orbit.body.scale * orbit.body.angular_frequency)
 
 
 def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:
