@@ -13,22 +13,26 @@ from vibroimpact.orchestrator.run.parameters import body_points
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
+TAKEN = ("law",)
+"""Rows of the table of limits that orbits on stops that yield take."""
 
 
-def impacting_body(scene: Scene) -> ImpactingBody:
-    """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on rigid stops.
+def impacting_body(scene: Scene, *, yields: bool = False) -> ImpactingBody:
+    """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on its stops.
 
     Parameters
     ----------
     scene : Scene
         In the short form; its sweep is ignored.
+    yields : bool
+        Whether stops that yield are taken, too.
 
     Raises
     ------
     UsageError
-        The scene is not a body of modes between restitution stops under one harmonic force.
+        The scene is not a body of modes between such stops under forces of one period.
     """
-    refuse_orbits(scene, seen(scene))
+    refuse_orbits(scene, seen(scene), TAKEN if yields else ())
     body = body_points(scene)
     found = body.mass_normalised()
     if found.is_dragged:

@@ -170,7 +170,7 @@ def _ends_of_runs(
     with long_runs(scene) as impacts_at:
         for value in seed_values(settings):
             try:
-                body = impacting_body(scene.with_values({parameter: value}))
+                body = impacting_body(scene.with_values({parameter: value}), yields=True)
             except SceneError:
                 continue  # the scene has no run there
             orbit = orbit_of_impacts(body, impacts_at({parameter: value}))
@@ -262,7 +262,9 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
             kept[value] = body_along(scene, {parameter: value})
         return kept[value]
 
-    impacting_body(scene.at({parameter: value}))  # a wrong key is refused before any orbit is followed
+    impacting_body(
+        scene.at({parameter: value}), yields=True
+    )  # a wrong key is refused before any orbit is followed
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
@@ -274,7 +276,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
-        return impacting_body(scene.at(values))
+        return impacting_body(scene.at(values), yields=True)
     except UsageError as problem:
         raise OrbitError(str(problem)) from problem
 

@@ -11,12 +11,14 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS
 from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
+from vibroimpact.analysis.orbits.yielding import start_near
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
@@ -76,7 +78,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
         """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
-        body, counts = impacting_body(self.scene), (self.impacts, self.periods)
+        body, counts = impacting_body(self.scene, yields=True), (self.impacts, self.periods)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
             return
@@ -190,7 +192,7 @@ def long_runs(scene: Scene) -> Iterator[Callable[[Mapping[str, float]], Floats |
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as impacts_at:
-        return orbit_of_impacts(impacting_body(scene), impacts_at({}))
+        return orbit_of_impacts(impacting_body(scene, yields=True), impacts_at({}))
 
 
 def orbit_of_impacts(
@@ -211,7 +213,9 @@ def orbit_of_impacts(
         if apart > REPEATS or not (contacts[count : 2 * count] == contacts[:count]).all():
             continue
         try:
-            orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods)
+            speeds, durations = rows[:count, 2], rows[:count, IMPACT_COLUMNS.index("impact_duration")]
+            start = start_near(body, contacts[:count], phases[:count], periods, speeds, durations)
+            orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods, start=start)
         except (OrbitError, UsageError):  # chatter: impacts closer than phases can resolve
             return None
         return orbit if orbit.is_physical else None

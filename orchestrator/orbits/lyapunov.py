@@ -49,13 +49,17 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
     """Lyapunov exponents of the runs of a dataset; a row has the exponents of a run, or the reason for none."""
 
     name = "lyapunov"
+    yields = True
     nothing = "a run with exponents"
     named = (DatasetError,)
 
     def rows(self) -> Generator[Exponents | str, None, None]:
         """Find the exponents of run after run."""
         runs = self.runs.vibroimpact.runs
-        self._bodies, impacts = Bodies(scene_of(self.runs, "lyapunov"), runs), ImpactsOf(self.runs)
+        self._bodies, impacts = (
+            Bodies(scene_of(self.runs, "lyapunov"), runs, yields=True),
+            ImpactsOf(self.runs),
+        )
         for place in range(runs.sizes["run"]):
             yield _of_run(self._bodies, impacts, runs, place)
 
@@ -83,7 +87,8 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain, a beam or
-        several bodies on restitution stops. 200 impacts must count, or two rounds of a periodic orbit.
+        several bodies. On stops that yield, motions of several modes must be periodic. 200 impacts must count, or two
+        rounds of a periodic orbit.
 
     Returns
     -------

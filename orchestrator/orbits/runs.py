@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -48,6 +48,9 @@ class OfRuns(Protocol):
 class RunsStudy(Study[Row]):
     """A study of the runs of a dataset, or of a scene, which runs first."""
 
+    yields: ClassVar[bool] = False
+    """Whether it takes stops that yield."""
+
     runs: xr.Dataset
     """As `open_dataset` or `run` gives it."""
 
@@ -59,7 +62,7 @@ class RunsStudy(Study[Row]):
     @classmethod
     def prepare(cls, options: OfRuns, stack: ExitStack) -> Self:
         """Open the runs."""
-        return cls(stack.enter_context(runs_of(options.file, options.changes or ())))
+        return cls(stack.enter_context(runs_of(options.file, options.changes or (), yields=cls.yields)))
 
     @property
     def left_out(self) -> str:
@@ -68,8 +71,8 @@ class RunsStudy(Study[Row]):
 
 
 @contextmanager
-def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
-    """Open the runs of a dataset, or run a scene and open its runs.
+def runs_of(path: Path, changes: Sequence[str], *, yields: bool = False) -> Iterator[xr.Dataset]:
+    """Open the runs of a dataset, or run a scene, whose stops may be ones that yield, and open its runs.
 
     UsageError: the scene's orbits cannot be followed, or changes are given for a dataset.
     """
@@ -83,7 +86,7 @@ def runs_of(path: Path, changes: Sequence[str]) -> Iterator[xr.Dataset]:
             yield dataset
         return
     scene = with_modes(opened_scene(path, changes))
-    impacting_body(scene)  # refused before it runs
+    impacting_body(scene, yields=yields)  # refused before it runs
     with ScratchFolder("energies") as folder:
         file = Path(folder.name, "run.nc")
         with shown_progress() as progress:
@@ -183,18 +186,21 @@ class ImpactsOf:
         order = np.argsort(owners, kind="stable")
         self._owners = owners[order]
         self._columns = [dataset[name].values[order] for name in columns]
+        lasts = "impact_duration" in dataset
+        self._durations = dataset["impact_duration"].values[order] if lasts else None
 
     def __getitem__(self, run_id: int) -> Impacts:
         first, stop = np.searchsorted(self._owners, [run_id, run_id + 1])
         time, phase, velocity, contact = (column[first:stop] for column in self._columns)
-        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1)
+        durations = None if self._durations is None else self._durations[first:stop]
+        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1, durations)
 
 
 class Bodies:
     """The body of each run; runs of one point share it."""
 
-    def __init__(self, scene: Scene, runs: xr.Dataset) -> None:
-        self._scene = scene
+    def __init__(self, scene: Scene, runs: xr.Dataset, *, yields: bool = False) -> None:
+        self._scene, self._yields = scene, yields
         self._columns = {key: runs[name].values for key, name in coordinate_names(scene).items()}
         self._last: tuple[dict[str, float], ImpactingBody] | None = None
         self.most_modes = 0
@@ -202,6 +208,6 @@ class Bodies:
     def __getitem__(self, place: int) -> ImpactingBody:
         values = {key: float(column[place]) for key, column in self._columns.items()}
         if self._last is None or self._last[0] != values:
-            self._last = values, impacting_body(self._scene.at(values))
+            self._last = values, impacting_body(self._scene.at(values), yields=self._yields)
             self.most_modes = max(self.most_modes, self._last[1].frequencies.size)
         return self._last[1]

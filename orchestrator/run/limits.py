@@ -8,7 +8,7 @@ start, as in a fused run.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, cast
 
@@ -55,6 +55,7 @@ LIMITS = {
     "stop": Limit(orbits="a restitution stop"),
     "motion": Limit(lanes=True),
     "law": Limit(orbits='"restitution": impacts without duration'),
+    "relaxing": Limit(orbits="0: a surface that relaxes at once"),
     "distance": Limit(lanes=True, orbits="0 where orbits are followed"),
     "reduced": Limit(thrown_back="a Chain with fewer modes than masses does not move one mass alone"),
     "projection": Limit(
@@ -103,6 +104,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')
+        if (relaxes := getattr(stop, "relaxation_time", 0.0)) > 0.0:
+            yield Seen("relaxing", f"{key}.relaxation_time", f"{relaxes:g}")
     if scene.falling_force:
         yield Seen("distance", "exciter.distance", "a force that falls with the distance")
     if not scene.is_one_body:
@@ -202,10 +205,10 @@ def seen_of_drag(scene: Scene) -> Seen:
     )
 
 
-def refuse_orbits(scene: Scene, found: Iterable[Seen]) -> None:
-    """Raise UsageError unless a search for orbits can take all features of a scene."""
+def refuse_orbits(scene: Scene, found: Iterable[Seen], taken: Container[str] = ()) -> None:
+    """Raise UsageError unless a search for orbits can take all features of a scene; some rows are `taken`."""
     for row, where, got in found:
-        if LIMITS[row].orbits:
+        if LIMITS[row].orbits and row not in taken:
             raise UsageError(f"{scene.source}: {where}: expected {LIMITS[row].orbits}, got {got}.")
 
 
