@@ -190,6 +190,8 @@ class LinearPassage:
         self.direction = contact.direction
         self.flow, self.force = forced.pressed(contact, stiffness, damping)
         self._back = self.flow.reversed()
+        # a body without a spring is placed by its stops alone: its depth counts from the stop itself
+        self._is_shifted = forced.body.loose == 0
         self._rate = self.force @ self.flow.matrix
         self._beyond, self._approach = forced.beyond(contact), forced.approach(contact)
 
@@ -215,7 +217,7 @@ class LinearPassage:
         forced = self._forced
         speed = self._contact.direction * float(self._approach @ before)
         pressed = before.copy()
-        pressed[forced.offset] = self._beyond @ before
+        pressed[forced.offset] = self._beyond @ before if self._is_shifted else 0.0
         return self._of_duration(
             pressed, self.release(pressed, limit) if speed > 0.0 else -self._began(pressed)
         )
@@ -229,7 +231,7 @@ class LinearPassage:
         own, sign = forced.motion, contact.direction
         over = self.flow.over(duration) if duration >= 0.0 else self._back.over(-duration)
         after = over @ pressed
-        flow, by_offset = over[own, own], over[own, forced.offset]
+        flow, by_offset = over[own, own], over[own, forced.offset] * self._is_shifted
         normal = np.concatenate([contact.shape, np.zeros(forced.modes)])
         salted = np.eye(2 * forced.modes)
         salted[forced.velocity, : forced.modes] -= self._damping * np.outer(contact.shape, contact.shape)
@@ -253,6 +255,14 @@ class LinearPassage:
             samples = self.flow.samples(state, bit)
             ahead = np.column_stack([samples, self.flow.one_step @ samples[:, -1]])
             forces, rates = rows @ ahead
+            if (
+                not self._is_shifted and passed == 0.0 and forces[0] < 0.0
+            ):  # beside an orbit a stop may be met late
+                if not (forces > 0.0).any():
+                    raise OrbitError(
+                        "orbit: expected a contact that presses its stop, got one that does not reach it."
+                    )
+                forces[: int(np.argmax(forces > 0.0)) + 1] = np.inf
             for k in _may_release(forces, rates, step):
                 time = self._zero(ahead[:, k], passed == 0.0 and k == 0)
                 if time is not None:
@@ -279,7 +289,7 @@ class LinearPassage:
         """Return the time within a step from a state at which the force falls through 0; None without one."""
         step = self.flow.step
         series = self.flow.polynomial(self.force[None], state)[:, 0]
-        if is_first and self._damping == 0.0:
+        if is_first and self._damping == 0.0 and self._is_shifted:
             series = series[1:]  # the force begins at 0
         return _first_fall(series, step)
 

@@ -266,7 +266,7 @@ class PowerPassage:
         return None
 
     def _end(self, before: Floats, found: _Contact, *, pulls: bool) -> tuple[float, float]:
-        """Return what is 0 at the end of a contact, and its rate: the depth, or the force's factor 1 + damping d'."""
+        """Return the depth, or the factor 1 + damping d' of the force where it `pulls`, at the end, and its rate."""
         depth, rate = (float(each) for each in found.end)
         if not pulls:
             return depth, rate

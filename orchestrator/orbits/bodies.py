@@ -38,6 +38,8 @@ def impacting_body(scene: Scene, *, yields: bool = False) -> ImpactingBody:
     if found.is_dragged:
         refuse_orbits(scene, [seen_of_drag(scene)])
     for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
+        if found.loose and contact.press is not None and not contact.press.is_linear:
+            refuse_orbits(scene, [Seen("placed", f"{key}.law", f'"{contact.press.law}"')])
         if not contact.shape @ contact.shape > 0.0:
             refuse_orbits(scene, [Seen("held", key, "one that is held")])
     if any(key.startswith("contact") for key in scene.stop_keys):

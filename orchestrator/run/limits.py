@@ -55,6 +55,7 @@ LIMITS = {
     "stop": Limit(orbits="a restitution stop"),
     "motion": Limit(lanes=True),
     "law": Limit(orbits='"restitution": impacts without duration'),
+    "placed": Limit(orbits='"restitution" or "kelvin_voigt" beside bodies that no spring ties to the ground'),
     "relaxing": Limit(orbits="0: a surface that relaxes at once"),
     "distance": Limit(lanes=True, orbits="0 where orbits are followed"),
     "reduced": Limit(thrown_back="a Chain with fewer modes than masses does not move one mass alone"),

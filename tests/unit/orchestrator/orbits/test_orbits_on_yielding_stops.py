@@ -76,6 +76,32 @@ def test_a_long_run_ends_on_the_orbit_with_its_speeds_impulses_and_durations(
         np.testing.assert_allclose(last[name].values[order], values[own], rtol=100 * error, atol=error)
 
 
+BALL = {
+    "scene": {"units": "nondimensional"},
+    "body": {"mass": 1.0, "stiffness": 0.0, "displacement_start": 1.2, "velocity_start": 3.1},
+    "forcing": {"signal": "constant", "amplitude": -1.0},
+    "stop": [
+        {
+            **{"law": "kelvin_voigt", "stiffness": 1000.0, "damping": 10.0, "position": 0.0, "side": "lower"},
+            **{"motion_amplitude": 1.2, "motion_angular_frequency": 1.0, "motion_phase": -1.05},
+        }
+    ],
+    "record": {"transient_periods": 200, "recorded_periods": 4, "impacts": True},
+}
+
+
+def test_a_ball_without_a_spring_is_placed_by_the_table_that_yields() -> None:
+    run = vi.run(BALL).vibroimpact.impacts()
+    stable, unstable = vi.find_orbits(BALL, 1)
+    assert (stable.stability, unstable.stability) == ("stable", "unstable")
+    assert stable.velocities[0] == pytest.approx(float(run.impact_velocity[-1]), rel=1e-13)
+    assert stable.determinant == pytest.approx(np.exp(-10.0 * stable.durations[0]), rel=1e-13)
+    hard = BALL | {"stop": [{"law": "hertz", "stiffness": 1e4, "position": 0.0, "side": "lower"}]}
+    hard["forcing"] = [BALL["forcing"], {"amplitude": 0.5, "angular_frequency": 1.0}]
+    with pytest.raises(UsageError, match=r'law: expected "restitution" or "kelvin_voigt" beside bodies'):
+        vi.find_orbits(hard)
+
+
 def test_an_unstable_orbit_returns_to_itself_in_a_run() -> None:
     given = scene(KELVIN_VOIGT | {"position": 1.0}, angular_frequency=1.35)
     (orbit,) = (each for each in vi.find_orbits(given, 1) if not each.is_stable)
