@@ -37,7 +37,8 @@ def alternating(orbit: PeriodicOrbit) -> float:
         return float(np.linalg.det(own / body.scale))
     count = orbit.phases.size
     phases = np.concatenate([orbit.phases, orbit.phases + TURN * orbit.periods])
-    slopes = evaluated(body, np.tile(orbit.contacts, 2), phases, 2 * orbit.periods).distance_slopes
+    twice = np.tile(orbit.contacts, 2)
+    slopes = evaluated(body, twice, phases, 2 * orbit.periods, orbit.start).distance_slopes
     return float(np.linalg.det((slopes[:count, :count] - slopes[:count, count:]) / body.scale))
 
 

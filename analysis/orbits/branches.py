@@ -231,17 +231,15 @@ def _record(orbit: PeriodicOrbit, most: int) -> RunRecord:
     phases = np.mod(orbit.phases, TURN * q)
     periods[:q, 4] = np.bincount((phases // TURN).astype(int), minlength=q)
     order = np.argsort(phases)
-    hit = [orbit.body.contacts[each] for each in orbit.contacts]
-    kept = [float(c.restitution_at(speed)) for c, speed in zip(hit, orbit.velocities, strict=True)]
     impacts = np.column_stack(
         [
             phases / w,
             np.mod(phases, TURN),
             orbit.velocities,
-            [(1.0 + r) * c.mass * speed for r, c, speed in zip(kept, hit, orbit.velocities, strict=True)],
+            orbit.impulses,
             orbit.contacts + 1.0,
-            kept,
-            np.zeros(phases.size),
+            orbit.restitutions,
+            orbit.durations,
         ]
     )
     return RunRecord(

@@ -17,10 +17,10 @@ from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
-BESIDE, BESIDE_OWN = 1e-4, 1e-2
-"""Step away from a graze, over the longest, after which an orbit is judged; without a force, whose unknowns are speeds.
+BESIDE, BESIDE_SQUARE = 1e-4, 1e-2
+"""Step away from a graze, over the longest, after which an orbit is judged; where the parameter changes with V^2.
 
-A maximum beyond its stop grows with the square of the speed, and must exceed rounding.
+It does so without a force, and on stops that yield. A maximum beyond its stop must exceed rounding.
 """
 SAME_VALUE = 1e-7
 """Difference of two values, over the range, up to which they are one point."""
@@ -178,15 +178,18 @@ def _orbit_of(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> Periodi
         phases = (phases[order] - phases[order][0]) / turns
         return PeriodicOrbit(body.with_period(turns * like.period), 1, phases, contacts[order], speeds[order])
     made = ordered(PeriodicOrbit(body, periods, phases, contacts, speeds))
-    velocities = evaluated(body, made.contacts, made.phases, periods).velocities
-    return PeriodicOrbit(body, periods, made.phases, made.contacts, velocities)
+    start = like.state_at(float(made.phases[0])) if body.yields else None
+    found = evaluated(body, made.contacts, made.phases, periods, start)
+    return PeriodicOrbit(body, periods, made.phases, made.contacts, found.velocities, found.start)
 
 
 def _beside(follower: Follower, orbit: PeriodicOrbit, value: float) -> Iterator[Departure]:
     """Yield the branch of an orbit at a graze in the direction of its physical orbits, if there are any."""
-    start, away = follower.on_branch(orbit, value, None), BESIDE_OWN if orbit.body.has_own_period else BESIDE
+    start = follower.on_branch(orbit, value, None)
+    is_square = orbit.body.has_own_period or orbit.body.yields
+    away = (BESIDE_SQUARE if is_square else BESIDE) * follower.settings.longest
     for each in (start, start.turned):
-        found = follower.step(each, away * follower.settings.longest)
+        found = follower.step(each, away)
         if found is not None and found[0].orbit.is_physical:
             next_to = found[0]
             yield Departure(each, "graze", is_stable=next_to.orbit.is_stable, beside=next_to.value)

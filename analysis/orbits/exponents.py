@@ -6,12 +6,16 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
+from vibroimpact.analysis.orbits.yielding_exponents import YieldingStretching
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
+
+Integers = NDArray[np.int64]
 
 FORGOTTEN = 1e-12
 """Share of an error of the first state that is left where impacts begin to count."""
@@ -100,6 +104,40 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
                 f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
                 "Record more periods."
             ) from None
+    edges = np.linspace(first, count, BLOCKS + 1).astype(int)
+    sums, exact = _stretched(body, impacts, elapsed, edges)
+    counted = count - first
+    interval = float(elapsed[first:].sum()) / counted
+    per_impact = sums.sum(axis=0) / counted
+    means = sums / np.diff(edges)[:, None]
+    order = np.argsort(-per_impact, kind="stable")
+    off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
+    if not off <= SUM_RULE:
+        raise ExponentError(
+            f"lyapunov: expected exponents whose sum is {exact:.12g}, got {per_impact.sum():.12g}."
+        )
+    error = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
+    return Exponents(per_impact[order], error[order], interval, counted, off)
+
+
+def _stretched(
+    body: ImpactingBody, impacts: Impacts, elapsed: Floats, edges: Integers
+) -> tuple[Floats, float]:
+    """Return the stretching of the directions between the edges, and the exact sum of the exponents per impact."""
+    first, blocks = int(edges[0]), list(itertools.pairwise(edges.tolist()))
+    if body.yields:
+        if body.frequencies.size > 1:
+            raise ExponentError(
+                "lyapunov: expected a periodic motion or one mode, where stops yield, got several modes: the impacts "
+                "do not show their state."
+            )
+        yielding = YieldingStretching(body, impacts)
+        try:
+            yielding.along(1, first)
+            sums = np.array([yielding.along(*each) for each in blocks])
+        except OrbitError as problem:
+            raise ExponentError(f"lyapunov: {problem}.") from problem
+        return sums, float(yielding.shrinking[first:].mean())
     moving = Stretching(
         body.kernel,
         impacts.contacts.astype(np.int32),
@@ -109,22 +147,10 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
         _first_state(body, impacts),
     )
     moving.along(1, first)
-    edges = np.linspace(first, count, BLOCKS + 1).astype(int)
-    sums = np.array([moving.along(low, high) for low, high in itertools.pairwise(edges)])
-    counted = count - first
-    interval = float(elapsed[first:].sum()) / counted
-    per_impact = sums.sum(axis=0) / counted
-    means = sums / np.diff(edges)[:, None]
-    order = np.argsort(-per_impact, kind="stable")
+    sums = np.array([moving.along(*each) for each in blocks])
+    decay = 2.0 * float(elapsed[first:].mean()) * body.decay
     shrinking = body.shrinking(impacts.contacts[first:], impacts.velocities[first:])
-    exact = float(np.mean(np.log(shrinking))) - 2.0 * interval * body.decay
-    off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
-    if not off <= SUM_RULE:
-        raise ExponentError(
-            f"lyapunov: expected exponents whose sum is {exact:.12g}, got {per_impact.sum():.12g}."
-        )
-    error = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
-    return Exponents(per_impact[order], error[order], interval, counted, off)
+    return sums, float(np.mean(np.log(shrinking))) - decay
 
 
 def _of_orbit(recorded: RecordedOrbit) -> Exponents:

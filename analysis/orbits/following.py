@@ -28,6 +28,7 @@ from vibroimpact.analysis.orbits.sign_changes import (
     is_explained,
     is_of_graze,
     turning,
+    turns_at_graze,
     turns_round,
 )
 from vibroimpact.analysis.orbits.symmetry import differences, is_symmetric
@@ -110,7 +111,7 @@ class BranchOrbit:
         """Functions whose sign changes at a special point, by kind."""
         orbit = self.orbit
         size = orbit.monodromy.shape[0]
-        fast = float(np.prod(np.minimum(orbit.velocities, 1.0)))
+        fast = float(np.prod(np.minimum(orbit.velocities[orbit.is_rigid], 1.0)))
         scale = orbit.body.scale
         tests = {
             BRANCH_POINT: self.border,
@@ -353,14 +354,14 @@ class Follower:
         before = now.orbit.unknowns
         unknowns = before + step * now.tangent[:-1]
         value = now.value + step * now.tangent[-1] * span
-        least = np.inf
+        least, orbit = np.inf, now.orbit
         try:
             across = self._over_value(now.orbit, unknowns, value)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                errors, slopes, orbit = self.residual(now.orbit, unknowns, value)
+                errors, slopes, orbit = self.residual(orbit, unknowns, value)
                 error = float(np.abs(errors).max())
                 small = error <= CLOSE * orbit.body.scale
-                if small and error >= 0.5 * least:
+                if small and (error >= 0.5 * least or orbit.body.yields):
                     break
                 least = min(least, error)
                 ahead = now.tangent @ np.append(unknowns - before, (value - now.value) / span)
@@ -442,7 +443,10 @@ class Follower:
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch
-                if (kind != "fold" or not is_level) and not is_of_graze(kind, found[1].orbit):
+                is_end = is_of_graze(kind, found[1].orbit) or (
+                    kind == "fold" and turns_at_graze(found[1].orbit)
+                )
+                if (kind != "fold" or not is_level) and not is_end:
                     yield found[0], end_of(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:

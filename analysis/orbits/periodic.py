@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.errors import OrbitError as OrbitError
 from vibroimpact.analysis.orbits.observed_motion import observed_motion
 from vibroimpact.analysis.orbits.own_period import equations, free_multipliers, is_unbounded, unknowns_of
 from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
+from vibroimpact.analysis.orbits.yielding import Train, yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
-from vibroimpact.fmus.errors import UsageError, VibroimpactError
+from vibroimpact.fmus.errors import UsageError
 
 TURN = 2.0 * np.pi
 MOST_STEPS = 60
@@ -32,12 +34,10 @@ SLOW = 1e-8
 """Speed of an impact, over that of the force's motion, below which it grazes."""
 NEXT_TO_BOUND = 0.9
 """Speed of an impact without a force, over the largest of the search, from which on it is next to that bound."""
+GUESSED = 1e-3
+"""Difference of a guess from a known orbit, rad and over the size of the state, below which it leads to that orbit."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
-
-
-class OrbitError(VibroimpactError):
-    """An orbit was not found, or not followed further."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,6 +57,8 @@ class PeriodicOrbit:
         Contact of each impact, from 0.
     velocities : array, shape (p,)
         Speeds towards the stops, relative to them, before the impacts, m/s.
+    start : array, shape (2 modes,), or None
+        Where stops yield, the state before the first impact, or one near to it: a search begins there.
     """
 
     body: ImpactingBody
@@ -64,6 +66,7 @@ class PeriodicOrbit:
     phases: Floats
     contacts: NDArray[np.int32]
     velocities: Floats
+    start: Floats | None = None
 
     @property
     def name(self) -> str:
@@ -107,7 +110,15 @@ class PeriodicOrbit:
 
     @cached_property
     def _motion(self) -> tuple[Floats, Floats]:
+        if self.body.yields:
+            return np.array([each.after for each in self.train.passages]), self.train.monodromy
         return self.body.kernel.motion(self.contacts, self.phases, self.periods, self.velocities)
+
+    @cached_property
+    def train(self) -> Train:
+        """The contacts of an orbit on stops that yield: equations.md 4.14."""
+        motion = yielding_motion(self.body)
+        return motion.periodic(self.contacts, self.phases, self.periods, self.start)
 
     @property
     def states(self) -> Floats:
@@ -158,8 +169,42 @@ class PeriodicOrbit:
     def exact_determinant(self) -> float:
         """Product of r (r + r' V) of the impacts and of the decay of all modes over the orbit: equations.md 4.2."""
         body = self.body
-        squared = np.prod(body.shrinking(self.contacts, self.velocities))
+        squared = np.prod(
+            self.train.values("shrinking") if body.yields else body.shrinking(self.contacts, self.velocities)
+        )
         return float(squared * np.exp(-2.0 * self.period * body.decay))
+
+    def state_at(self, phase: float) -> Floats:
+        """Return modal displacements and velocities at a phase of an orbit on stops that yield, shape (2 modes,)."""
+        first = float(self.phases[0])
+        later = first + np.mod(phase - first, TURN * self.periods)
+        return yielding_motion(self.body).states(self.train, np.array([later]), first)[:, 0]
+
+    @property
+    def durations(self) -> Floats:
+        """Durations of the contacts, s; 0 on rigid stops, shape (p,)."""
+        return self.train.values("duration") if self.body.yields else np.zeros(self.phases.size)
+
+    @property
+    def restitutions(self) -> Floats:
+        """Speeds after the contacts over speeds before them, shape (p,)."""
+        if self.body.yields:
+            return self.train.values("rebound") / self.velocities
+        hit = zip(self.contacts, self.velocities, strict=True)
+        return np.array([float(self.body.contacts[k].restitution_at(speed)) for k, speed in hit])
+
+    @property
+    def impulses(self) -> Floats:
+        """Impulses of the contacts, N s, shape (p,)."""
+        if self.body.yields:
+            return self.train.values("impulse")
+        masses = np.array([each.mass for each in self.body.contacts])[self.contacts]
+        return np.asarray((1.0 + self.restitutions) * masses * self.velocities)
+
+    @property
+    def is_rigid(self) -> NDArray[np.bool_]:
+        """Whether the stop of each impact is rigid, shape (p,)."""
+        return np.array([each.press is None for each in self.body.contacts])[self.contacts]
 
     @property
     def falling(self) -> NDArray[np.bool_]:
@@ -178,6 +223,8 @@ class PeriodicOrbit:
 
         All maxima at all contacts are found: a bound of the third derivative certifies the search.
         """
+        if self.body.yields:
+            return yielding_motion(self.body).highest(self.phases, self.train)
         return self.body.kernel.maximum(self.contacts, self.phases, self.periods, self.states)
 
     @property
@@ -217,7 +264,7 @@ class PeriodicOrbit:
         )
         if body.has_own_period:
             q, body, phases = 1, body.with_period(self.period / self.turns), phases * self.turns
-        return PeriodicOrbit(body, q, phases[:p], self.contacts[:p], self.velocities[:p])
+        return PeriodicOrbit(body, q, phases[:p], self.contacts[:p], self.velocities[:p], self.start)
 
     def repeated(self, turns: int) -> PeriodicOrbit:
         """Return the orbit counted several times, as one orbit."""
@@ -226,7 +273,8 @@ class PeriodicOrbit:
         if body.has_own_period:
             phases, body, periods = phases / turns, body.with_period(turns * self.period), 1
         return PeriodicOrbit(
-            body, periods, phases, np.tile(self.contacts, turns), np.tile(self.velocities, turns)
+            *(body, periods, phases, np.tile(self.contacts, turns), np.tile(self.velocities, turns)),
+            self.start,
         )
 
     def counted_from(self, impact: int) -> PeriodicOrbit:
@@ -235,7 +283,10 @@ class PeriodicOrbit:
         if self.body.has_own_period:
             phases = phases - phases[0]
         contacts, velocities = np.roll(self.contacts, -impact), np.roll(self.velocities, -impact)
-        return PeriodicOrbit(self.body, self.periods, phases, contacts, velocities)
+        start = self.start
+        if self.body.yields and impact and start is not None:
+            start = self.train.entries[impact]
+        return PeriodicOrbit(self.body, self.periods, phases, contacts, velocities, start)
 
     @cached_property
     def unknowns(self) -> Floats:
@@ -257,6 +308,8 @@ class PeriodicOrbit:
         tuple of array
             m, m/s; at an impact the values after it.
         """
+        if self.body.yields:
+            return yielding_motion(self.body).observed(self.train, phases, float(self.phases[0]))
         return observed_motion(self.body, self.phases, self.states, phases)
 
 
@@ -305,13 +358,24 @@ def tried(body: ImpactingBody, like: PeriodicOrbit, unknowns: Floats) -> Trial:
         return Trial(
             own.errors, own.slopes, PeriodicOrbit(own.body, 1, own.phases, like.contacts, own.velocities)
         )
-    found = evaluated(body, like.contacts, unknowns, like.periods)
-    made = PeriodicOrbit(body, like.periods, unknowns, like.contacts, found.velocities)
+    found = evaluated(body, like.contacts, unknowns, like.periods, like.start)
+    made = PeriodicOrbit(body, like.periods, unknowns, like.contacts, found.velocities, found.start)
     return Trial(found.distances, found.distance_slopes, made)
 
 
-def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
-    """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them."""
+def evaluated(
+    body: ImpactingBody,
+    contacts: NDArray[np.int32],
+    phases: Floats,
+    periods: int,
+    start: Floats | None = None,
+) -> Evaluation:
+    """Return velocities, distances and slopes for phases of impacts; OrbitError where no motion has them.
+
+    Where stops yield, the search begins at a state before the first impact if one is given.
+    """
+    if body.yields:
+        return yielding_motion(body).evaluate(contacts, phases, periods, start)
     found = body.kernel.evaluate(contacts, phases, periods)
     _refuse_end(found.end, phases)
     return found
@@ -351,6 +415,8 @@ def find_orbit(
     phases: Sequence[float] | Floats,
     contacts: Sequence[int] | None = None,
     periods: int = 1,
+    *,
+    start: Floats | None = None,
 ) -> PeriodicOrbit:
     """Find the orbit near given phases of impacts, stable or not, by Newton's method: equations.md 4.7.
 
@@ -363,6 +429,8 @@ def find_orbit(
         Contact of each impact, from 0; by default the first contact.
     periods : int
         q.
+    start : array, shape (2 modes,), optional
+        Where stops yield, a state near to that before the first impact.
 
     Raises
     ------
@@ -374,18 +442,20 @@ def find_orbit(
     at: Floats = np.array(phases, dtype=np.float64)
     hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
     _refuse_no_train(body, at, hit, periods)
-    found = evaluated(body, hit, at, periods)
+    found = evaluated(body, hit, at, periods, start)
     for _ in range(MOST_STEPS):
         error = float(np.abs(found.distances).max())
+        if body.yields and error <= CLOSE * body.scale:
+            break  # rounding decides nothing more
         step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
-        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, error)
+        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, found)
         if nearer is None:
             break
         at, found = nearer
     # next to a fold, phases are known only to the square root of rounding
     error = float(np.abs(found.distances).max())
     if error <= 1e3 * CLOSE * body.scale:
-        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
+        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities, found.start))
     raise OrbitError(
         f"orbit: expected an orbit P({at.size},{periods}) near to the phases "
         f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none: Newton's method ends {error:.2g} m "
@@ -394,12 +464,18 @@ def find_orbit(
 
 
 def _damped_step(
-    body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, step: Floats, periods: int, error: float
+    body: ImpactingBody,
+    contacts: NDArray[np.int32],
+    phases: Floats,
+    step: Floats,
+    periods: int,
+    now: Evaluation,
 ) -> tuple[Floats, Evaluation] | None:
     """Return phases nearer to an orbit, a part of a step away; None if there are none."""
+    error = float(np.abs(now.distances).max())
     for _ in range(MOST_HALVINGS):
         tried = phases - step
-        found = evaluated(body, contacts, tried, periods)
+        found = evaluated(body, contacts, tried, periods, now.start)
         if float(np.abs(found.distances).max()) < error:
             return tried, found
         step = 0.5 * step
@@ -428,7 +504,12 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
     order = np.argsort(phases, kind="stable")
     first = int(np.floor(phases[order[0]] / TURN))
     phases = phases[order] - TURN * first
-    return PeriodicOrbit(orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order])
+    start = orbit.start
+    if orbit.body.yields and order[0] != 0 and start is not None:
+        start = orbit.train.entries[order[0]]
+    return PeriodicOrbit(
+        orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order], start
+    )
 
 
 def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
@@ -442,6 +523,8 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
     OrbitError
         An undamped mode gives infinitely many orbits.
     """
+    if body.yields:
+        return _single_contacts(body, periods, contact)
     hit = np.array([contact], dtype=np.int32)
     is_linear = body.has_one_sine and not body.contacts[contact].yield_velocity > 0.0
     phases = _phases_of_one_sine if is_linear else _phases_of_sines
@@ -451,6 +534,37 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
         if velocity[0] > least_speed(body):
             orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
     return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _single_contacts(body: ImpactingBody, periods: int, contact: int) -> tuple[PeriodicOrbit, ...]:
+    """Return the orbits P(1,q) of a contact of a body whose stops yield: equations.md 4.14."""
+    if body.contacts[contact].press is None:
+        alone = closed_form(replace(body, contacts=(body.contacts[contact],)), periods)
+        starts: list[tuple[float, Floats | None]] = [(float(each.phases[0]), None) for each in alone]
+    else:
+        starts = [*yielding_motion(body).single_contacts(contact, periods)]
+    found: list[PeriodicOrbit] = []
+    for phase, start in starts:
+        if any(_is_near(orbit, phase, start) for orbit in found):
+            continue
+        try:
+            orbit = find_orbit(body, [phase], [contact], periods, start=start)
+        except OrbitError:
+            continue
+        apart = [abs(np.mod(orbit.phases - each.phases + np.pi, TURN) - np.pi).max() for each in found]
+        if orbit.velocities[0] > least_speed(body) and min(apart, default=1.0) > SAME:
+            found.append(orbit)
+    return tuple(sorted(found, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _is_near(orbit: PeriodicOrbit, phase: float, start: Floats | None) -> bool:
+    """Tell whether a guess of an orbit with one contact leads to a known one."""
+    apart = abs(np.mod(float(orbit.phases[0]) - phase + np.pi, TURN) - np.pi)
+    if start is None or orbit.start is None:
+        return False
+    return bool(
+        apart < GUESSED and np.linalg.norm(orbit.start - start) < GUESSED * np.linalg.norm(orbit.start)
+    )
 
 
 def _phases_of_one_sine(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.own_orbits import orbit_of_round, repeating_round
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.analysis.orbits.yielding import start_near
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
@@ -31,12 +32,15 @@ class Impacts(NamedTuple):
         s; forcing phases, rad; speeds towards the stops, m/s.
     contacts : array of int, shape (impact,)
         Contact of each impact, from 0.
+    durations : array, shape (impact,), or None
+        Durations of the contacts, s; None: they are not known.
     """
 
     times: Floats
     phases: Floats
     velocities: Floats
     contacts: NDArray[np.int64]
+    durations: Floats | None = None
 
 
 class RecordedOrbit(NamedTuple):
@@ -71,8 +75,10 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
     first = phases[last][0]
     # counted from the period of the first impact
     begin = TURN * np.floor(first / TURN)
-    found = find_orbit(body, phases[last] - begin, impacts.contacts[last].tolist(), periods)
-    velocities = impacts.velocities[last]
+    velocities, hit = impacts.velocities[last], impacts.contacts[last]
+    lasting = None if impacts.durations is None else impacts.durations[last]
+    start = start_near(body, hit, phases[last] - begin, periods, velocities, lasting)
+    found = find_orbit(body, phases[last] - begin, hit.tolist(), periods, start=start)
     order = _same_order(found.phases, phases[last] - begin, periods)
     gaps = found.velocities[order] - velocities
     away = np.abs(np.mod(found.phases[order] - phases[last] + begin + np.pi, TURN) - np.pi).max()
@@ -109,7 +115,8 @@ def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
     if orbit.turns == 1:
         return orbit
     count, periods = orbit.phases.size // orbit.turns, orbit.periods // orbit.turns
-    return find_orbit(orbit.body, orbit.phases[:count], orbit.contacts[:count].tolist(), periods)
+    hit = orbit.contacts[:count].tolist()
+    return find_orbit(orbit.body, orbit.phases[:count], hit, periods, start=orbit.start)
 
 
 def _unwrapped(impacts: Impacts, rate: float) -> Floats:

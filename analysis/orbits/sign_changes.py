@@ -13,6 +13,8 @@ from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SLOWEST = 1e-6
 """Speed of an impact, over the size of the motion, below which a fold without a force is the graze of this impact."""
+SLOW = 1e-7
+"""Speed of a contact, over that of the force's motion, below which its orbit counts as the one at a graze."""
 MULTIPLIERS_OF = {"fold": 1, "period doubling": 1, "torus": 2, "branch point": 1}
 """Number of multipliers that pass the unit circle at a point of each kind."""
 
@@ -41,6 +43,12 @@ def turns_round(multipliers: NDArray[np.complex128]) -> bool:
 def is_of_graze(kind: str, at: PeriodicOrbit) -> bool:
     """Tell whether a zero without a force is that of a speed: the parameter is even in the speed of an impact there."""
     return at.body.has_own_period and not kind.startswith("graze") and bool(grazes(at, SLOWEST).any())
+
+
+def turns_at_graze(orbit: PeriodicOrbit) -> bool:
+    """Tell whether a branch turns because a contact with a stop that yields has no speed: the branch ends there."""
+    speeds = np.abs(orbit.velocities[~orbit.is_rigid])
+    return bool(speeds.min(initial=np.inf) < SLOW * orbit.body.scale * orbit.body.angular_frequency)
 
 
 def is_explained(before: PeriodicOrbit, after: PeriodicOrbit, kinds: Sequence[str]) -> bool:

@@ -36,6 +36,8 @@ def _is_image(one: Contact, other: Contact) -> bool:
     """Tell whether the mirror image of a stop, half a period later, is another one."""
     if abs(one.restitution - other.restitution) > EQUAL or one.yield_velocity != other.yield_velocity:
         return False
+    if one.press != other.press:
+        return False
     orders = {*one.motion, *other.motion}
     here = np.array([one.position, *(one.motion.get(n, 0j) for n in sorted(orders))])
     turned = np.array([other.position, *(other.motion.get(n, 0j) * (-1) ** n for n in sorted(orders))])
@@ -57,8 +59,9 @@ def mirror_image(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     if contacts is None:
         return None
     later = orbit.phases if orbit.body.has_own_period else orbit.phases + 0.5 * TURN
+    start = None if orbit.start is None else -orbit.start
     return ordered(
-        PeriodicOrbit(orbit.body, orbit.periods, later, contacts[orbit.contacts], orbit.velocities)
+        PeriodicOrbit(orbit.body, orbit.periods, later, contacts[orbit.contacts], orbit.velocities, start)
     )
 
 

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.core.contact_laws import numbered_contact_law
 from vibroimpact.fmus.core.orbits import OrbitBody
 
 Floats = NDArray[np.float64]
@@ -26,9 +27,37 @@ MOST_STEPS_OF_SPEED = 50
 """Largest number of Newton steps from the speed of equal impulse to the speed of an impact."""
 
 
+LINEAR = "kelvin_voigt"
+"""Name of the law of a spring and a dashpot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """The force of a stop that yields; it never pulls: equations.md 6.9, 6.10.
+
+    Attributes
+    ----------
+    law : str
+        `kelvin_voigt`: stiffness d + damping d'. `hertz`, `hunt_crossley`: stiffness d^exponent (1 + damping d').
+    stiffness, damping : float
+        N/m^exponent; N s/m, or s/m of a power law.
+    exponent : float
+    """
+
+    law: str
+    stiffness: float
+    damping: float = 0.0
+    exponent: float = 1.0
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the force is a spring's and a dashpot's."""
+        return self.law == LINEAR
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A point of a body with a rigid stop.
+    """A point of a body with a stop.
 
     Attributes
     ----------
@@ -39,13 +68,15 @@ class Contact:
     position : float
         Mean position of the stop, m.
     restitution : float
-        Coefficient of restitution, 0 to 1.
+        Coefficient of restitution, 0 to 1, of a rigid stop.
     motion : mapping of int to complex
         Complex amplitudes of the stop's motion, m, by their harmonic n: position + Re(amplitude e^(i n phase)).
     yield_velocity : float
         Speed above which the restitution falls as (V / yield_velocity)^(-1/4), m/s; 0: it is constant.
     name : str
         Name of a contact of two points, such as `contact 1`; empty for a stop.
+    press : Press or None
+        Force of a stop that yields; None: the stop is rigid.
     """
 
     shape: Floats
@@ -55,6 +86,7 @@ class Contact:
     motion: Mapping[int, complex] = field(default_factory=dict)
     yield_velocity: float = 0.0
     name: str = ""
+    press: Press | None = None
 
     @cached_property
     def mass(self) -> float:
@@ -161,6 +193,11 @@ class ImpactingBody:
     def has_one_sine(self) -> bool:
         """Whether the clock's force is the only motion with its period: no further sines, no moving stops."""
         return not self.further and not any(each.motion for each in self.contacts)
+
+    @cached_property
+    def yields(self) -> bool:
+        """Whether one of its stops yields."""
+        return any(each.press is not None for each in self.contacts)
 
     @cached_property
     def loose(self) -> int:
@@ -327,8 +364,18 @@ def contacts_of(shapes: Iterable[Floats], numbers: Numbers, integers: Integers) 
     """Return the contacts of given mass-normalised shapes, from the parameters of a body's FMU."""
     found = []
     for k, shape in enumerate(shapes, start=1):
-        position, restitution = (numbers[f"contact[{k}].{name}"] for name in ("position", "restitution"))
-        falls_above = numbers.get(f"contact[{k}].yield_velocity", 0.0)
-        side = DIRECTIONS[integers[f"contact[{k}].side"]]
-        found.append(Contact(shape, side, position, restitution, yield_velocity=falls_above))
+        port = f"contact[{k}]"
+        position, restitution = numbers[f"{port}.position"], numbers.get(f"{port}.restitution", 0.0)
+        falls_above = numbers.get(f"{port}.yield_velocity", 0.0)
+        side, press = DIRECTIONS[integers[f"{port}.side"]], _press_of(port, numbers, integers)
+        found.append(Contact(shape, side, position, restitution, yield_velocity=falls_above, press=press))
     return tuple(found)
+
+
+def _press_of(port: str, numbers: Numbers, integers: Integers) -> Press | None:
+    """Return the force of the stop at a port; None where it is rigid."""
+    law = numbered_contact_law(integers[f"{port}.law"])
+    if law.stop != "yielding":
+        return None
+    exponent = numbers.get(f"{port}.exponent", 1.0 if law.name == LINEAR else 1.5)
+    return Press(law.name, numbers[f"{port}.stiffness"], numbers.get(f"{port}.damping", 0.0), exponent)

@@ -242,6 +242,8 @@ class Evaluation:
         distances of an orbit are 0.
     distance_slopes, velocity_slopes : array, shape (impacts, impacts)
         Derivatives over the phase of each impact (columns).
+    start : array, shape (2 modes,), or None
+        State before the first impact, from which a search goes on where stops yield.
     """
 
     end: OrbitEnd
@@ -249,6 +251,7 @@ class Evaluation:
     distances: Array
     distance_slopes: Array
     velocity_slopes: Array
+    start: Array | None = None
 
 
 def _train(contacts: NDArray[np.int32], phases: Array, periods: int) -> _Train:

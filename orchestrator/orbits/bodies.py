@@ -17,34 +17,39 @@ from vibroimpact.orchestrator.scene import Scene
 Floats = NDArray[np.float64]
 SLIGHT = 1e-12
 """Negative damping, over the largest, below which it is rounding."""
+YIELDING = frozenset({"law"})
+"""Rows of the table of limits that orbits on stops that yield take."""
 
 
-def impacting_body(scene: Scene, *, free: bool = False) -> ImpactingBody:
-    """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on rigid stops.
+def impacting_body(scene: Scene, *, all_kinds: bool = False) -> ImpactingBody:
+    """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on its stops.
 
     Parameters
     ----------
     scene : Scene
         In the short form; its sweep is ignored.
-    free : bool
-        Whether the scene may be without a force: negative dashpots then keep the body moving (equations.md 4.14). And
-        whether nothing need tie the body to the ground: its drift is then told apart.
+    all_kinds : bool
+        Whether stops that yield are taken, too. Whether the scene may be without a force: negative dashpots then keep
+        the body moving (equations.md 4.16). And whether nothing need tie the body to the ground: its drift is then
+        told apart.
 
     Raises
     ------
     UsageError
-        The scene is not a body of modes between restitution stops under one harmonic force.
+        The scene is not a body of modes between such stops under forces of one period.
     """
-    own = free and scene.period is None
-    refuse_orbits(scene, seen(scene), OF_OWN_PERIOD if own else ())
+    own = all_kinds and scene.period is None
+    refuse_orbits(scene, seen(scene), OF_OWN_PERIOD if own else YIELDING if all_kinds else ())
     found = (_without_force(scene) if own else body_points(scene)).mass_normalised()
     order = np.argsort(found.frequencies != 0.0, kind="stable")
     found = replace(loose_first(found, order), has_own_period=own)
-    if free and found.loose and not found.is_dragged:
+    if all_kinds and found.loose and not found.is_dragged:
         found = without_drift(found, _velocities(scene)[order])
     if found.is_dragged:
         refuse_orbits(scene, [seen_of_drag(scene)])
     for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
+        if found.loose and contact.press is not None and not contact.press.is_linear:
+            refuse_orbits(scene, [Seen("placed", f"{key}.law", f'"{contact.press.law}"')])
         if not contact.shape @ contact.shape > 0.0:
             refuse_orbits(scene, [Seen("held", key, "one that is held")])
     if any(key.startswith("contact") for key in scene.stop_keys):

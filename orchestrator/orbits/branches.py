@@ -294,7 +294,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
         return kept[value]
 
     impacting_body(
-        scene.at({parameter: value}), free=True
+        scene.at({parameter: value}), all_kinds=True
     )  # a wrong key is refused before any orbit is followed
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
@@ -307,7 +307,7 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
     """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
     try:
-        return impacting_body(scene.at(values), free=True)
+        return impacting_body(scene.at(values), all_kinds=True)
     except UsageError as problem:
         raise OrbitError(str(problem)) from problem
 

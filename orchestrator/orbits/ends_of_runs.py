@@ -64,7 +64,7 @@ def ends_of_runs(
         for value in [*values, *reversed(values)]:
             looking(value)
             try:
-                body = impacting_body(scene.with_values({parameter: value}), free=True)
+                body = impacting_body(scene.with_values({parameter: value}), all_kinds=True)
             except (SceneError, UsageError):
                 continue  # the scene has no run there
             record = record_of({parameter: value}, start)

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import RunRecord
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, RunRecord
 from vibroimpact.analysis.dataset.provenance import program_attributes
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
@@ -19,6 +19,7 @@ from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
+from vibroimpact.analysis.orbits.yielding import start_near
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
@@ -83,7 +84,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def rows(self) -> Generator[PeriodicOrbit, None, None]:
         """Yield the orbit near the seed, the orbits of given counts, or P(1,1) and the orbit of a long run."""
-        body, counts = impacting_body(self.scene, free=True), (self.impacts, self.periods)
+        body, counts = impacting_body(self.scene, all_kinds=True), (self.impacts, self.periods)
         refuse_without_energy(self.scene, body)
         if self.seed is not None:
             yield _of_seed(body, self.seed, self.impacts, 1 if self.periods is None else self.periods)
@@ -210,7 +211,7 @@ def _long_record(scene: Scene) -> dict[str, float]:
     names = ("record.transient_periods", "record.recorded_periods")
     if scene.period is not None:
         return dict(zip(names, (TRANSIENT, RECORDED), strict=True))
-    turn = 2.0 * np.pi / impacting_body(scene, free=True).slowest
+    turn = 2.0 * np.pi / impacting_body(scene, all_kinds=True).slowest
     names = ("record.transient_time", "record.recorded_time")
     return dict(zip(names, (TRANSIENT * turn, RECORDED_TURNS * turn), strict=True))
 
@@ -218,7 +219,7 @@ def _long_record(scene: Scene) -> dict[str, float]:
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
     with long_runs(scene) as record_of:
-        return orbit_of_impacts(impacting_body(scene, free=True), record_of({}, None).impacts)
+        return orbit_of_impacts(impacting_body(scene, all_kinds=True), record_of({}, None).impacts)
 
 
 def orbit_of_impacts(
@@ -241,7 +242,9 @@ def orbit_of_impacts(
         if apart > REPEATS or not (contacts[count : 2 * count] == contacts[:count]).all():
             continue
         try:
-            orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods)
+            speeds, durations = rows[:count, 2], rows[:count, IMPACT_COLUMNS.index("impact_duration")]
+            start = start_near(body, contacts[:count], phases[:count], periods, speeds, durations)
+            orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods, start=start)
         except (OrbitError, UsageError):  # chatter: impacts closer than phases can resolve
             return None
         return orbit if orbit.is_physical else None

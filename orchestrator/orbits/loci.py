@@ -123,7 +123,7 @@ def at_other_values(result: FollowedLoci, second: FollowSettings) -> Iterator[Fo
             continue
         other = scene.at({result.second: float(value)})
         try:
-            impacting_body(other, free=True)
+            impacting_body(other, all_kinds=True)
         except UsageError:
             continue  # such as a force of 0
         yield Followed(other, parameter)

@@ -51,13 +51,13 @@ class ExponentsOfRuns(RunsStudy[Exponents | str]):
     name = "lyapunov"
     nothing = "a run with exponents"
     named = (DatasetError,)
-    free = True
+    all_kinds = True
 
     def rows(self) -> Generator[Exponents | str, None, None]:
         """Find the exponents of run after run."""
         runs = self.runs.vibroimpact.runs
         self._bodies, impacts = (
-            Bodies(scene_of(self.runs, "lyapunov"), runs, free=True),
+            Bodies(scene_of(self.runs, "lyapunov"), runs, all_kinds=True),
             ImpactsOf(self.runs),
         )
         for place in range(runs.sizes["run"]):
@@ -107,8 +107,9 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain, a beam or
-        several bodies on restitution stops. 200 impacts must count, or two rounds of a periodic orbit. Without a force
-        only periodic orbits have exponents; the exponent 0 of the motion along itself is left out.
+        several bodies. On stops that yield, motions of several modes must be periodic. 200 impacts must count, or two
+        rounds of a periodic orbit. Without a force only periodic orbits have exponents; the exponent 0 of the motion
+        along itself is left out.
 
     Returns
     -------

@@ -48,8 +48,8 @@ class OfRuns(Protocol):
 class RunsStudy(Study[Row]):
     """A study of the runs of a dataset, or of a scene, which runs first."""
 
-    free: ClassVar[bool] = False
-    """Whether scenes may be without a force, and bodies without a tie to the ground."""
+    all_kinds: ClassVar[bool] = False
+    """Whether stops may yield, scenes be without a force, and bodies without a tie to the ground."""
 
     runs: xr.Dataset
     """As `open_dataset` or `run` gives it."""
@@ -62,7 +62,7 @@ class RunsStudy(Study[Row]):
     @classmethod
     def prepare(cls, options: OfRuns, stack: ExitStack) -> Self:
         """Open the runs."""
-        return cls(stack.enter_context(runs_of(options.file, options.changes or (), free=cls.free)))
+        return cls(stack.enter_context(runs_of(options.file, options.changes or (), all_kinds=cls.all_kinds)))
 
     @property
     def left_out(self) -> str:
@@ -71,7 +71,7 @@ class RunsStudy(Study[Row]):
 
 
 @contextmanager
-def runs_of(path: Path, changes: Sequence[str], *, free: bool = False) -> Iterator[xr.Dataset]:
+def runs_of(path: Path, changes: Sequence[str], *, all_kinds: bool = False) -> Iterator[xr.Dataset]:
     """Open the runs of a dataset, or run a scene and open its runs.
 
     UsageError: the scene's orbits cannot be followed, or changes are given for a dataset.
@@ -86,7 +86,7 @@ def runs_of(path: Path, changes: Sequence[str], *, free: bool = False) -> Iterat
             yield dataset
         return
     scene = with_modes(opened_scene(path, changes))
-    impacting_body(scene, free=free)  # refused before it runs
+    impacting_body(scene, all_kinds=all_kinds)  # refused before it runs
     with ScratchFolder("energies") as folder:
         file = Path(folder.name, "run.nc")
         with shown_progress() as progress:
@@ -186,18 +186,21 @@ class ImpactsOf:
         order = np.argsort(owners, kind="stable")
         self._owners = owners[order]
         self._columns = [dataset[name].values[order] for name in columns]
+        lasts = "impact_duration" in dataset
+        self._durations = dataset["impact_duration"].values[order] if lasts else None
 
     def __getitem__(self, run_id: int) -> Impacts:
         first, stop = np.searchsorted(self._owners, [run_id, run_id + 1])
         time, phase, velocity, contact = (column[first:stop] for column in self._columns)
-        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1)
+        durations = None if self._durations is None else self._durations[first:stop]
+        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1, durations)
 
 
 class Bodies:
     """The body of each run; runs of one point share it."""
 
-    def __init__(self, scene: Scene, runs: xr.Dataset, *, free: bool = False) -> None:
-        self._scene, self._free = scene, free
+    def __init__(self, scene: Scene, runs: xr.Dataset, *, all_kinds: bool = False) -> None:
+        self._scene, self._all_kinds = scene, all_kinds
         self._columns = {key: runs[name].values for key, name in coordinate_names(scene).items()}
         self._last: tuple[dict[str, float], ImpactingBody] | None = None
         self.most_modes = 0
@@ -205,6 +208,6 @@ class Bodies:
     def __getitem__(self, place: int) -> ImpactingBody:
         values = {key: float(column[place]) for key, column in self._columns.items()}
         if self._last is None or self._last[0] != values:
-            self._last = values, impacting_body(self._scene.at(values), free=self._free)
+            self._last = values, impacting_body(self._scene.at(values), all_kinds=self._all_kinds)
             self.most_modes = max(self.most_modes, self._last[1].frequencies.size)
         return self._last[1]

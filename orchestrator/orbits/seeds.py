@@ -77,7 +77,7 @@ def seed_of_run(dataset: xr.Dataset | str | PathLike[str], run: int | None = Non
         raise DatasetError(f"seed: expected a run with a periodic orbit, got none: {reason}.")
     impacts = ImpactsOf(dataset)[int(runs["run_id"].values[place])]
     try:
-        orbit = recorded_orbit(Bodies(scene, runs)[place], impacts).orbit
+        orbit = recorded_orbit(Bodies(scene, runs, all_kinds=True)[place], impacts).orbit
     except OrbitError as problem:
         reason = str(problem).removeprefix("orbit: ")
         raise DatasetError(f"seed: expected a run with a periodic orbit, got none: {reason}.") from problem

@@ -55,6 +55,8 @@ LIMITS = {
     "stop": Limit(orbits="a restitution stop"),
     "motion": Limit(lanes=True),
     "law": Limit(orbits='"restitution": impacts without duration'),
+    "placed": Limit(orbits='"restitution" or "kelvin_voigt" beside bodies that no spring ties to the ground'),
+    "relaxing": Limit(orbits="0: a surface that relaxes at once"),
     "distance": Limit(lanes=True, orbits="0 where orbits are followed"),
     "reduced": Limit(thrown_back="a Chain with fewer modes than masses does not move one mass alone"),
     "projection": Limit(
@@ -103,6 +105,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
     for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')
+        if (relaxes := getattr(stop, "relaxation_time", 0.0)) > 0.0:
+            yield Seen("relaxing", f"{key}.relaxation_time", f"{relaxes:g}")
     if scene.falling_force:
         yield Seen("distance", "exciter.distance", "a force that falls with the distance")
     if not scene.is_one_body:

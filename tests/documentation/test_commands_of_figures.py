@@ -106,6 +106,9 @@ COMMANDS = {
     'follow examples/ball_on_table.toml --parameter "stop[1].motion_amplitude" --from 1.1 --to 1.6': Shown(
         ("1.5268237005", "4.1887902")
     ),
+    "orbit examples/yielding_stop.toml": Shown(("0.2475857134", "1.606526485", "1 physical orbit.")),
+    "follow examples/yielding_stop.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6 "
+    "--figure yielding.png": Shown(("0.90210579988", "1.4585050166", "0.90330839648"), is_long=True),
     f"campaign {BIFURCATION} -o sweep": Shown(("802 points computed",)),
     "plot branches.nc --over sweep -o both.png": Shown((), (16_040, 9688, 253)),
     f"follow {BIFURCATION} {FREQUENCY} --from 0.3 --to 2.2 {SECOND} -o loci.nc --figure loci.png": Shown(

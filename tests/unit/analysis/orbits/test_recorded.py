@@ -64,7 +64,7 @@ def test_the_halves_of_an_orbit_next_to_its_doubling_are_not_taken_for_one() -> 
     assert found.orbit.name == "P(2,2)"
     # the last round may begin with either impact
     odd = recorded(orbit, 5)
-    shifted = Impacts(*(column[1:] for column in odd))
+    shifted = Impacts(*(column[1:] for column in odd[:4]))
     assert recorded_orbit(orbit.body, shifted).orbit.name == "P(2,2)"
 
 
@@ -79,7 +79,7 @@ def test_what_does_not_repeat_is_refused_in_words() -> None:
     with pytest.raises(OrbitError, match="not periodic: 1 recorded"):
         recorded_orbit(orbit.body, recorded(orbit, 1))
     with pytest.raises(OrbitError, match="no impacts"):
-        recorded_orbit(orbit.body, Impacts(*(column[:0] for column in impacts)))
+        recorded_orbit(orbit.body, Impacts(*(column[:0] for column in impacts[:4])))
 
 
 def test_impacts_of_another_body_have_no_orbit_next_to_them() -> None:

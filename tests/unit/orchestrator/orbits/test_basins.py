@@ -152,9 +152,9 @@ def test_chaotic_attractors_that_are_mirror_images_of_each_other_are_two() -> No
         counts = np.bincount(run.impact_contact.values.astype(int), minlength=3)[1:]
         at = found.sel(displacement_start=x, velocity_start=y, method="nearest")
         ends = found.attractor_impacts.values[int(at.basin)]
-        assert (x, y) == (0.9, -0.7) or np.argmax(ends) == np.argmax(
-            counts
-        ), "next to a border a cell is coarse"
+        assert (x, y) == (0.9, -0.7) or np.argmax(ends) == np.argmax(counts), (
+            "next to a border a cell is coarse"
+        )
 
 
 @pytest.mark.usefixtures("brief_transients")

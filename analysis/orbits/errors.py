@@ -1,0 +1,9 @@
+"""The error of a search for orbits."""
+
+from __future__ import annotations
+
+from vibroimpact.fmus.errors import VibroimpactError
+
+
+class OrbitError(VibroimpactError):
+    """An orbit was not found, or not followed further."""
