@@ -38,6 +38,8 @@ STABILITY_CHANGE = "stability change"
 """Kind of a point where the stability changes for none of the known reasons."""
 BRANCH_POINT = "branch point"
 """Kind of a point where another branch of orbits with the same impacts crosses."""
+SLOWED = "its impacts lose their speed"
+"""End of a branch without a force whose impacts have no speed where nothing gives energy."""
 CLOSED = "closed"
 """End of a branch that returns to its first orbit."""
 TOGETHER = 1e-3
@@ -416,7 +418,9 @@ class Follower:
                     found = self._branch_point(now, step)
                     is_level = found is not None and abs(found[1].tangent[-1]) < LEVEL
                 else:
-                    found = self._located(now, step, _test_of(kind))
+                    found = self._located(now, step, kind)
+                if found is None and kind == "graze" and now.orbit.body.has_own_period:
+                    yield step, SLOWED, now  # an undamped mode in resonance hides the graze itself
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch
@@ -426,7 +430,7 @@ class Follower:
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
                 yield 0.0, "end of the range", now
             elif (now.value - bound) * (taken.value - bound) < 0.0:
-                found = self._located(now, step, _beyond(bound))
+                found = self._located(now, step, bound)
                 if found is not None:
                     yield found[0], "end of the range", found[1]
 
@@ -448,10 +452,8 @@ class Follower:
                 return place, BranchOrbit(value, orbit, slopes / np.linalg.norm(slopes), 0.0)
         return None
 
-    def _located(
-        self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
-    ) -> tuple[float, BranchOrbit] | None:
-        """Return the place along a step where a test is 0, and the orbit there."""
+    def _located(self, now: BranchOrbit, step: float, test: str | float) -> tuple[float, BranchOrbit] | None:
+        """Return the place along a step where a test, or the parameter less a bound, is 0, and the orbit there."""
         from scipy.optimize import brentq
 
         missing = []
@@ -461,7 +463,7 @@ class Follower:
             if found is None:
                 missing.append(part)
                 return float(np.nan)
-            return test(found[0])
+            return found[0].tests[test] if isinstance(test, str) else found[0].value - test
 
         try:
             part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
@@ -469,10 +471,6 @@ class Follower:
             return None
         found = self.step(now, part) if part > 0.0 and not missing else None
         return None if found is None else (part, found[0])
-
-
-def _test_of(kind: str) -> Callable[[BranchOrbit], float]:
-    return lambda orbit: orbit.tests[kind]
 
 
 def _as_end(kind: str, now: PeriodicOrbit, at: PeriodicOrbit) -> str:
@@ -485,10 +483,6 @@ def _as_end(kind: str, now: PeriodicOrbit, at: PeriodicOrbit) -> str:
     if kind == BRANCH_POINT and is_symmetric(at) and not is_symmetric(now):
         return f"{BRANCH_POINT} of the symmetric {at.name}"
     return kind
-
-
-def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
-    return lambda orbit: orbit.value - bound
 
 
 def joined(backward: Branch, forward: Branch) -> Branch:
