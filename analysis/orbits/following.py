@@ -43,6 +43,8 @@ SHORTEST = 1e-9
 """Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
 """Kind of a point where the stability changes for none of the known reasons."""
+SLOWED = "its impacts lose their speed"
+"""End of a branch without a force whose impacts have no speed where nothing gives energy."""
 CLOSED = "closed"
 """End of a branch that returns to its first orbit."""
 TOGETHER = 1e-3
@@ -440,6 +442,8 @@ class Follower:
                     is_level = found is not None and abs(found[1].tangent[-1]) < LEVEL
                 else:
                     found = self._located(now, step, kind)
+                if found is None and kind == "graze" and now.orbit.body.has_own_period:
+                    yield step, SLOWED, now  # an undamped mode in resonance hides the graze itself
                 if found is None or (kind == "torus" and not turns_round(found[1].orbit.multipliers)):
                     continue
                 # a branch that is level at a branch point turns because of the other branch

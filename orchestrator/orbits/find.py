@@ -43,8 +43,8 @@ TRANSIENT = 2000
 """Forcing periods of a run before its orbit is read."""
 RECORDED = 64
 """Forcing periods in which its orbit is read: chaos takes 40 periods to recognise, an orbit twice its own."""
-RECORDED_TURNS = 100
-"""Turns of the slowest mode that are recorded without a force."""
+SETTLING_TURNS, RECORDED_TURNS = 400, 100
+"""Turns of the slowest mode of a run without a force before its orbit is read, and while it is."""
 LARGEST_PHASE = 1e6
 """Largest phase of a seed, rad; a larger phase has lost digits within its turn."""
 REPEATS = 1e-4
@@ -213,7 +213,7 @@ def _long_record(scene: Scene) -> dict[str, float]:
         return dict(zip(names, (TRANSIENT, RECORDED), strict=True))
     turn = 2.0 * np.pi / impacting_body(scene, all_kinds=True).slowest
     names = ("record.transient_time", "record.recorded_time")
-    return dict(zip(names, (TRANSIENT * turn, RECORDED_TURNS * turn), strict=True))
+    return dict(zip(names, (SETTLING_TURNS * turn, RECORDED_TURNS * turn), strict=True))
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:

@@ -125,6 +125,7 @@ SHORT_FORM: dict[str, list[dict[str, float]]] = {
     "single_run.toml": [{}],
     "tolerances.toml": [{"stop[1].position": 0.0021, "body.stiffness": 103.0}],
     "two_stops.toml": [{}],
+    "yielding_stop.toml": [{}],
 }
 
 

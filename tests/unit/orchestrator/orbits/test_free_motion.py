@@ -13,6 +13,7 @@ import vibroimpact as vi
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.orbits.free_motion import FreeMotion
+from vibroimpact.orchestrator.orbits.further_sines import FurtherSines
 
 CHAIN = {"kind": "chain", "masses": [1.0, 2.0], "stiffnesses": [1.0, 2.0], "dampings": [0.1, 0.02]}
 
@@ -42,7 +43,7 @@ def test_an_oscillator_that_can_meet_no_stop_meets_none(
         {"position": position, "restitution": 0.7},
         {"amplitude": 0.3, "angular_frequency": frequency},
     )
-    free = FreeMotion.of(given_scene, impacting_body(given_scene))
+    free = FreeMotion.of(given_scene, impacting_body(given_scene), FurtherSines.of(given_scene))
     state = np.array([[body["displacement_start"], v]])
     if free is not None and free.stays_free(state)[0]:
         assert int(vi.run(given_scene).impact_count) == 0
@@ -55,7 +56,7 @@ def test_the_steady_state_of_a_chain_is_that_of_a_long_run() -> None:
         {"signal": "constant", "amplitude": [0.1, 0.0]},
     ]
     given_scene = scene(CHAIN, stop, force)
-    free = FreeMotion.of(given_scene, impacting_body(given_scene))
+    free = FreeMotion.of(given_scene, impacting_body(given_scene), FurtherSines.of(given_scene))
     assert free is not None
     flow = BodyFlow(given_scene, workers=1)
     try:
@@ -71,10 +72,10 @@ def test_a_steady_motion_that_reaches_the_stop_is_no_free_motion() -> None:
     body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
     force = {"amplitude": 1.0, "angular_frequency": 1.0}
     hits = scene(body, {"position": 1.0, "restitution": 0.7}, force)
-    assert FreeMotion.of(hits, impacting_body(hits)) is None
+    assert FreeMotion.of(hits, impacting_body(hits), FurtherSines.of(hits)) is None
     undamped = scene(
         {**body, "damping_ratio": 0.0},
         {"position": 9.0, "restitution": 0.7},
         {**force, "angular_frequency": 2.0},
     )
-    assert FreeMotion.of(undamped, impacting_body(undamped)) is None
+    assert FreeMotion.of(undamped, impacting_body(undamped), FurtherSines.of(undamped)) is None
