@@ -1,4 +1,4 @@
-"""Periodic orbits of bodies on restitution stops, stable and unstable, and how they change with a parameter."""
+"""Periodic orbits of bodies between stops, stable and unstable, and how they change with a parameter."""
 
 from __future__ import annotations
 

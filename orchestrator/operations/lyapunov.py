@@ -10,7 +10,7 @@ from vibroimpact.orchestrator.operations.arguments import Changes, SceneOrDatase
 class Lyapunov(Operation):
     """Find the Lyapunov exponents of runs with impacts, from the saltation of the impacts; their sum is checked.
 
-    The body is an oscillator, a chain, a beam or several bodies on restitution stops; at least 200 impacts must
+    The body is an oscillator, a chain, a beam or several bodies; at least 200 impacts must
     count. A scene is run first. A run without exponents (no impacts, sticking) is listed with the reason.
 
     Example: vibroimpact lyapunov examples/thesis/figure_2_11.toml --set record.recorded_periods=2000

@@ -131,7 +131,9 @@ def test_a_period_doubling_separates_the_classes_of_runs() -> None:
     given = scene(KELVIN_VOIGT | {"position": 1.0}, angular_frequency=0.902)
     given["record"] = {"transient_periods": 4000, "recorded_periods": 40, "impacts": True, "strobe": True}
     near = vi.Scene.from_dict(given)
-    branches = vi.follow(near, "forcing.angular_frequency", 0.897, 0.9031, doublings=0, step=0.2)
+    (orbit,) = vi.find_orbits(near, 1)
+    seed = [(float(orbit.phases[0]), 1)]
+    branches = vi.follow(near, "forcing.angular_frequency", 0.9018, 0.9023, doublings=0, step=0.2, seed=seed)
     special = branches.where(branches.orbit_special == int(SpecialOrbit.period_doubling), drop=True)
     assert float(special.angular_frequency.values[0]) == pytest.approx(0.90210579988, abs=1e-10)
     assert vi.classify(vi.run(near.with_values({"forcing.angular_frequency": 0.9035})))[0].name == "P(1,1)"
