@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.following import CLOSED, SpecialPoint
+from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.own_period import alternating_slopes
 from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated, tried
 from vibroimpact.analysis.orbits.sign_changes import turning

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
 from vibroimpact.analysis.orbits.bifurcations import Locus
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, SpecialPoint
+from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint
 from vibroimpact.analysis.orbits.index_sum import index
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
 from vibroimpact.analysis.orbits.symmetry import is_symmetric, mirror_image

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT, LEVEL, crossing_direction
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, split_orbit
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, Follower, SpecialPoint
+from vibroimpact.analysis.orbits.following import Follower
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, grazes, ordered
 from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats

@@ -24,15 +24,14 @@ from vibroimpact.analysis.orbits.bifurcations import (
     joined_loci,
     meets_torus,
 )
+from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.following import (
-    CLOSED,
     EASY_NEWTON,
     LOCATED,
     MOST_NEWTON,
     MOST_TURN,
     SHORTEST,
     FollowSettings,
-    SpecialPoint,
 )
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, tried
 from vibroimpact.analysis.orbits.sign_changes import turns_round

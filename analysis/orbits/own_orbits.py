@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.finding import MOST_HALVINGS
 from vibroimpact.analysis.orbits.own_period import TURN, shortened, speed_unit, unknowns_of
-from vibroimpact.analysis.orbits.periodic import CLOSE, MOST_HALVINGS, OrbitError, PeriodicOrbit, Trial, tried
+from vibroimpact.analysis.orbits.periodic import CLOSE, OrbitError, PeriodicOrbit, Trial, tried
 from vibroimpact.fmus.bodies.impacting_body import Contact, Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS, OrbitEnd
 from vibroimpact.fmus.errors import UsageError

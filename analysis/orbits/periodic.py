@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -13,17 +12,11 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.errors import OrbitError as OrbitError
 from vibroimpact.analysis.orbits.observed_motion import observed_motion
 from vibroimpact.analysis.orbits.own_period import equations, free_multipliers, is_unbounded, unknowns_of
-from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
 from vibroimpact.analysis.orbits.yielding import Train, yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
-from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.core.orbits import Evaluation, OrbitEnd
 
 TURN = 2.0 * np.pi
-MOST_STEPS = 60
-"""Number of Newton steps after which the search for an orbit fails."""
-MOST_HALVINGS = 12
-"""Largest number of halvings of a Newton step until it leads nearer to the orbit."""
 CLOSE = 32.0 * np.finfo(float).eps
 """Distance from the stops at the impacts, over the size of the motion, below which an orbit is found."""
 SAME = 1e-7
@@ -34,8 +27,6 @@ SLOW = 1e-8
 """Speed of an impact, over that of the force's motion, below which it grazes."""
 NEXT_TO_BOUND = 0.9
 """Speed of an impact without a force, over the largest of the search, from which on it is next to that bound."""
-GUESSED = 1e-3
-"""Difference of a guess from a known orbit, rad and over the size of the state, below which it leads to that orbit."""
 TOUCHES = 1e-12
 """Distance beyond a stop, over the size of the motion, above which an orbit passes through it."""
 
@@ -350,7 +341,7 @@ def tried(body: ImpactingBody, like: PeriodicOrbit, unknowns: Floats) -> Trial:
         own = equations(body, like.contacts, unknowns)
         if is_unbounded(body, own.velocities):
             raise OrbitError("orbit: expected impacts of bounded speed, got ones that grow without bound.")
-        _refuse_end(own.end, own.phases)
+        refuse_end(own.end, own.phases)
         if not (np.isfinite(own.errors).all() and np.isfinite(own.slopes).all()):
             raise OrbitError(
                 f"orbit: expected a motion of bounded size, got a period of {own.body.period:.3g}."
@@ -377,11 +368,11 @@ def evaluated(
     if body.yields:
         return yielding_motion(body).evaluate(contacts, phases, periods, start)
     found = body.kernel.evaluate(contacts, phases, periods)
-    _refuse_end(found.end, phases)
+    refuse_end(found.end, phases)
     return found
 
 
-def _refuse_end(end: OrbitEnd, phases: Floats) -> None:
+def refuse_end(end: OrbitEnd, phases: Floats) -> None:
     """Raise OrbitError where no motion has impacts at these phases."""
     if end is OrbitEnd.resonant:
         raise OrbitError(
@@ -410,91 +401,6 @@ def _refuse_end(end: OrbitEnd, phases: Floats) -> None:
         )
 
 
-def find_orbit(
-    body: ImpactingBody,
-    phases: Sequence[float] | Floats,
-    contacts: Sequence[int] | None = None,
-    periods: int = 1,
-    *,
-    start: Floats | None = None,
-) -> PeriodicOrbit:
-    """Find the orbit near given phases of impacts, stable or not, by Newton's method: equations.md 4.7.
-
-    Parameters
-    ----------
-    body : ImpactingBody
-    phases : array, shape (p,)
-        Forcing phases near those of the impacts, rad, ascending, within 2 pi `periods`.
-    contacts : sequence of int, shape (p,), optional
-        Contact of each impact, from 0; by default the first contact.
-    periods : int
-        q.
-    start : array, shape (2 modes,), optional
-        Where stops yield, a state near to that before the first impact.
-
-    Raises
-    ------
-    UsageError
-        The phases or contacts are no impacts.
-    OrbitError
-        There is no orbit near the phases.
-    """
-    at: Floats = np.array(phases, dtype=np.float64)
-    hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
-    _refuse_no_train(body, at, hit, periods)
-    found = evaluated(body, hit, at, periods, start)
-    for _ in range(MOST_STEPS):
-        error = float(np.abs(found.distances).max())
-        if body.yields and error <= CLOSE * body.scale:
-            break  # rounding decides nothing more
-        step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
-        nearer = _damped_step(body, hit, at, shortened(step, at, periods), periods, found)
-        if nearer is None:
-            break
-        at, found = nearer
-    # next to a fold, phases are known only to the square root of rounding
-    error = float(np.abs(found.distances).max())
-    if error <= 1e3 * CLOSE * body.scale:
-        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities, found.start))
-    raise OrbitError(
-        f"orbit: expected an orbit P({at.size},{periods}) near to the phases "
-        f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none: Newton's method ends {error:.2g} m "
-        "from the stops."
-    )
-
-
-def _damped_step(
-    body: ImpactingBody,
-    contacts: NDArray[np.int32],
-    phases: Floats,
-    step: Floats,
-    periods: int,
-    now: Evaluation,
-) -> tuple[Floats, Evaluation] | None:
-    """Return phases nearer to an orbit, a part of a step away; None if there are none."""
-    error = float(np.abs(now.distances).max())
-    for _ in range(MOST_HALVINGS):
-        tried = phases - step
-        found = evaluated(body, contacts, tried, periods, now.start)
-        if float(np.abs(found.distances).max()) < error:
-            return tried, found
-        step = 0.5 * step
-    return None
-
-
-def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
-    """Return a step of the phases, or a part of it that keeps the impacts in their order and within their train."""
-    gaps = np.append(phases[1:], phases[0] + TURN * periods) - phases
-    if not gaps.min() > 0.0:
-        raise OrbitError(
-            f"orbit: expected impacts one after the other, got two at one phase of {np.round(phases, 6).tolist()}."
-        )
-    closing = step - np.append(step[1:], step[0])
-    most = float(np.max(-closing / gaps, initial=0.0))
-    part = min(1.0, 0.5 / most if most > 0.0 else 1.0, 0.5 / max(float(np.abs(step).max()), 0.5))
-    return part * step
-
-
 def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """Return an orbit counted from its first impact in the first period; without a force as it is."""
     if orbit.body.has_own_period:
@@ -510,103 +416,3 @@ def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
     return PeriodicOrbit(
         orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order], start
     )
-
-
-def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
-    """Return all orbits P(1,q) of a contact, physical or not, the fastest first: equations.md 4.3, any number of modes.
-
-    The distance from the stop at the impact is a sum of sines of the phase. One sine has at most two zeros. All zeros
-    of several sines are found, also where restitution falls with speed.
-
-    Raises
-    ------
-    OrbitError
-        An undamped mode gives infinitely many orbits.
-    """
-    if body.yields:
-        return _single_contacts(body, periods, contact)
-    hit = np.array([contact], dtype=np.int32)
-    is_linear = body.has_one_sine and not body.contacts[contact].yield_velocity > 0.0
-    phases = _phases_of_one_sine if is_linear else _phases_of_sines
-    orbits = []
-    for phase in phases(body, hit, periods):
-        velocity = evaluated(body, hit, np.array([phase]), periods).velocities
-        if velocity[0] > least_speed(body):
-            orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
-    return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
-
-
-def _single_contacts(body: ImpactingBody, periods: int, contact: int) -> tuple[PeriodicOrbit, ...]:
-    """Return the orbits P(1,q) of a contact of a body whose stops yield: equations.md 4.14."""
-    if body.contacts[contact].press is None:
-        alone = closed_form(replace(body, contacts=(body.contacts[contact],)), periods)
-        starts: list[tuple[float, Floats | None]] = [(float(each.phases[0]), None) for each in alone]
-    else:
-        starts = [*yielding_motion(body).single_contacts(contact, periods)]
-    found: list[PeriodicOrbit] = []
-    for phase, start in starts:
-        if any(_is_near(orbit, phase, start) for orbit in found):
-            continue
-        try:
-            orbit = find_orbit(body, [phase], [contact], periods, start=start)
-        except OrbitError:
-            continue
-        apart = [abs(np.mod(orbit.phases - each.phases + np.pi, TURN) - np.pi).max() for each in found]
-        if orbit.velocities[0] > least_speed(body) and min(apart, default=1.0) > SAME:
-            found.append(orbit)
-    return tuple(sorted(found, key=lambda orbit: -orbit.velocities[0]))
-
-
-def _is_near(orbit: PeriodicOrbit, phase: float, start: Floats | None) -> bool:
-    """Tell whether a guess of an orbit with one contact leads to a known one."""
-    apart = abs(np.mod(float(orbit.phases[0]) - phase + np.pi, TURN) - np.pi)
-    if start is None or orbit.start is None:
-        return False
-    return bool(
-        apart < GUESSED and np.linalg.norm(orbit.start - start) < GUESSED * np.linalg.norm(orbit.start)
-    )
-
-
-def _phases_of_one_sine(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
-    """Return the phases with distance 0, from three distances: a + b cos(phase) + c sin(phase)."""
-    at = [
-        evaluated(body, hit, np.array([phase]), periods).distances[0] for phase in (0.0, 0.5 * np.pi, np.pi)
-    ]
-    level, cosine = 0.5 * (at[0] + at[2]), 0.5 * (at[0] - at[2])
-    sine = at[1] - level
-    size = float(np.hypot(cosine, sine))
-    if not 0.0 < size >= abs(level):
-        return []
-    middle, off = np.arctan2(sine, cosine), np.arccos(np.clip(-level / size, -1.0, 1.0))
-    return list(dict.fromkeys(float(np.mod(middle + side * off, TURN)) for side in (1.0, -1.0)))
-
-
-def _phases_of_sines(body: ImpactingBody, hit: NDArray[np.int32], periods: int) -> list[float]:
-    """Return the phases with distance 0: of several sines, moving stops, or a restitution that falls with speed."""
-    contact, order = body.contacts[int(hit[0])], np.array(list(body.harmonics), dtype=float)
-    wave = body.kernel.wave(int(hit[0]), periods)
-    _refuse_end(wave.end, np.zeros(1))
-    if not contact.yield_velocity > 0.0:
-        return SumOfSines(wave.level, order, wave.cosine, wave.sine).zeros()
-    return FallingDistance(
-        wave.level,
-        *wave.answer,
-        order,
-        wave.steady_cosine,
-        wave.steady_sine,
-        body.loose == 0,
-        body.angular_frequency,
-        contact,
-    ).zeros()
-
-
-def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.int32], periods: int) -> None:
-    most = f"1 to {MOST_IMPACTS} impacts"
-    if not (1 <= phases.size <= MOST_IMPACTS and contacts.shape == phases.shape and periods >= 1):
-        raise UsageError(f"orbit: expected {most} in 1 or more periods, got {phases.size} in {periods}.")
-    if not (np.isfinite(phases).all() and (np.diff(phases) > 0.0).all() and np.ptp(phases) < TURN * periods):
-        raise UsageError(
-            f"orbit: phases: expected ascending ones within {periods} turns, got {phases.tolist()}."
-        )
-    if not ((contacts >= 0) & (contacts < len(body.contacts))).all():
-        raise UsageError(f"orbit: contacts: expected 0 to {len(body.contacts) - 1}, got {contacts.tolist()}.")

@@ -7,15 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.orbits.finding import find_orbit
 from vibroimpact.analysis.orbits.own_orbits import own_closed_form, own_starts
-from vibroimpact.analysis.orbits.periodic import (
-    SAME,
-    TURN,
-    OrbitError,
-    PeriodicOrbit,
-    closed_form,
-    find_orbit,
-)
+from vibroimpact.analysis.orbits.periodic import SAME, TURN, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.single_impacts import closed_form
 from vibroimpact.analysis.orbits.symmetry import differences
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS

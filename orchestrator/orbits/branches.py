@@ -12,18 +12,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint, joined
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import MISSING_ORBITS, dataset_of_branches, mirror_images
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.departures import Departure, departures, passes
-from vibroimpact.analysis.orbits.following import (
-    Branch,
-    BranchOrbit,
-    Follower,
-    FollowSettings,
-    SpecialPoint,
-    joined,
-)
+from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS

@@ -13,9 +13,10 @@ from typing import Self
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
 from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
-from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, FollowSettings, SpecialPoint
+from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, FollowSettings
 from vibroimpact.analysis.orbits.periodic import grazes
 from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.study import Study

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
-from vibroimpact.analysis.orbits.following import Branch, FollowSettings
+from vibroimpact.analysis.orbits.branch import Branch
+from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.index_sum import IndexSum, clears_stops, index_sum, why_without_sum
 from vibroimpact.analysis.orbits.search import each_orbit, same_orbit
 from vibroimpact.analysis.orbits.symmetry import mirror_image

@@ -13,8 +13,9 @@ import xarray as xr
 
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci
+from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
-from vibroimpact.analysis.orbits.following import Branch, FollowSettings
+from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body

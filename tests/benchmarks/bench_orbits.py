@@ -27,7 +27,7 @@ from scipy.optimize import root
 
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import find_orbit
-from vibroimpact.analysis.orbits.following import Branch
+from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.follow import Following

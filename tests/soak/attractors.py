@@ -17,9 +17,10 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.basins import Basins
+from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
-from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, Branch, BranchOrbit
+from vibroimpact.analysis.orbits.following import STABILITY_CHANGE
 from vibroimpact.analysis.study import whole
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.basins import BasinsOfScene

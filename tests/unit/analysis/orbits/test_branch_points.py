@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, find_orbit
+from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.branch_points import (
     bordered_determinant,
     crossing_direction,
     interpolated_zeros,
 )
 from vibroimpact.analysis.orbits.departures import departures
-from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings
+from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 SLOPES = st.floats(-2.0, 2.0)

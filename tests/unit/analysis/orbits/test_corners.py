@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import vibroimpact as vi
+from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
-from vibroimpact.analysis.orbits.following import Branch
 from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.follow import Following
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, closed_form, find_orbit
+from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.departures import departures, passes
-from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings
+from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.sign_changes import is_explained
 from vibroimpact.analysis.orbits.symmetry import are_alike, mirror_image
 

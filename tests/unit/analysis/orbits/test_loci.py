@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, PeriodicOrbit, closed_form
 from vibroimpact.analysis.orbits.bifurcations import Bifurcation, Locus, joined_loci
-from vibroimpact.analysis.orbits.following import Branch, Follower, FollowSettings, SpecialPoint
+from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
+from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
 
 RATIO = 0.04

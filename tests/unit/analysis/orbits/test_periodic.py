@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
-from vibroimpact.analysis.orbits.periodic import PeriodicOrbit, shortened
+from vibroimpact.analysis.orbits.finding import shortened
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
 from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.fmus.errors import UsageError
