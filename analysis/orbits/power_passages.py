@@ -6,6 +6,7 @@ where the depth then grows with the square of their variable. So a force d^1.5 h
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -14,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.special import beta
 
 from vibroimpact.analysis.orbits.errors import OrbitError
 from vibroimpact.analysis.orbits.linear_flow import LinearFlow
@@ -150,7 +150,8 @@ class PowerPassage:
         """Return the duration of a contact without other forces and without damping, s: equations.md 6.10."""
         press, power = self._press, self._press.exponent + 1.0
         deepest = (0.5 * power * self._contact.mass * speed**2 / press.stiffness) ** (1.0 / power)
-        return float(2.0 * deepest / speed * beta(1.0 / power, 0.5) / power)
+        integral = math.sqrt(math.pi) * math.gamma(1.0 / power) / math.gamma(1.0 / power + 0.5) / power
+        return float(2.0 * deepest / speed * integral)
 
     @cached_property
     def usual_duration(self) -> float:

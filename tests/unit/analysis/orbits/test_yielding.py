@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.periodic import evaluated
+from vibroimpact.analysis.orbits.power_passages import PowerPassage
 from vibroimpact.analysis.orbits.yielding import yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Press
 
@@ -160,6 +161,15 @@ def test_a_branch_begins_at_the_graze_of_the_motion_without_impacts(press: Press
     found = [point.at.value for point in branch.points if point.kind == "graze"]
     assert found == pytest.approx([graze], abs=1e-10)
     assert not [point for point in branch.points if point.kind == "stability change"]
+
+
+def test_a_contact_without_other_forces_lasts_as_long_as_the_closed_form() -> None:
+    # 6.10: m=.05, k_h=2e8, V=.4: t_c=.557646 ms
+    stop = Contact(ONE / np.sqrt(0.05), 1.0, 0.5, 0.0, press=Press("hertz", 2e8, 0.0, 1.5))
+    body = ImpactingBody(ONE, 0.05 * ONE, 0.5 * ONE, 0.0 * ONE, 1.2, 0.0, (stop,), ONE)
+    (law,) = yielding_motion(body).passages
+    assert isinstance(law, PowerPassage)
+    assert law.usual_duration_at(0.4) == pytest.approx(0.557646e-3, rel=2e-6)
 
 
 def test_phases_that_no_contact_has_are_refused_by_name() -> None:
