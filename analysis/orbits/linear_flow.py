@@ -18,7 +18,7 @@ BISECTIONS = 80
 
 
 class LinearFlow:
-    """The flow of y' = matrix y: equations.md 4.14.
+    """The flow of y' = matrix y: equations.md 4.18.
 
     Parameters
     ----------

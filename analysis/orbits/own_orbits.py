@@ -35,7 +35,7 @@ def find_own_orbit(
     velocities: Floats,
     contacts: NDArray[np.int32],
 ) -> PeriodicOrbit:
-    """Find the orbit near given impacts and a period by Newton's method: equations.md 4.14.
+    """Find the orbit near given impacts and a period by Newton's method: equations.md 4.16.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def _damped_step(
 
 
 def own_closed_form(body: ImpactingBody, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
-    """Return the orbits P(1,1) of a contact up to `LONGEST`, physical or not, the fastest first: equations.md 4.14.
+    """Return the orbits P(1,1) of a contact up to `LONGEST`, physical or not, the fastest first: equations.md 4.16.
 
     Each sign change of one equation for the period is an orbit. Impacts at one period take a velocity at most.
     """

@@ -1,4 +1,4 @@
-"""The equations of orbits whose period is unknown, of bodies that neither force nor stop drives: equations.md 4.14.
+"""The equations of orbits whose period is unknown, of bodies that neither force nor stop drives: equations.md 4.16.
 
 The first impact is at time 0. The unknowns are the logarithm of the period, the phases of the other impacts in it, and
 the velocities before all impacts. Velocities are inverse hyperbolic sines: linear when slow, logarithms when fast.

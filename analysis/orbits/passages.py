@@ -1,4 +1,4 @@
-"""The passage of a state through one contact: a rigid impact, or a stop that is pressed for a while: 4.2, 4.14."""
+"""The passage of a state through one contact: a rigid impact, or a stop that is pressed for a while: 4.2, 4.18."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHALLOW = 1e-3
 
 
 class ForcedModes:
-    """The modes of a body with its sines as one linear system, free and pressed on a stop: equations.md 4.14.
+    """The modes of a body with its sines as one linear system, free and pressed on a stop: equations.md 4.18.
 
     The vector of the system has modal displacements and velocities, then cosines and sines of the clock's harmonics.
     Its last elements are 1, the offset of the pressed surface (m), and the impulse (N s).
@@ -183,7 +183,7 @@ class RigidPassage:
 
 
 class LinearPassage:
-    """Contacts with a spring and a dashpot that never pull, whose surface relaxes at once: equations.md 4.14."""
+    """Contacts with a spring and a dashpot that never pull, whose surface relaxes at once: equations.md 4.18."""
 
     def __init__(self, forced: ForcedModes, contact: Contact, stiffness: float, damping: float) -> None:
         self._forced, self._contact, self._damping = forced, contact, damping

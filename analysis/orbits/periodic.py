@@ -107,7 +107,7 @@ class PeriodicOrbit:
 
     @cached_property
     def train(self) -> Train:
-        """The contacts of an orbit on stops that yield: equations.md 4.14."""
+        """The contacts of an orbit on stops that yield: equations.md 4.18."""
         motion = yielding_motion(self.body)
         return motion.periodic(self.contacts, self.phases, self.periods, self.start)
 

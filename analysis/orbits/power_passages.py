@@ -1,4 +1,4 @@
-"""The passage of a state through a contact whose force is a power of the depth: equations.md 4.14.
+"""The passage of a state through a contact whose force is a power of the depth: equations.md 4.18.
 
 The modes move by their exact flow between the values of the force at Gauss nodes. The nodes are dense at both ends,
 where the depth then grows with the square of their variable. So a force d^1.5 has a power series in this variable.

@@ -1,4 +1,4 @@
-"""First guesses of all orbits with one contact of a spring and a dashpot: equations.md 4.14.
+"""First guesses of all orbits with one contact of a spring and a dashpot: equations.md 4.18.
 
 For a given duration of the contact the periodic motion is linear in the cosines and sines of the phase at which the
 contact begins. The phases at which the contact point is on its stop follow. The force at the end of the contact is then

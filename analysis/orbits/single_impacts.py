@@ -50,7 +50,7 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
 
 
 def _single_contacts(body: ImpactingBody, periods: int, contact: int) -> tuple[PeriodicOrbit, ...]:
-    """Return the orbits P(1,q) of a contact of a body whose stops yield: equations.md 4.14."""
+    """Return the orbits P(1,q) of a contact of a body whose stops yield: equations.md 4.18."""
     if body.contacts[contact].press is None:
         alone = closed_form(replace(body, contacts=(body.contacts[contact],)), periods)
         starts: list[tuple[float, Floats | None]] = [(float(each.phases[0]), None) for each in alone]

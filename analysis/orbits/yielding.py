@@ -1,4 +1,4 @@
-"""Orbits of bodies on stops that yield, for given phases of the beginnings of their contacts: equations.md 4.14."""
+"""Orbits of bodies on stops that yield, for given phases of the beginnings of their contacts: equations.md 4.18."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Train:
 
 
 class YieldingMotion:
-    """The motions of a body whose stops yield, or yield and are rigid: equations.md 4.14.
+    """The motions of a body whose stops yield, or yield and are rigid: equations.md 4.18.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The stretching of small changes by contacts with stops that yield: equations.md 4.11, 4.14."""
+"""The stretching of small changes by contacts with stops that yield: equations.md 4.11, 4.18."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ class ImpactingBody:
     further : mapping of int to array, shape (modes,)
         Complex modal amplitudes of further sines, N kg^(-1/2), by their harmonic n: Re(amplitude e^(i n phase)).
     has_own_period : bool
-        Whether neither force nor stop sets the period: the clock is that of an orbit (equations.md 4.14).
+        Whether neither force nor stop sets the period: the clock is that of an orbit (equations.md 4.16).
     drift : float or None
         Mean velocity of the observed point with the whole body, m/s, where nothing ties it to the ground; else None.
     unseen : mapping of int to complex

@@ -1,4 +1,4 @@
-"""Orbits on a spring with a dashpot that never pull, against 40 digits: equations.md 6.9, 4.14."""
+"""Orbits on a spring with a dashpot that never pull, against 40 digits: equations.md 6.9, 4.18."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-/* Orbits of a body without a force: their period is unknown (equations.md 4.14). The clock of the body has the period of
+/* Orbits of a body without a force: their period is unknown (equations.md 4.16). The clock of the body has the period of
  * the orbit, and no sine turns with it.
  *
  * Velocities do not follow from the phases then: the equations of the velocities are homogeneous. So phases and

@@ -1,4 +1,4 @@
-"""Orbits of bodies whose stops yield, for given phases of their contacts: equations.md 4.14."""
+"""Orbits of bodies whose stops yield, for given phases of their contacts: equations.md 4.18."""
 
 from __future__ import annotations
 

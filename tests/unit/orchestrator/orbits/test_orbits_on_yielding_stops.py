@@ -1,4 +1,4 @@
-"""Orbits, branches and exponents of scenes whose stops yield, beside runs: equations.md 4.14."""
+"""Orbits, branches and exponents of scenes whose stops yield, beside runs: equations.md 4.18."""
 
 from __future__ import annotations
 
