@@ -44,7 +44,7 @@ def moved_body() -> ImpactingBody:
             Contact(shapes[2], 1.0, 0.5, 0.0, press=HUNT_CROSSLEY),
         ),
         shapes[0],
-        further={2: rng.normal(size=3) * 0.3 * (1.0 + 0.5j)},
+        further={2: np.array(rng.normal(size=3) * (0.3 + 0.15j), dtype=np.complex128)},
     )
 
 
