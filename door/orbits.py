@@ -38,8 +38,8 @@ def find_orbits(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain, a beam or several bodies on rigid stops or stops that yield, under a harmonic force, or
-        without a force on rigid stops; the sweep is ignored.
+        An oscillator, a chain, a beam or several bodies under a harmonic force, on rigid stops or stops that yield. On
+        rigid stops it may be without a force. The sweep is ignored.
     impacts, periods : int, optional
         p and q of P(p,q). By default all orbits P(1,1) are found, and the orbit that a long run ends on.
     seed : sequence of (phase, stop), optional
@@ -98,8 +98,8 @@ def follow(
     Parameters
     ----------
     scene : Scene, path or mapping
-        An oscillator, a chain, a beam or several bodies on rigid stops or stops that yield, under a harmonic force, or
-        without a force on rigid stops; the sweep is ignored.
+        An oscillator, a chain, a beam or several bodies under a harmonic force, on rigid stops or stops that yield. On
+        rigid stops it may be without a force. The sweep is ignored.
     parameter : str
         Key of a number in the scene, for example `forcing.angular_frequency`.
     start, stop : float

@@ -1,4 +1,4 @@
-"""Orbits of bodies without a force, found from a first guess, from many starts, or next to recorded impacts: 4.14."""
+"""Orbits of bodies without a force, found from a first guess, from many starts, or next to recorded impacts: 4.16."""
 
 from __future__ import annotations
 

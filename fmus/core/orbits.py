@@ -141,7 +141,7 @@ class OrbitBody:
     def errors(
         self, contacts: NDArray[np.int32], phases: Array, velocities: Array
     ) -> tuple[OrbitEnd, Array, Array]:
-        """Return the errors of impacts of a body without a force, whose clock has the period of the orbit: 4.14.
+        """Return the errors of impacts of a body without a force, whose clock has the period of the orbit: 4.16.
 
         Parameters
         ----------
