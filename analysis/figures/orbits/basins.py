@@ -83,7 +83,7 @@ def _draw_edges(axis: Axes, dataset: xr.Dataset) -> None:
 
 def _label(name: str, share: str) -> str:
     """Return a name and its share for the legend, in lines if the name has a rotation number."""
-    return f"{name}: {share}" if "," not in name else f"{name.replace(', ', f',{chr(10)}')}:{chr(10)}{share}"
+    return f"{name}: {share}" if ", " not in name else f"{name.replace(', ', f',{chr(10)}')}:{chr(10)}{share}"
 
 
 def _share(dataset: xr.Dataset, place: int) -> str:
