@@ -7,7 +7,7 @@ from typing import Any
 
 import xarray as xr
 
-from vibroimpact.analysis.orbits.basins import MOST_PERIODS
+from vibroimpact.analysis.orbits.attractors.basins import MOST_PERIODS
 from vibroimpact.analysis.orbits.feedback import Law
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.fmus.errors import UsageError

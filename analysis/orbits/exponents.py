@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
-from vibroimpact.analysis.orbits.yielding_exponents import YieldingStretching
+from vibroimpact.analysis.orbits.yielding_stops.exponents import YieldingStretching
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError

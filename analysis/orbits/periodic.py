@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.errors import OrbitError as OrbitError
 from vibroimpact.analysis.orbits.observed_motion import observed_motion
 from vibroimpact.analysis.orbits.own_period import equations, free_multipliers, is_unbounded, unknowns_of
-from vibroimpact.analysis.orbits.yielding import Train, yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import Train, yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import Evaluation, OrbitEnd
 

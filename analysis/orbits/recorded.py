@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.orbits.finding import find_orbit
 from vibroimpact.analysis.orbits.own_orbits import orbit_of_round, repeating_round
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit
-from vibroimpact.analysis.orbits.yielding import start_near
+from vibroimpact.analysis.orbits.yielding_stops.motion import start_near
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 

@@ -18,7 +18,7 @@ from vibroimpact.analysis.orbits.periodic import (
     refuse_end,
 )
 from vibroimpact.analysis.orbits.trigonometric import FallingDistance, SumOfSines
-from vibroimpact.analysis.orbits.yielding import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 GUESSED = 1e-3

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
-from vibroimpact.analysis.orbits.basins import MOST_PERIODS, Basins
-from vibroimpact.analysis.orbits.continued import Continued
+from vibroimpact.analysis.orbits.attractors.basins import MOST_PERIODS, Basins
+from vibroimpact.analysis.orbits.attractors.continued import Continued
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table

@@ -12,8 +12,8 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset.results import ResultTable
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basin_search import find_basins
-from vibroimpact.analysis.orbits.basins import (
+from vibroimpact.analysis.orbits.attractors.basin_search import find_basins
+from vibroimpact.analysis.orbits.attractors.basins import (
     BEYOND_A_STOP,
     MOST_PERIODS,
     UNDECIDED,
@@ -22,9 +22,9 @@ from vibroimpact.analysis.orbits.basins import (
     Floats,
     partners,
 )
-from vibroimpact.analysis.orbits.borders import border_dimension, border_share
-from vibroimpact.analysis.orbits.edges import Track
-from vibroimpact.analysis.orbits.separation import Separation
+from vibroimpact.analysis.orbits.attractors.borders import border_dimension, border_share
+from vibroimpact.analysis.orbits.attractors.edges import Track
+from vibroimpact.analysis.orbits.attractors.separation import Separation
 from vibroimpact.analysis.orbits.symmetry import mirrored_contacts
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError

@@ -14,8 +14,8 @@ import numpy as np
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basins import Ends, Floats, Section
-from vibroimpact.analysis.orbits.chaotic_groups import Blocks, block_features
+from vibroimpact.analysis.orbits.attractors.basins import Ends, Floats, Section
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import Blocks, block_features
 from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.orchestrator.orbits.free_motion import FreeMotion
@@ -111,7 +111,7 @@ class BodyFlow:
         return None if self._free is None else self._free.state
 
     def stays_free(self, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Return a mask of the states from which no stop can be met: see `analysis.orbits.basins.Flow`."""
+        """Return a mask of the states from which no stop can be met: see `analysis.orbits.attractors.basins.Flow`."""
         return np.zeros(len(states), np.bool_) if self._free is None else self._free.stays_free(states)
 
     def _loop(self, record: dict[str, Any]) -> PointLoop | _OneByOne:
@@ -141,7 +141,7 @@ class BodyFlow:
             alone.close()
 
     def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
-        """Return the states after some forcing periods: see `analysis.orbits.basins.Flow`."""
+        """Return the states after some forcing periods: see `analysis.orbits.attractors.basins.Flow`."""
         columns = self._run(self._bare, states, (0, periods), first=first)
         ends = self._final(columns, states, periods, first=first)
         return Ends(ends, np.concatenate([_went_well(each) for each in columns]))
@@ -166,7 +166,7 @@ class BodyFlow:
         return found, self._final(columns, states, transient + RECORDED, first=first)
 
     def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
-        """Return features of impacts in consecutive blocks: see `analysis.orbits.basins.Flow`."""
+        """Return features of impacts in consecutive blocks: see `analysis.orbits.attractors.basins.Flow`."""
         features, well = [], np.ones(len(states), np.bool_)
         for _ in range(blocks):  # one block after the other keeps few impacts in memory
             columns = self._run(self._measuring, states, (0, periods), first=False)
@@ -176,13 +176,13 @@ class BodyFlow:
         return Blocks(np.stack(features, axis=1), states, well)
 
     def impacts(self, state: Floats, periods: int) -> Floats:
-        """Return the impacts from a state at phase 0 on: see `analysis.orbits.edges.EdgeFlow`."""
+        """Return the impacts from a state at phase 0 on: see `analysis.orbits.attractors.edges.EdgeFlow`."""
         (columns,) = self._run(self._measuring, state[None], (0, periods), first=False)
         assert columns.impacts is not None
         return columns.impacts.rows.copy()
 
     def section(self, states: Floats, periods: int) -> Section:
-        """Return the motions at each forcing phase 0: see `analysis.orbits.basins.Flow`."""
+        """Return the motions at each forcing phase 0: see `analysis.orbits.attractors.basins.Flow`."""
         tables = [each.periods for each in self._run(self._recording, states, (0, periods), first=False)]
         rows = np.concatenate([table for table in tables if table is not None])
         highest, lowest = rows[..., 0], rows[..., 1]

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.basins import Basins, Floats, Labels
+from vibroimpact.analysis.orbits.attractors.basins import Basins, Floats, Labels
+from vibroimpact.analysis.orbits.attractors.edges import LOOKED_AT, EdgeTracking, Track, neighbouring_pairs
 from vibroimpact.analysis.orbits.branches import multiplier_text
-from vibroimpact.analysis.orbits.edges import LOOKED_AT, EdgeTracking, Track, neighbouring_pairs
 from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
 from vibroimpact.analysis.orbits.search import same_orbit
 from vibroimpact.fmus.bodies.impacting_body import ImpactingBody

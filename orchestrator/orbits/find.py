@@ -19,7 +19,7 @@ from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
-from vibroimpact.analysis.orbits.yielding import start_near
+from vibroimpact.analysis.orbits.yielding_stops.motion import start_near
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.basins import Floats
+from vibroimpact.analysis.orbits.attractors.basins import Floats
 from vibroimpact.fmus.bodies.impacting_body import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.operations.basins import Basins as Options

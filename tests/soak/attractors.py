@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.analysis.orbits.basins import Basins
+from vibroimpact.analysis.orbits.attractors.basins import Basins
 from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basin_search import find_basins
-from vibroimpact.analysis.orbits.basins import (
+from vibroimpact.analysis.orbits.attractors.basin_search import find_basins
+from vibroimpact.analysis.orbits.attractors.basins import (
     BEYOND_A_STOP,
     UNDECIDED,
     Basins,
@@ -20,8 +20,8 @@ from vibroimpact.analysis.orbits.basins import (
     Floats,
     Section,
 )
-from vibroimpact.analysis.orbits.borders import border_dimension, border_share
-from vibroimpact.analysis.orbits.chaotic_groups import Blocks, Feature
+from vibroimpact.analysis.orbits.attractors.borders import border_dimension, border_share
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import Blocks, Feature
 from vibroimpact.analysis.orbits.classify import RunClass
 
 BORDER = 0.3

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basins import Attractor, Basins, Features
+from vibroimpact.analysis.orbits.attractors.basins import Attractor, Basins, Features
+from vibroimpact.analysis.orbits.attractors.continued import Continued, features_apart
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.continued import Continued, features_apart
 
 
 def attractor(impacts: float, speed: float, size: float = 1.0, name: tuple[int, int] = (1, 1)) -> Attractor:

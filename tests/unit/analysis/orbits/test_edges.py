@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vibroimpact.analysis.orbits.edges import neighbouring_pairs
+from vibroimpact.analysis.orbits.attractors.edges import neighbouring_pairs
 
 
 @given(st.integers(0, 2**31), st.integers(1, 6), st.integers(1, 6))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.recurrence import correlation_dimension, recurrence
+from vibroimpact.analysis.orbits.attractors.recurrence import correlation_dimension, recurrence
 
 Floats = NDArray[np.float64]
 

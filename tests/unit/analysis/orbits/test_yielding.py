@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.periodic import evaluated
-from vibroimpact.analysis.orbits.power_passages import PowerPassage
-from vibroimpact.analysis.orbits.yielding import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.power_passages import PowerPassage
 from vibroimpact.fmus.bodies.impacting_body import Press
 
 ONE = np.ones(1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.chaotic_groups import NO_GROUPS, Blocks, Feature, Groups
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import NO_GROUPS, Blocks, Feature, Groups
 from vibroimpact.analysis.orbits.classify import RunClass
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.chaotic_groups import components
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import components
 
 Floats = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.errors import OrbitError
-from vibroimpact.analysis.orbits.linear_flow import LinearFlow
-from vibroimpact.analysis.orbits.passages import ForcedModes, LinearPassage, Passage
+from vibroimpact.analysis.orbits.yielding_stops.linear_flow import LinearFlow
+from vibroimpact.analysis.orbits.yielding_stops.passages import ForcedModes, LinearPassage, Passage
 from vibroimpact.fmus.bodies.impacting_body import Contact, Floats, Press
 
 NODES = (24, 48, 96, 192)

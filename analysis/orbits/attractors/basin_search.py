@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.aperiodic import (
+from vibroimpact.analysis.orbits.attractors.aperiodic import (
     APERIODIC,
     DRAWN,
     LongRuns,
     are_aperiodic,
     attractor_of_runs,
 )
-from vibroimpact.analysis.orbits.basins import (
+from vibroimpact.analysis.orbits.attractors.basins import (
     UNDECIDED,
     Attractor,
     Basins,
@@ -32,7 +32,7 @@ from vibroimpact.analysis.orbits.basins import (
     Separation,
     missed_share,
 )
-from vibroimpact.analysis.orbits.chaotic_groups import (
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import (
     BLOCK,
     BLOCKS,
     LEAST_AGREEING,
@@ -41,8 +41,8 @@ from vibroimpact.analysis.orbits.chaotic_groups import (
     grouped,
     merged,
 )
+from vibroimpact.analysis.orbits.attractors.recurrence import Recurrence, long_period, recurrence
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.recurrence import Recurrence, long_period, recurrence
 
 Places = NDArray[np.int64]
 

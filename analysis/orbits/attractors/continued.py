@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basins import Attractor, Basins
-from vibroimpact.analysis.orbits.chaotic_groups import Feature
+from vibroimpact.analysis.orbits.attractors.basins import Attractor, Basins
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import Feature
 
 MATCHED = 0.25
 """Difference of the features of two attractors, over their size, up to which they are one attractor."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.errors import OrbitError
-from vibroimpact.analysis.orbits.linear_flow import LinearFlow, value_of, zero_of
+from vibroimpact.analysis.orbits.yielding_stops.linear_flow import LinearFlow, value_of, zero_of
 from vibroimpact.fmus.bodies.impacting_body import Contact, Floats, ImpactingBody
 
 FIRST_SAMPLES = 4

@@ -10,10 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.errors import OrbitError
-from vibroimpact.analysis.orbits.linear_flow import LinearFlow, value_of, zero_of
-from vibroimpact.analysis.orbits.passages import ForcedModes, LinearPassage, Passage, Path, RigidPassage
-from vibroimpact.analysis.orbits.power_passages import ALIKE, PowerPassage
-from vibroimpact.analysis.orbits.single_contacts import Guess, guesses
+from vibroimpact.analysis.orbits.yielding_stops.linear_flow import LinearFlow, value_of, zero_of
+from vibroimpact.analysis.orbits.yielding_stops.passages import (
+    ForcedModes,
+    LinearPassage,
+    Passage,
+    Path,
+    RigidPassage,
+)
+from vibroimpact.analysis.orbits.yielding_stops.power_passages import ALIKE, PowerPassage
+from vibroimpact.analysis.orbits.yielding_stops.single_contacts import Guess, guesses
 from vibroimpact.fmus.bodies.impacting_body import Contact, Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import Evaluation, OrbitEnd
 

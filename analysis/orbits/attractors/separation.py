@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.basins import Floats, Flow
+from vibroimpact.analysis.orbits.attractors.basins import Floats, Flow
 
 STEP = 1e-8
 """Distance of neighbours, over the size of the motion, at the beginning of each round."""

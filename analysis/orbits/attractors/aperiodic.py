@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import OrbitClass
-from vibroimpact.analysis.orbits.basins import Attractor, Features, Floats, Flow
-from vibroimpact.analysis.orbits.chaotic_groups import Feature
+from vibroimpact.analysis.orbits.attractors.basins import Attractor, Features, Floats, Flow
+from vibroimpact.analysis.orbits.attractors.chaotic_groups import Feature
+from vibroimpact.analysis.orbits.attractors.recurrence import correlation_dimension, long_period
+from vibroimpact.analysis.orbits.attractors.separation import separation_of
 from vibroimpact.analysis.orbits.classify import RunClass
-from vibroimpact.analysis.orbits.recurrence import correlation_dimension, long_period
 from vibroimpact.analysis.orbits.rotation import Rotation, rotation_of
-from vibroimpact.analysis.orbits.separation import separation_of
 
 APERIODIC = (OrbitClass.chaos, OrbitClass.quasi_periodic, OrbitClass.unknown)
 """Classes of motions whose states do not repeat."""

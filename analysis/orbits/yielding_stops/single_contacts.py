@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vibroimpact.analysis.orbits.passages import ForcedModes, LinearPassage
 from vibroimpact.analysis.orbits.trigonometric import SumOfSines
+from vibroimpact.analysis.orbits.yielding_stops.passages import ForcedModes, LinearPassage
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 TURN = 2.0 * np.pi

@@ -6,7 +6,7 @@ import numpy as np
 
 from vibroimpact.analysis.orbits.errors import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts
-from vibroimpact.analysis.orbits.yielding import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 ARRIVES = 1e-6

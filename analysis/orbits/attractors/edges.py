@@ -14,10 +14,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.basin_search import ROUNDS, SEARCH_PERIODS, OnTheirWay
-from vibroimpact.analysis.orbits.basins import UNDECIDED, Basins, Floats, Flow, Labels
+from vibroimpact.analysis.orbits.attractors.basin_search import ROUNDS, SEARCH_PERIODS, OnTheirWay
+from vibroimpact.analysis.orbits.attractors.basins import UNDECIDED, Basins, Floats, Flow, Labels
+from vibroimpact.analysis.orbits.attractors.separation import UNKNOWN, Separation, of_rates
 from vibroimpact.analysis.orbits.periodic import PeriodicOrbit
-from vibroimpact.analysis.orbits.separation import UNKNOWN, Separation, of_rates
 
 TOGETHER, APART = 1e-12, 1e-7
 """Distances of the straddling states, over the size of the motion: bisection ends below, and begins above."""

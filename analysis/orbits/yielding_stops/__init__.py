@@ -1,0 +1,1 @@
+"""Orbits of bodies on stops that yield: flows, contacts, motions and exponents (equations.md 4.18)."""
