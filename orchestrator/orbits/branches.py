@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,7 @@ from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, message
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.bodies import impacting_body, refuse_without_energy
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
 from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck
@@ -151,6 +151,7 @@ def follow_branches(
     scene, parameter = followed.scene, followed.parameter
     _refuse(start, stop, impacts, periods, doublings, grazes, longest, starts)
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
+    _refuse_without_energy(scene, parameter, (start, 0.5 * (start + stop), stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
     found = 0
@@ -287,15 +288,27 @@ def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], Imp
             kept[value] = body_along(scene, {parameter: value})
         return kept[value]
 
-    impacting_body(
-        scene.at({parameter: value}), all_kinds=True
-    )  # a wrong key is refused before any orbit is followed
+    # a wrong key is refused before any orbit is followed
+    impacting_body(scene.at({parameter: value}), all_kinds=True)
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
             "got the frequency of one of them."
         )
     return body_at
+
+
+def _refuse_without_energy(scene: Scene, parameter: str, values: Sequence[float]) -> None:
+    """Raise UsageError if nothing gives energy to the body at any of some values of the range."""
+    problems = []
+    for value in values:
+        at = scene.at({parameter: value})
+        try:
+            refuse_without_energy(at, impacting_body(at, all_kinds=True))
+        except UsageError as problem:
+            problems.append(problem)
+    if len(problems) == len(values):
+        raise problems[0]
 
 
 def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:

@@ -12,7 +12,7 @@ from support.command_line import in_this_process
 from support.places import EXAMPLES
 
 import vibroimpact as vi
-from vibroimpact.analysis.orbits import basin_search
+from vibroimpact.analysis.orbits.attractors import basin_search
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.hard_cases.loose import ball_in_cavity
 from vibroimpact.orchestrator.orbits import basins as basins_module
