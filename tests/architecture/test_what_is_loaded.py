@@ -99,7 +99,7 @@ OTHERS: Rows = {
     "run drawn.toml -o drawn.nc": ("scipy", 0),
     "follow scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9": ("scipy", 0),
     "diagram scene.toml --parameter forcing.angular_frequency --from 0.88 --to 0.9 --values 3 --parts sweep": (
-        "scipy",
+        "scipy dask",
         0,
     ),
     # the names of connections are labels

@@ -363,7 +363,7 @@ static void check_refusals(uint64_t *seed)
     REFUSED(bad.body.angular_frequency = (double)NAN);
     REFUSED(bad.natural[0] = 0.0; bad.damping_ratio[0] = 0.1);
     REFUSED(bad.natural[0] = (double)INFINITY);
-    REFUSED(bad.damping_ratio[0] = -0.1);
+    REFUSED(bad.damping_ratio[0] = (double)NAN);
     REFUSED(bad.direction[0] = 0.5);
     REFUSED(bad.restitution[0] = 1.1);
     REFUSED(bad.restitution[0] = (double)NAN);
