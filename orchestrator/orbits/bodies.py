@@ -47,13 +47,14 @@ def impacting_body(scene: Scene, *, all_kinds: bool = False) -> ImpactingBody:
         found = without_drift(found, _velocities(scene)[order])
     if found.is_dragged:
         refuse_orbits(scene, [seen_of_drag(scene)])
-    for key, contact in zip(scene.stop_keys, found.contacts, strict=True):
+    stop_keys = scene.stop_keys
+    for key, contact in zip(stop_keys, found.contacts, strict=True):
         if found.loose and contact.press is not None and not contact.press.is_linear:
             refuse_orbits(scene, [Seen("placed", f"{key}.law", f'"{contact.press.law}"')])
         if not contact.shape @ contact.shape > 0.0:
             refuse_orbits(scene, [Seen("held", key, "one that is held")])
-    if any(key.startswith("contact") for key in scene.stop_keys):
-        keys = (key.replace("[", " ").removesuffix("]") for key in scene.stop_keys)
+    if any(key.startswith("contact") for key in stop_keys):
+        keys = (key.replace("[", " ").removesuffix("]") for key in stop_keys)
         named = [replace(each, name=name) for each, name in zip(found.contacts, keys, strict=True)]
         return replace(found, contacts=tuple(named))
     return found

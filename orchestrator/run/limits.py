@@ -89,7 +89,8 @@ def seen(scene: Scene) -> Iterator[Seen]:
     """Yield the features of a scene that have a row in the table of limits."""
     if not scene.is_lone_body:
         yield Seen("body", "body", "a scene of components" if scene.replay is None else "a replay")
-    for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
+    stops = [*zip(scene.stop_keys, scene.stops, strict=True)]
+    for key, stop in stops:
         if isinstance(stop, StopTable) and stop.drifts:
             yield Seen("drift", key, "a velocity or a table of its motion")
     if signals_of(scene.forces):
@@ -98,11 +99,11 @@ def seen(scene: Scene) -> Iterator[Seen]:
         yield Seen("forcing", "forcing", "none")
     if scene.clock is not None and not scene.clock.is_common:
         yield Seen("quasi-periodic", "forcing", "sines without one")
-    if not scene.stops:
+    if not stops:
         yield Seen("stop", "stop", "none")
     if scene.moving_stop:
         yield Seen("motion", scene.moving_stop, "a stop that moves")
-    for key, stop in zip(scene.stop_keys, scene.stops, strict=True):
+    for key, stop in stops:
         if stop.law != "restitution":
             yield Seen("law", f"{key}.law", f'"{stop.law}"')
         if (relaxes := getattr(stop, "relaxation_time", 0.0)) > 0.0:

@@ -181,8 +181,9 @@ class Parts(SceneTable):
     @property
     def stop_keys(self) -> tuple[str, ...]:
         """The key of the table of each of `stops`: `stop[1]`, `contact[1]`."""
-        own = sum(not isinstance(stop, ContactTable) for stop in self.stops)
-        numbers = range(1, len(self.stops) + 1)
+        stops = self.stops
+        own = sum(not isinstance(stop, ContactTable) for stop in stops)
+        numbers = range(1, len(stops) + 1)
         return tuple(f"stop[{n}]" if n <= own else f"contact[{n - own}]" for n in numbers)
 
     @property

@@ -91,7 +91,6 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable:
     for axis, panel in zip(axes, panels, strict=True):
         if over is not None:
             draw_below(axis, over, name, panel)
-        _shade_missing(axis, dataset)
         draw_orbits(axis, dataset, name, panel)
         axis.set_ylabel(_label(dataset, panel))
         axis.margins(x=0.02)
@@ -220,6 +219,7 @@ def values_of_runs(dataset: xr.Dataset, name: str, panel: str, direction: str = 
 
 def draw_orbits(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
     """Draw orbits over their parameter into a panel: branches as lines, special points as marks."""
+    _shade_missing(axis, dataset)
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
     rows = _rows(dataset, panel)
