@@ -13,7 +13,7 @@ from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT, LEVEL, crossing_direction
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY, split_orbit
 from vibroimpact.analysis.orbits.following import Follower
-from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit, evaluated, grazes, ordered
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, evaluated, grazes, ordered
 from vibroimpact.analysis.orbits.symmetry import are_alike, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
@@ -138,7 +138,10 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
         for chosen in _subsets(sometimes):
             if not always and not chosen:
                 continue
-            other = _orbit_of(orbit, turns, always + chosen)
+            try:
+                other = _orbit_of(orbit, turns, always + chosen)
+            except OrbitError:
+                continue  # contacts of such an orbit overlap
             images = [other, mirror_image(other)]
             if other.turns > 1 or any(
                 are_alike(each, image) for each in found for image in images if image is not None
@@ -186,7 +189,10 @@ def _orbit_of(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> Periodi
 
 def _beside(follower: Follower, orbit: PeriodicOrbit, value: float) -> Iterator[Departure]:
     """Yield the branch of an orbit at a graze in the direction of its physical orbits, if there are any."""
-    start = follower.on_branch(orbit, value, None)
+    try:
+        start = follower.on_branch(orbit, value, None)
+    except OrbitError:
+        return  # contacts overlap next to it
     is_square = orbit.body.has_own_period or orbit.body.yields
     away = (BESIDE_SQUARE if is_square else BESIDE) * follower.settings.longest
     for each in (start, start.turned):

@@ -337,7 +337,12 @@ class Parts(SceneTable):
         return field_of(type(owner), parts.name)
 
     def _key(self, text: str) -> Key:
-        return numeric_key(text).among(len(self.forces))
+        key = numeric_key(text).among(len(self.forces))
+        if key.owner != "body" or not self.is_one_body:
+            return key
+        # a structure of one body has its numbers under `body` or, as one of a list, under `body[1]`
+        is_listed = isinstance(self.body, StructureBody) and [*self.body.tables()] == ["body[1]"]
+        return key._replace(place=0) if is_listed else key
 
     def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
         number = number_of(owner, parts)

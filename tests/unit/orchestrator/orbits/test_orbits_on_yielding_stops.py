@@ -127,6 +127,22 @@ def test_exponents_of_a_periodic_run_are_its_multipliers_and_a_chaotic_run_keeps
     assert vi.classify(run)[0].name == "chaos"
 
 
+@pytest.mark.long
+def test_a_stop_may_lose_its_whole_stiffness_along_a_branch() -> None:
+    found = vi.follow(
+        scene(KELVIN_VOIGT | {"position": 1.0}),
+        "stop[1].stiffness",
+        0.0,
+        2.0,
+        impacts=1,
+        doublings=0,
+        step=0.2,
+    )
+    # next to a stop without a force the contacts of other orbits overlap; the branch has all values
+    assert found.stiffness.values.min() == pytest.approx(0.0, abs=1e-9)
+    assert found.stiffness.values.max() == pytest.approx(2.0)
+
+
 def test_a_period_doubling_separates_the_classes_of_runs() -> None:
     given = scene(KELVIN_VOIGT | {"position": 1.0}, angular_frequency=0.902)
     given["record"] = {"transient_periods": 4000, "recorded_periods": 40, "impacts": True, "strobe": True}

@@ -154,3 +154,18 @@ def test_a_constant_force_on_a_box_on_ice_is_refused() -> None:
         UsageError, match="expected no constant force on a body that nothing ties to the ground"
     ):
         vi.find_orbits(vi.Scene.from_text(scene))
+
+
+def test_a_single_body_has_its_key_also_as_a_structure() -> None:
+    body = {"mass": 1.0, "stiffness": 1.0, "damping": -0.1, "displacement_start": 0.1}
+    stop = [{"position": 1.0, "restitution": 0.6}]
+    given = {
+        "scene": {"units": "nondimensional"},
+        "body": body,
+        "stop": stop,
+        "record": {"recorded_time": 50.0},
+    }
+    found = vi.follow(vi.Scene.from_dict(given), "body.damping", -0.2, -0.1, impacts=1, step=0.2)
+    # the impact gives back what the negative dashpot brings: one multiplier, r^2 exp(-2 zeta w T)
+    decay = 0.36 * np.exp(-found.damping.values * found.orbit_period.values)
+    np.testing.assert_allclose(found.orbit_multiplier_real.values, decay, rtol=1e-9)
