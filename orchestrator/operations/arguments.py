@@ -44,3 +44,14 @@ FromDataset = Annotated[
     ),
 ]
 Run = Annotated[int | None, Option(help="run_index of that run, if there are several.", min=0, python="")]
+Doublings = Annotated[int, Option(help="Number of successive period doublings that are followed.")]
+Grazes = Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")]
+SecondStart = Annotated[
+    float | None,
+    Option(
+        "--second-from",
+        python="second_range: tuple[float, float] | None = None",
+        help="First end of its range.",
+    ),
+]
+SecondStop = Annotated[float | None, Option("--second-to", python="", help="Second end of its range.")]

@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 
 from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
-from vibroimpact.orchestrator.operations.arguments import Changes, SceneFile
+from vibroimpact.orchestrator.operations.arguments import (
+    Changes,
+    Doublings,
+    Grazes,
+    SceneFile,
+    SecondStart,
+    SecondStop,
+)
 
 
 @study("orchestrator.orbits.diagram:Diagram", Door("diagram"))
@@ -45,20 +52,11 @@ class MakeDiagram(Operation):
     )
     impacts: Annotated[int | None, Option(help="Impacts of the first orbits that are followed (1).")] = None
     periods: Annotated[int, Option(help="Forcing periods of the first orbits that are followed.")] = 1
-    doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
-    grazes: Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")] = 1
+    doublings: Doublings = 1
+    grazes: Grazes = 1
     second: Annotated[str | None, Option(metavar="KEY", help="Second varied number of the scene.")] = None
-    second_start: Annotated[
-        float | None,
-        Option(
-            "--second-from",
-            python="second_range: tuple[float, float] | None = None",
-            help="First end of its range.",
-        ),
-    ] = None
-    second_stop: Annotated[
-        float | None, Option("--second-to", python="", help="Second end of its range.")
-    ] = None
+    second_start: SecondStart = None
+    second_stop: SecondStop = None
     second_values: Annotated[int | None, Option(help="Number of values in its range (81).")] = None
     changes: Changes = None
     force: Force = False

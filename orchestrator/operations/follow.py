@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import Annotated
 
 from vibroimpact.fmus.operations import DatasetFile, Door, FigureFile, Force, Operation, Option, study
-from vibroimpact.orchestrator.operations.arguments import Changes, FromDataset, Run, SceneFile, Seed
+from vibroimpact.orchestrator.operations.arguments import (
+    Changes,
+    Doublings,
+    FromDataset,
+    Grazes,
+    Run,
+    SceneFile,
+    SecondStart,
+    SecondStop,
+    Seed,
+)
 
 
 @study("orchestrator.orbits.follow:Following", Door("follow"))
@@ -36,8 +46,8 @@ class Follow(Operation):
     seed: Seed = None
     from_dataset: FromDataset = None
     run: Run = None
-    doublings: Annotated[int, Option(help="Number of successive period doublings that are followed.")] = 1
-    grazes: Annotated[int, Option(help="Number of successive grazes at which other orbits are followed.")] = 1
+    doublings: Doublings = 1
+    grazes: Grazes = 1
     step: Annotated[float, Option(help="Largest step along a branch, relative to the range.")] = 0.01
     starts: Annotated[
         int, Option(help="Trains of impacts from which each search for orbits of several impacts starts.")
@@ -46,16 +56,7 @@ class Follow(Operation):
         str | None,
         Option(metavar="KEY", help="Second number, over which the bifurcations are followed."),
     ] = None
-    second_start: Annotated[
-        float | None,
-        Option(
-            "--second-from",
-            python="second_range: tuple[float, float] | None = None",
-            help="First end of its range.",
-        ),
-    ] = None
-    second_stop: Annotated[
-        float | None, Option("--second-to", python="", help="Second end of its range.")
-    ] = None
+    second_start: SecondStart = None
+    second_stop: SecondStop = None
     changes: Changes = None
     force: Force = False
