@@ -41,6 +41,8 @@ SHORTEST = 1e-9
 """Step along the branch, over the longest, below which the branch ends."""
 STABILITY_CHANGE = "stability change"
 """Kind of a point where the stability changes for none of the known reasons."""
+END = "end of the range"
+"""End of a branch at a bound of the parameter."""
 SLOWED = "its impacts lose their speed"
 """End of a branch without a force whose impacts have no speed where nothing gives energy."""
 TOGETHER = 1e-3
@@ -136,6 +138,9 @@ class Follower:
                 now, step = branch.orbits[-1], 0.1 * longest
                 continue
             too_near = found is not None and abs(found[0].border) < NEAR * abs(now.border)
+            if found is None and (last := self._last(now, step)) is not None:
+                yield from self._to_end(branch, now, last)
+                return
             if found is None or too_near or (born and not found[0].orbit.is_physical):
                 step *= 0.5
                 if step < SHORTEST * longest:
@@ -144,7 +149,7 @@ class Follower:
                 continue
             taken, newton = found
             # an orbit next to its origin has no special points of its own yet
-            closing = None if born else self._closing_step(branch.orbits[0], now, taken)
+            closing = None if born else self._closing_step(branch.orbits[0], now, taken, step)
             if closing is not None:
                 step, taken = closing
             if not born and (yield from self._passed(branch, now, taken, step)):
@@ -173,6 +178,36 @@ class Follower:
         branch.orbits += [before, BranchOrbit(*corner.beyond)][: 1 if orbit.turns > 1 else 2]
         yield branch.orbits[-1]
         return orbit.turns > 1
+
+    def _last(self, now: BranchOrbit, step: float) -> BranchOrbit | None:
+        """Return the orbit at the end of the range that a step would pass, where there is no body beyond; else None."""
+        lowest, highest, span = self.settings.lowest, self.settings.highest, self.settings.span
+        ahead = now.value + step * now.tangent[-1] * span
+        bound = min(max(ahead, lowest), highest)
+        if bound in (ahead, now.value):
+            return None
+        unknowns = now.orbit.unknowns + now.tangent[:-1] * (bound - now.value) / (now.tangent[-1] * span)
+        close, least = CLOSE * now.orbit.body.scale, np.inf
+        try:
+            for _ in range(MOST_NEWTON):
+                errors, slopes, orbit = self.residual(now.orbit, unknowns, bound)
+                error = float(np.abs(errors).max())
+                if error <= close and (error >= 0.5 * least or orbit.body.yields):
+                    found = self.on_branch(orbit, bound, now.tangent, slopes)
+                    return found if found.tangent @ now.tangent >= np.cos(MOST_TURN) else None
+                least = min(least, error)
+                unknowns = unknowns - np.linalg.solve(slopes, errors)
+        except (OrbitError, np.linalg.LinAlgError):
+            return None
+        return None
+
+    def _to_end(self, branch: Branch, now: BranchOrbit, last: BranchOrbit) -> Iterator[BranchOrbit]:
+        """Add the orbit at the end of the range, and the events before it, to the branch."""
+        step = float(now.tangent @ self._difference(now, last))
+        if not (yield from self._passed(branch, now, last, step)):
+            branch.orbits.append(last)
+            branch.ends.append(END)
+            yield last
 
     def _obstacle(self, now: BranchOrbit) -> str:
         """Return the reason why no orbit is found beyond one, after a colon; an empty text if none is known."""
@@ -216,20 +251,42 @@ class Follower:
         """Return errors, their slopes, and the orbit, for other unknowns and another parameter."""
         return tried(self._body_at(value), orbit, unknowns)
 
-    def _over_value(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Floats:
-        """Return the derivative of the errors by the parameter, measured in its range."""
+    def _over_value(
+        self, orbit: PeriodicOrbit, unknowns: Floats, value: float, before: float = -1.0
+    ) -> Floats:
+        """Return the derivative of the errors by the parameter, measured in its range.
+
+        `before` 0 takes the difference on one side, which is enough for a direction of Newton's method.
+        """
         change = 1e-6 * max(abs(value), 1e-3 * self.settings.span)
-        ends = [self.residual(orbit, unknowns, value + side * change).errors for side in (1.0, -1.0)]
-        return (ends[0] - ends[1]) * (self.settings.span / (2.0 * change))
+        try:
+            ends = [self.residual(orbit, unknowns, value + side * change).errors for side in (1.0, before)]
+        except OrbitError:
+            return self._over_value_at_bound(orbit, unknowns, value, change)
+        return (ends[0] - ends[1]) * (self.settings.span / ((1.0 - before) * change))
+
+    def _over_value_at_bound(
+        self, orbit: PeriodicOrbit, unknowns: Floats, value: float, change: float
+    ) -> Floats:
+        """Return the derivative by the parameter from values on that side of a bound where there is a body."""
+        inwards = change if value < 0.5 * (self.settings.lowest + self.settings.highest) else -change
+        at, near, far = (self.residual(orbit, unknowns, value + n * inwards).errors for n in range(3))
+        return (4.0 * near - 3.0 * at - far) * (self.settings.span / (2.0 * inwards))
 
     def matrix(self, orbit: PeriodicOrbit, unknowns: Floats, value: float) -> Floats:
         """Return the derivatives of the errors by all unknowns, shape (p, p + 1)."""
         slopes = self.residual(orbit, unknowns, value).slopes
         return np.column_stack([slopes, self._over_value(orbit, unknowns, value)])
 
-    def on_branch(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> BranchOrbit:
-        """Return an orbit with the direction of its branch, which is near to a direction if there is one."""
-        matrix = self.matrix(orbit, orbit.unknowns, value)
+    def on_branch(
+        self, orbit: PeriodicOrbit, value: float, before: Floats | None, slopes: Floats | None = None
+    ) -> BranchOrbit:
+        """Return an orbit with the direction of its branch, which is near to a direction if there is one.
+
+        `slopes` are those of the orbit's errors where they are known.
+        """
+        known = self.residual(orbit, orbit.unknowns, value).slopes if slopes is None else slopes
+        matrix = np.column_stack([known, self._over_value(orbit, orbit.unknowns, value)])
         tangent: Floats = np.linalg.svd(matrix)[2][-1]
         if before is not None and tangent @ before < 0.0:
             tangent = -tangent
@@ -238,16 +295,16 @@ class Follower:
     def step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
         """Return the orbit a step further, and the number of Newton steps; None without an orbit that near."""
         span = self.settings.span
-        before = now.orbit.unknowns
+        before, close = now.orbit.unknowns, CLOSE * now.orbit.body.scale
         unknowns = before + step * now.tangent[:-1]
         value = now.value + step * now.tangent[-1] * span
         least, orbit = np.inf, now.orbit
         try:
-            across = self._over_value(now.orbit, unknowns, value)
+            across = self._over_value(now.orbit, unknowns, value, before=0.0)
             for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
                 errors, slopes, orbit = self.residual(orbit, unknowns, value)
                 error = float(np.abs(errors).max())
-                small = error <= CLOSE * orbit.body.scale
+                small = error <= close
                 if small and (error >= 0.5 * least or orbit.body.yields):
                     break
                 least = min(least, error)
@@ -259,18 +316,19 @@ class Follower:
                 unknowns = unknowns + change[:-1]
                 value += change[-1] * span
             else:
-                if not least <= 1e3 * CLOSE * now.orbit.body.scale:
+                if not least <= 1e3 * close:
                     return None
-            taken = self.on_branch(orbit, float(value), now.tangent)
+            taken = self.on_branch(orbit, float(value), now.tangent, slopes)
         except (OrbitError, np.linalg.LinAlgError):
             return None
         return (taken, newton) if taken.tangent @ now.tangent >= np.cos(MOST_TURN) else None
 
     def _closing_step(
-        self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit
+        self, first: BranchOrbit, now: BranchOrbit, taken: BranchOrbit, step: float
     ) -> tuple[float, BranchOrbit] | None:
         """Return the step to the first orbit of the branch, and that orbit; None unless a step passes it."""
-        if now is first or taken is first:
+        # far from the first orbit, over the length of the step, there is nothing to compare
+        if now is first or taken is first or abs(taken.value - first.value) > 4.0 * step * self.settings.span:
             return None
         before, beyond = (self._difference(first, each) for each in (now, taken))
         if not first.tangent @ before < 0.0 <= first.tangent @ beyond:
@@ -278,9 +336,9 @@ class Follower:
         farther = max(float(np.linalg.norm(each)) for each in (before, beyond))
         if farther > 2.0 * float(np.linalg.norm(beyond - before)):
             return None  # another part of the branch passes the same plane
-        step = float(now.tangent @ self._difference(now, first))
-        found = self.step(now, step) if step > 0.0 else None
-        return None if found is None else (step, found[0])
+        last = float(now.tangent @ self._difference(now, first))
+        found = self.step(now, last) if last > 0.0 else None
+        return None if found is None else (last, found[0])
 
     def _difference(self, one: BranchOrbit, other: BranchOrbit) -> Floats:
         """Return the difference of two orbits in the unknowns of the branch, whatever turn their phases start from."""
@@ -339,11 +397,11 @@ class Follower:
                     yield found[0], end_of(kind, now.orbit, found[1].orbit), found[1]
         for bound in (settings.lowest, settings.highest):
             if now.value == bound and not settings.lowest <= taken.value <= settings.highest:
-                yield 0.0, "end of the range", now
+                yield 0.0, END, now
             elif (now.value - bound) * (taken.value - bound) < 0.0:
                 found = self._located(now, step, bound)
                 if found is not None:
-                    yield found[0], "end of the range", found[1]
+                    yield found[0], END, found[1]
 
     def _branch_point(self, now: BranchOrbit, step: float) -> tuple[float, BranchOrbit] | None:
         """Return the place along a step where another branch crosses, and the orbit there: equations.md 4.13."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import itertools
+from collections.abc import Mapping
 from ctypes import POINTER, Structure, byref, c_double, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass
 from enum import IntEnum
@@ -86,16 +88,18 @@ class OrbitBody:
     """
 
     def __init__(self, angular_frequency: float, *, coupling: Array | None = None, **arrays: Array) -> None:
-        self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
-        contacts, self.modes = self._arrays["shape"].shape
-        addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
-        tied = self._arrays["natural"] != 0.0
+        # all arrays in one block: there is one address to ask for
+        parts = [arrays[name] for name in BODY.ARRAYS]
+        self._block = np.concatenate([part.ravel() for part in parts], dtype=np.float64)
+        sizes = (self._block.itemsize * part.size for part in parts[:-1])
+        begins = itertools.accumulate(sizes, initial=self._block.ctypes.data)
+        contacts, self.modes = arrays["shape"].shape
         self._terms = None
-        if coupling is not None and tied.any():
-            self._terms = self._coupled(angular_frequency, coupling, tied)
+        if coupling is not None and arrays["natural"].any():
+            self._terms = self._coupled(angular_frequency, coupling, arrays)
         terms = None if self._terms is None else self._terms.ctypes.data
-        self.harmonics = self._arrays["order"].size
-        self.address = BODY(self.modes, contacts, self.harmonics, angular_frequency, *addresses, terms)
+        self.harmonics = arrays["order"].size
+        self.address = BODY(self.modes, contacts, self.harmonics, angular_frequency, *begins, terms)
 
     def with_frequency(self, angular_frequency: float) -> Self:
         """Return the same body with another frequency of its clock, rad/s; no sine turns with the clock."""
@@ -104,14 +108,14 @@ class OrbitBody:
         found.address.angular_frequency = angular_frequency
         return found
 
-    def _coupled(self, angular_frequency: float, coupling: Array, tied: NDArray[np.bool_]) -> Array:
+    def _coupled(self, angular_frequency: float, coupling: Array, arrays: Mapping[str, Array]) -> Array:
         """Return the complex modes of the modes with springs in the form of C, as bytes in an array of numbers."""
-        library = _library()
+        library, tied = _library(), arrays["natural"] != 0.0
         found = np.empty(library.vi_door_orbit_coupling_size() // 8 + 1)
         work = np.empty(library.vi_door_orbit_coupling_work_size() // 8 + 1)
         damping = np.ascontiguousarray(_numbers(coupling, (self.modes, self.modes))[np.ix_(tied, tied)])
-        rows = [np.ascontiguousarray(self._arrays[name][..., tied]) for name in ("natural", "cosine", "sine")]
-        rates = angular_frequency * self._arrays["order"]
+        rows = [np.ascontiguousarray(arrays[name][..., tied]) for name in ("natural", "cosine", "sine")]
+        rates = angular_frequency * arrays["order"]
         given = (rates, rows[0], damping, rows[1], rows[2], found, work)
         modes = int(np.count_nonzero(tied))
         end = library.vi_door_orbit_couple(modes, rates.size, *(each.ctypes.data for each in given))

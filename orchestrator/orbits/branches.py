@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit
+from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint, joined
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import MISSING_ORBITS, dataset_of_branches, mirror_images
@@ -23,7 +23,7 @@ from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.messages import counted, message
-from vibroimpact.orchestrator.orbits.bodies import impacting_body, refuse_without_energy
+from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, refuse_outside, refuse_without_energy
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
 from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck
@@ -150,8 +150,9 @@ def follow_branches(
     """
     scene, parameter = followed.scene, followed.parameter
     _refuse(start, stop, impacts, periods, doublings, grazes, longest, starts)
+    refuse_outside(scene, parameter, (start, stop), "--from, --to")
     body_at = _bodies(scene, parameter, 0.5 * (start + stop))
-    _refuse_without_energy(scene, parameter, (start, 0.5 * (start + stop), stop))
+    _refuse_without_energy(scene, body_at, (start, 0.5 * (start + stop), stop))
     settings = FollowSettings(min(start, stop), max(start, stop), longest)
     follower = Follower(body_at, settings)
     found = 0
@@ -277,46 +278,29 @@ def _leaving(follower: Follower, departure: Departure, parent: Branch, result: F
             result.branches.pop()
 
 
-def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], ImpactingBody]:
-    kept: dict[float, ImpactingBody] = {}
-
-    def body_at(value: float) -> ImpactingBody:
-        value = float(value)
-        if value not in kept:
-            if len(kept) > 8:
-                kept.clear()
-            kept[value] = body_along(scene, {parameter: value})
-        return kept[value]
-
-    # a wrong key is refused before any orbit is followed
-    impacting_body(scene.at({parameter: value}), all_kinds=True)
+def _bodies(scene: Scene, parameter: str, value: float) -> BodiesAlong:
+    """Return the bodies over a number; UsageError for one that no orbit can be followed over."""
+    found = BodiesAlong(scene, {parameter: value})
     if len([*sines_of(scene.forces), *sines_of_stops(scene.stops)]) > 1 and is_frequency(parameter):
         raise UsageError(
             f"follow: {parameter}: expected a number that the common period of the sines does not depend on, "
             "got the frequency of one of them."
         )
-    return body_at
+    return found
 
 
-def _refuse_without_energy(scene: Scene, parameter: str, values: Sequence[float]) -> None:
+def _refuse_without_energy(scene: Scene, body_at: BodiesAlong, values: Sequence[float]) -> None:
     """Raise UsageError if nothing gives energy to the body at any of some values of the range."""
     problems = []
     for value in values:
-        at = scene.at({parameter: value})
         try:
-            refuse_without_energy(at, impacting_body(at, all_kinds=True))
+            refuse_without_energy(scene, body_at(value))
         except UsageError as problem:
             problems.append(problem)
+        except OrbitError:
+            continue  # the scene has no body there, such as with a force of frequency 0
     if len(problems) == len(values):
         raise problems[0]
-
-
-def body_along(scene: Scene, values: dict[str, float]) -> ImpactingBody:
-    """Return the body at values next to a branch; OrbitError where the scene has none, such as a negative damping."""
-    try:
-        return impacting_body(scene.at(values), all_kinds=True)
-    except UsageError as problem:
-        raise OrbitError(str(problem)) from problem
 
 
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:

@@ -96,7 +96,11 @@ def _of_many_impacts(
     inside = [own] if settings.lowest <= own <= settings.highest else []
     for value in [*inside, *seed_values(settings)]:
         looking(value)
-        yield from ((value, orbit) for orbit in orbits_of(body_at(value), impacts, periods, starts=starts))
+        try:
+            body = body_at(value)
+        except OrbitError:
+            continue  # the scene has no body there
+        yield from ((value, orbit) for orbit in orbits_of(body, impacts, periods, starts=starts))
 
 
 def _of_seed(

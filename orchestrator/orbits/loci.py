@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.branches import Followed, body_along
+from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, impacting_body, refuse_outside
+from vibroimpact.orchestrator.orbits.branches import Followed
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
@@ -109,7 +108,7 @@ def follow_loci(
     followed = followed or result.followed
     scene, keys = followed.scene, (followed.parameter, result.second)
     value = float(scene.value(result.second))
-    body_at = lru_cache(16)(lambda *both: body_along(scene, dict(zip(keys, both, strict=True))))
+    body_at = BodiesAlong(scene, dict(zip(keys, (0.5 * (first.lowest + first.highest), value), strict=True)))
     result.values.append(value)
     yield from _from_starts(
         result, LocusFollower(body_at, first, second), _starts(followed.branches, value, result.second)
@@ -175,7 +174,9 @@ def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:
         raise UsageError(
             f"--second: expected another number of the scene than {result.second}, got the same."
         )
-    value = float(result.followed.scene.value(result.second))
+    scene, ends = result.followed.scene, (second.lowest, second.highest)
+    refuse_outside(scene, result.second, ends, "--second-from, --second-to")
+    value = float(scene.value(result.second))
     if not second.lowest <= value <= second.highest:
         raise UsageError(
             f"--second-from, --second-to: expected a range around {result.second} = {value:g} of the scene, "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import struct
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from vibroimpact.orchestrator.scene.laws import LAWS
 from vibroimpact.orchestrator.scene.measuring_models import Exciter
 
 Floats = NDArray[np.float64]
+PROBES = (2.0**-20, 0.0812537291, -0.0316227766, 1.4142135e-9)
+"""Relative changes of a value, with many different bits, that test whether a parameter copies the value."""
 SIDE_NUMBERS = {"upper": 1, "lower": 2}
 
 
@@ -184,3 +187,30 @@ def body_points(scene: Scene, columns: Columns | Mapping[str, float] | None = No
     """
     floats = float_parameters(scene, None) if columns is None else columns
     return POINTS_OF_FMU[scene.body.FMU](floats, integer_parameters(scene), len(scene.stops))
+
+
+def own_parameters(scene: Scene, keys: Sequence[str]) -> list[str] | None:
+    """Return the parameter of the body's FMU that copies the value of each key; None where a key sets other ones."""
+    given = float_parameters(scene, None)
+    names = []
+    for key in keys:
+        found = {_alone(scene, key, probe, given) for probe in PROBES}
+        if len(found) > 1 or "" in found:
+            return None
+        names.append(found.pop())
+    return names
+
+
+def _alone(scene: Scene, key: str, probe: float, given: Mapping[str, float]) -> str:
+    """Return the only parameter that changes with a key and equals its value bit for bit; empty if there is none."""
+    value = scene.value(key)
+    other = value * (1.0 + probe) if value else probe
+    found = float_parameters(scene.at({key: other}), None)
+    if found.keys() != given.keys():
+        return ""
+    changed = [name for name in found if _bits(found[name]) != _bits(given[name])]
+    return changed[0] if len(changed) == 1 and _bits(found[changed[0]]) == _bits(other) else ""
+
+
+def _bits(value: float) -> bytes:
+    return struct.pack("d", value)

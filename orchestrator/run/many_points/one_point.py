@@ -6,7 +6,6 @@ the FMU sets that parameter directly. Other keys need all parameters of the scen
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,15 +22,10 @@ from vibroimpact.orchestrator.run.many_points.loop import (
     PreparedPoints,
 )
 from vibroimpact.orchestrator.run.many_points.loop_rows import LoopArrays
-from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
+from vibroimpact.orchestrator.run.parameters import float_parameters, own_parameters, state_variables
 from vibroimpact.orchestrator.run.record import OBSERVED, ROW_IMPACT, ROW_PERIOD
 from vibroimpact.orchestrator.run.window import forced_window
-from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.laws import LAWS
-
-PROBES = (2.0**-20, 0.0812537291, -0.0316227766, 1.4142135e-9)
-"""Relative changes of a value, with many different bits, that test whether a parameter copies the value."""
-
 
 NOT_OF_THE_MOTION = ("run_index", "direction", "point_seconds")
 """Variables of a dataset that do not describe the motion of a point."""
@@ -69,7 +63,8 @@ class OnePoint:
         self._scene, self._keys, self._points = loop.scene, tuple(keys), points
         self._names = names = loop.driver.float_names
         self._columns = [points.columns[name] for name in names]
-        self._own = own_columns(loop.scene, keys, names)
+        own = own_parameters(loop.scene, keys)
+        self._own = None if own is None else [names.index(each) for each in own]
         self._arrays = LoopArrays(loop, points, None)
         self._row = points.table[0]
         record, stops = loop.scene.record, loop.scene.stops
@@ -180,30 +175,3 @@ def of_the_only_run(found: Mapping[str, Any]) -> dict[str, Any]:
         for name, array in found.items()
         if name not in NOT_OF_THE_MOTION
     }
-
-
-def own_columns(scene: Scene, keys: Sequence[str], names: Sequence[str]) -> list[int] | None:
-    """Return the place of the parameter that each key sets; None where a key does not set exactly one parameter."""
-    given = float_parameters(scene, None)
-    places = []
-    for key in keys:
-        found = {_alone(scene, key, probe, given) for probe in PROBES}
-        if len(found) > 1 or "" in found:
-            return None
-        places.append(names.index(found.pop()))
-    return places
-
-
-def _alone(scene: Scene, key: str, probe: float, given: Mapping[str, float]) -> str:
-    """Return the only parameter that changes with a key and equals its value bit for bit; empty if there is none."""
-    value = scene.value(key)
-    other = value * (1.0 + probe) if value else probe
-    found = float_parameters(scene.at({key: other}), None)
-    if found.keys() != given.keys():
-        return ""
-    changed = [name for name in found if _bits(found[name]) != _bits(given[name])]
-    return changed[0] if len(changed) == 1 and _bits(found[changed[0]]) == _bits(other) else ""
-
-
-def _bits(value: float) -> bytes:
-    return struct.pack("d", value)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import random
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.places import ROOT
 
 import vibroimpact as vi
-from vibroimpact.analysis.orbits import closed_form
+from vibroimpact.analysis.orbits import OrbitError, closed_form
 from vibroimpact.analysis.orbits.search import orbits_of
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.orbits import impacting_body
+from vibroimpact.orchestrator.orbits.bodies import BodiesAlong
 from vibroimpact.orchestrator.scene import load_scene, parse_scene
 
 RECORD = "[record]\ntransient_periods = 400\nrecorded_periods = 2\nimpacts = true\n"
@@ -123,3 +129,32 @@ def test_a_chain_of_one_mass_has_the_orbits_of_the_oscillator() -> None:
 def test_examples_of_the_thesis_have_bodies() -> None:
     for name in ("thesis/figure_6_13", "thesis/figure_7_10", "bifurcation"):
         assert closed_form(impacting_body(load_scene(ROOT / "examples" / f"{name}.toml"))) != ()
+
+
+@pytest.mark.parametrize(
+    "text", [ONE, CHAIN, BEAM, COUPLED, TWO_STOPS], ids=["one", "chain", "beam", "coupled", "two"]
+)
+@given(share=st.floats(0.2, 3.0), sign=st.sampled_from([1.0, -1.0]), draw=st.randoms(use_true_random=False))
+@settings(max_examples=12, deadline=None)
+def test_a_body_along_any_number_is_that_of_the_scene(
+    text: str, share: float, sign: float, draw: random.Random
+) -> None:
+    scene = parse_scene(text + RECORD, "scene.toml")
+    key, given_value = draw.choice([each for each in scene.numbers() if not each[0].startswith("execution")])
+    first = {key: given_value or 0.5}
+    bodies, value = BodiesAlong(scene, first), sign * share * first[key]
+    try:
+        expected = impacting_body(scene.with_values({key: value}), all_kinds=True)
+    except SceneError:
+        return
+    except UsageError as problem:
+        with pytest.raises(OrbitError, match=re.escape(str(problem))):
+            bodies(value)
+        return
+    for name, one in vars(bodies(value)).items():
+        np.testing.assert_equal(_plain(one), _plain(vars(expected)[name]), err_msg=f"{key} {value}: {name}")
+
+
+def _plain(value: object) -> object:
+    """Return contacts as their attributes."""
+    return [vars(each) for each in value] if isinstance(value, tuple) else value

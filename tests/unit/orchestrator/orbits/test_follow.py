@@ -165,6 +165,15 @@ def test_curves_lie_on_the_map_of_both_numbers(loci: xr.Dataset) -> None:
             ["--second", "forcing.amplitude"],
             "--second: expected --second, --second-from and --second-to together",
         ),
+        (
+            ["--parameter", "body.mass", "--from", "-1"],
+            "--from, --to: body.mass: expected a number > 0, got -1.",
+        ),
+        (["--parameter", "stop[1].restitution", "--to", "1.5"], "expected 0 <= r <= 1, got 1.5."),
+        (
+            ["--second", "body.stiffness", "--second-from", "-1", "--second-to", "2"],
+            "--second-from, --second-to: body.stiffness: expected a number >= 0, got -1.",
+        ),
         (["--set", "stop=[]"], "stop: expected a restitution stop, got none."),
     ],
 )
@@ -211,13 +220,15 @@ def test_what_was_followed_before_ctrl_c_is_written(tmp_path: Path, monkeypatch:
     assert vi.open_dataset(output).sizes["angular_frequency"] >= 25
 
 
-def test_a_branch_ends_where_the_scene_allows_no_further() -> None:
-    span = ["--parameter", "stop[1].restitution", "--from", "0.5", "--to", "1.5"]
-    code, out, _ = in_this_process(
-        ["follow", str(SCENE), "--set", "sweep={}", "--set", f"{PARAMETER}=1.2", *span]
-    )
-    assert code == 0
-    assert "cannot be followed beyond 0.99999" in out
+def test_a_branch_reaches_the_bounds_of_its_number() -> None:
+    """Beyond these values there is no body, so differences there are on one side."""
+    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({})
+    found = vi.follow(scene, "stop[1].restitution", 0.0, 1.0, step=0.1, impacts=1)
+    runs = found.vibroimpact.runs
+    values = runs["restitution"].values[runs["orbit_branch"].values == 1]
+    assert (values[0], values[-1]) == (0.0, 1.0)
+    special = runs["restitution"].values[runs["orbit_special"].values == SpecialOrbit.period_doubling]
+    assert special == pytest.approx([0.51349590817], abs=1e-10)
 
 
 def test_what_was_followed_before_an_error_is_written(
