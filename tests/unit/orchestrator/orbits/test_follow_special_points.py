@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,7 @@ def test_a_loss_of_symmetry_is_a_branch_point_at_which_both_broken_branches_begi
     ):
         assert said in out
     assert "no cause was found" not in out
+    assert re.search(r"2  P\(2,1\), 1 at stop 1, 1 at stop 2 +pitchfork +0\.97282429546 ", out)
     with vi.open_dataset(output) as written:
         runs = written.vibroimpact.runs
         branch, value = runs["orbit_branch"].values, runs["angular_frequency"].values
