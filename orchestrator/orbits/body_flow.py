@@ -310,8 +310,6 @@ def _classes(columns: RunColumns, rests: Mask | None = None) -> list[RunClass]:
     assert columns.periods is not None
     table, stuck = columns.periods, _stick_counts(columns) > 0 if rests is None else rests
     return [
-        class_of(
-            table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(stuck[run])
-        )
+        class_of(table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(stuck[run]))
         for run in range(len(columns))
     ]

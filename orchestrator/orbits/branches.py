@@ -191,7 +191,11 @@ def _refuse_nothing(
     ends = followed.ends or list(ends_of_runs(scene, parameter, values))
     kind = "an orbit with impacts" if followed.ends else f"a physical orbit P({impacts or 1},{periods})"
     tried = f" near {starts} trains of impacts at each" if (impacts or 1) > 1 else ""
-    without = f"The scene refuses {counted(len(refused), 'value')} of these: {refused[0].message} " if refused else ""
+    without = (
+        f"The scene refuses {counted(len(refused), 'value')} of these: {refused[0].message} "
+        if refused
+        else ""
+    )
     raise OrbitError(
         message(
             f"follow: expected {kind} at one of {SEEDS} values of "

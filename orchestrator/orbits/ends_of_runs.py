@@ -84,9 +84,7 @@ def where_runs_end(ends: Sequence[RunEnd], sought: tuple[int, int]) -> str:
         runs = f"{count} of {len(ends)} runs over the range end on P({impacts},{periods}): "
         return message(runs, _asking(impacts, periods), ".")
     others = ", ".join(f"{name} ({count})" for name, count in counts.most_common())
-    return (
-        f"Runs over the range end on {others}. Try another range, or other impacts and periods."
-    )
+    return f"Runs over the range end on {others}. Try another range, or other impacts and periods."
 
 
 def ends_in_words(ends: Sequence[RunEnd], followed: Callable[[RunEnd], bool]) -> list[str]:

@@ -159,7 +159,11 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             return "near to the seed"
         if self.impacts is None and self.periods is None:
             return "P(1,1), and none that a long run ends on"
-        tried = "" if self.impacts in (None, 1) or self.scene.period is None else f" near {STARTS} trains of impacts"
+        tried = (
+            ""
+            if self.impacts in (None, 1) or self.scene.period is None
+            else f" near {STARTS} trains of impacts"
+        )
         return f"P({self.impacts or 1},{self.periods or 1}){tried}"
 
     def conclude(self, options: FindOrbits) -> None:
@@ -187,9 +191,7 @@ def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int)
             "Give the number of impacts, or a start that leads to the orbit."
         )
     if impacts not in (None, len(seed)):
-        raise UsageError(
-            f"seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
-        )
+        raise UsageError(f"seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}.")
     for phase, stop in seed:
         if abs(phase) > LARGEST_PHASE:
             raise UsageError(f"seed: expected phases up to {LARGEST_PHASE:g} rad, got {phase:g}.")

@@ -124,10 +124,13 @@ def test_the_orbits_on_which_runs_end_are_followed_unless_others_are_wanted(tmp_
 
 def test_a_range_without_orbits_says_how_many_starts_were_tried_and_which_values_the_scene_refuses() -> None:
     scene = vi.Scene.from_dict(swept_scene(angular_frequency=1.1)).with_values({"forcing.amplitude": 0.01})
-    with pytest.raises(OrbitError, match=r"got none near 2 trains of impacts at each\. Runs .* no impacts \(50\)"):
+    with pytest.raises(
+        OrbitError, match=r"got none near 2 trains of impacts at each\. Runs .* no impacts \(50\)"
+    ):
         vi.follow(scene, PARAMETER, 1.0, 2.0, impacts=3, starts=2)
     with pytest.raises(
-        OrbitError, match=r"The scene refuses 12 values of these: .*restitution: expected 0 <= r <= 1, got 1\.0"
+        OrbitError,
+        match=r"The scene refuses 12 values of these: .*restitution: expected 0 <= r <= 1, got 1\.0",
     ):
         vi.follow(scene, "stop[1].restitution", 0.5, 1.5)
     with pytest.raises(SceneError, match=r"^.*restitution: expected 0 <= r <= 1, got 1\.21.*$"):
