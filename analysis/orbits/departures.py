@@ -25,6 +25,8 @@ It does so without a force, and on stops that yield. A maximum beyond its stop m
 """
 SAME_VALUE = 1e-7
 """Difference of two values, over the range, up to which they are one point."""
+SAME_TOUCH = 1e-3
+"""Difference of phases, rad, below which two touches of a stop are one; a phase at a graze has half the digits."""
 MOST_TURNS = 3
 """Number of turns of a grazing orbit, some with and some without an impact, up to which orbits are named."""
 MOST_TOUCHES = 4
@@ -120,7 +122,8 @@ def _crossing(follower: Follower, at: BranchOrbit, cause: str = "") -> Departure
 def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
     """Yield the branches of orbits with some of the impacts and maxima that touch a stop, others than the own one.
 
-    Several turns of the orbit may each have others of them.
+    Several turns of the orbit may each have others of them. Where all impacts touch, a turn is one period of the motion
+    without impacts.
     """
     orbit = at.orbit
     slow = grazes(orbit)
@@ -128,18 +131,21 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
         return  # the motion vanishes
     fast = _impacts(orbit, ~slow)
     touching = _impacts(orbit, slow) or _touching_maxima(orbit)
+    turn = orbit.periods
+    if slow.all():
+        turn, touching = 1, _in_one_period(orbit, touching)
     found = [orbit]
     for turns in range(1, MOST_TURNS + 1):
         if turns * (len(fast) + len(touching)) > MOST_IMPACTS or turns * len(touching) > MOST_TOUCHES:
             return
-        later = [TURN * orbit.periods * turn for turn in range(turns)]
+        later = [TURN * turn * count for count in range(turns)]
         always = [(phase + more, contact, speed) for more in later for phase, contact, speed in fast]
         sometimes = [(phase + more, contact, speed) for more in later for phase, contact, speed in touching]
         for chosen in _subsets(sometimes):
             if not always and not chosen:
                 continue
             try:
-                other = _orbit_of(orbit, turns, always + chosen)
+                other = _orbit_of(orbit, turns, turns * turn, always + chosen)
             except OrbitError:
                 continue  # contacts of such an orbit overlap
             images = [other, mirror_image(other)]
@@ -173,10 +179,24 @@ def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     return [(phase, contact, 0.0), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]), 0.0)]
 
 
-def _orbit_of(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> PeriodicOrbit:
-    """Return the orbit of some turns of another one that has these impacts."""
+def _in_one_period(orbit: PeriodicOrbit, touching: list[Impact]) -> list[Impact]:
+    """Return the touches in one period of a motion without impacts, with those of its mirror image if it is its own."""
+    contacts = mirrored_contacts(orbit.body)
+    images = (
+        [] if contacts is None else [(at + 0.5 * TURN, int(contacts[hit]), 0.0) for at, hit, _ in touching]
+    )
+    found: list[Impact] = []
+    for phase, contact, _ in [*touching, *images]:
+        apart = [abs((phase - at + 0.5 * TURN) % TURN - 0.5 * TURN) for at, hit, _ in found if hit == contact]
+        if min(apart, default=TURN) > SAME_TOUCH:
+            found.append((phase % TURN, contact, 0.0))
+    return found
+
+
+def _orbit_of(like: PeriodicOrbit, turns: int, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
+    """Return the orbit of some turns of another one that has these impacts in its forcing periods."""
     phases, hit, speeds = (np.array(each) for each in zip(*impacts, strict=True))
-    body, periods, contacts = like.body, turns * like.periods, hit.astype(np.int32)
+    body, contacts = like.body, hit.astype(np.int32)
     if body.has_own_period:
         order = np.argsort(phases)
         phases = (phases[order] - phases[order][0]) / turns

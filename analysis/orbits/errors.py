@@ -6,4 +6,6 @@ from vibroimpact.fmus.errors import VibroimpactError
 
 
 class OrbitError(VibroimpactError):
-    """An orbit was not found, or not followed further."""
+    """An orbit was not found, or not followed further, with the given numbers."""
+
+    exit_code = 2

@@ -39,6 +39,7 @@ from vibroimpact.orchestrator.orbits.planes import (
     axes_of,
     beyond_stops,
     element_of,
+    mass_displacement,
     plane_of,
     spans_of,
     start_states,
@@ -175,22 +176,24 @@ def basins_dataset(
     for place, attractor in enumerate(found.attractors):
         if len(attractor.section):
             section[place, : len(attractor.section)] = attractor.section[:, [across, along]]
+    body = strobed_body(scene)
+    unit = mass_displacement(scene, body)
     names = ("section_displacement", "section_velocity") if drawn else ()
-    sections = dict(zip(names, np.moveaxis(section, -1, 0), strict=False))
+    sections = dict(zip(names, np.moveaxis(unit * section, -1, 0), strict=False))
     dimension = border_dimension(labels)
     values = {
         "displacement_start": x,
         "velocity_start": y,
         "basin": labels,
-        **attractor_values(found, mirrored_contacts(strobed_body(scene)), len(scene.stops)),
+        **attractor_values(found, mirrored_contacts(body), len(scene.stops)),
         **sections,
-        "attractor_displacement": points[..., 0],
-        "attractor_velocity": points[..., 1],
+        "attractor_displacement": unit * points[..., 0],
+        "attractor_velocity": unit * points[..., 1],
         "attractor_radius": np.array([each.radius for each in found.attractors]),
         "border_fraction": border_share(labels),
         "border_dimension": np.nan if dimension is None else dimension.value,
         "border_dimension_error": np.nan if dimension is None else dimension.error,
-        **({} if edges is None else edge_values(edges, (across, along))),
+        **({} if edges is None else edge_values(edges, (across, along), unit)),
     }
     attributes = scene_attributes(scene, HISTORY) | {"units_system": scene.units} | search_attributes(found)
     return TABLE.dataset(values, attributes, units=scene.units, of=element_of(scene, plane.number))
@@ -219,14 +222,16 @@ class BasinsOfScene(Study[Basins]):
         body = strobed_body(self.scene)
         axes_of(self.scene, self.plane.number)
         spans, scale = spans_of(self.scene, body, self.plane)
-        self.x, self.y, states = start_states(self.scene, self.plane, spans)
+        unit = mass_displacement(self.scene, body)
+        self.x, self.y, states = start_states(self.scene, self.plane, spans, unit)
         phases = len(FurtherSines.of(self.scene))
         beyond = beyond_stops(self.scene, body, states[:, : states.shape[1] - phases])
         if beyond.all():
             raise UsageError("basins: x: expected starts on the free side of the stops, got none.")
         half = (states.shape[1] - phases) // 2
         sizes = np.repeat(
-            [max(size, np.abs(ends).max()) for size, ends in zip(scale, spans, strict=True)], half
+            [max(size, np.abs(ends).max() / abs(unit)) for size, ends in zip(scale, spans, strict=True)],
+            half,
         )
         sizes = np.append(sizes, np.zeros(phases))  # neighbours share the phases of forces
         labels = np.where(beyond, BEYOND_A_STOP, UNDECIDED).astype(np.int16)

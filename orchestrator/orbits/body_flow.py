@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.columns import RunColumns, columns_of, joined
@@ -28,6 +29,8 @@ from vibroimpact.orchestrator.run.many_points.loop import PointLoop, PointValues
 from vibroimpact.orchestrator.run.many_points.loop_rows import run_loop
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.scene import Scene
+
+Mask = NDArray[np.bool_]
 
 RECORDED = 64
 """Forcing periods that define the class of a run."""
@@ -159,11 +162,30 @@ class BodyFlow:
     ) -> tuple[list[RunClass], Floats]:
         """Return the class of a run from each state after a transient (forcing periods), and its last states."""
         columns = self._run(self._recording, states, (transient, RECORDED), first=first)
+        ends = self._final(columns, states, transient + RECORDED, first=first)
         found = [kind for each in columns for kind in _classes(each)]
         if self.turns is not None:  # neighbours part by phases of further sines
             free = OrbitClass.no_impacts
-            found = [each if each.kind is free else RunClass(OrbitClass.unknown) for each in found]
-        return found, self._final(columns, states, transient + RECORDED, first=first)
+            return [each if each.kind is free else RunClass(OrbitClass.unknown) for each in found], ends
+        rests = self._rests(found, ends)
+        if rests.any():
+            parts = np.split(rests, np.cumsum([len(each) for each in columns])[:-1])
+            both = zip(columns, parts, strict=True)
+            found = [kind for each, part in both for kind in _classes(each, part)]
+        return found, ends
+
+    def _rests(self, kinds: list[RunClass], states: Floats) -> Mask:
+        """Return a mask of the repeating motions that rest on a stop, by one more period of each from its last state.
+
+        Runs that define classes keep no impacts, whose sticks would need memory.
+        """
+        rests = np.array([each.periods > 0 and each.kind is not OrbitClass.no_impacts for each in kinds])
+        rests &= np.isfinite(states).all(axis=1)
+        if rests.any():
+            longest = max(kinds[place].periods for place in np.flatnonzero(rests))
+            columns = self._run(self._measuring, states[rests], (0, longest), first=False)
+            rests[rests] = np.concatenate([_stick_counts(each) > 0 for each in columns])
+        return rests
 
     def measure(self, states: Floats, periods: int, blocks: int) -> Blocks:
         """Return features of impacts in consecutive blocks: see `analysis.orbits.attractors.basins.Flow`."""
@@ -278,13 +300,16 @@ def _final(columns: RunColumns) -> Floats:
     return np.column_stack([columns.final_displacement, columns.final_velocity])
 
 
-def _classes(columns: RunColumns) -> list[RunClass]:
+def _stick_counts(columns: RunColumns) -> NDArray[np.int64]:
+    """Return the number of sticks of each run; runs that keep no impacts keep no sticks."""
+    return np.zeros(len(columns), np.int64) if columns.sticks is None else columns.sticks.count
+
+
+def _classes(columns: RunColumns, rests: Mask | None = None) -> list[RunClass]:
+    """Return the class of each run, with a mask of the runs that are known to rest on a stop."""
     assert columns.periods is not None
-    table, sticks = columns.periods, columns.sticks
-    counts = np.zeros(len(columns), np.int64) if sticks is None else sticks.count
+    table, stuck = columns.periods, _stick_counts(columns) > 0 if rests is None else rests
     return [
-        class_of(
-            table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(counts[run] > 0)
-        )
+        class_of(table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(stuck[run]))
         for run in range(len(columns))
     ]

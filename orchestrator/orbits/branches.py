@@ -21,7 +21,7 @@ from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import counted, message
 from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, refuse_outside, refuse_without_energy
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
@@ -74,6 +74,8 @@ class Followed:
     """The self-check by index sums, where orbits of all kinds were looked for."""
     meetings: list[Meeting] = field(default_factory=list)
     """The grazes of these branches, with the orbits that meet there."""
+    crossings: dict[SpecialPoint, str] = field(default_factory=dict)
+    """The cause of the other branch at each branch point: `pitchfork` or `transcritical branch point`."""
     most_begun_impacts: int = MOST_IMPACTS
     """Impacts of an orbit up to which branches begin at special points."""
     left: int = 0
@@ -174,23 +176,47 @@ def follow_branches(
         followed.check = IndexCheck(scene, parameter, settings, starts)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
     if required:
-        _refuse_nothing(followed, settings, impacts, periods)
+        _refuse_nothing(followed, settings, impacts, periods, starts)
 
 
-def _refuse_nothing(followed: Followed, settings: FollowSettings, impacts: int | None, periods: int) -> None:
-    """Raise OrbitError if there is no branch, with the motions on which runs end."""
+def _refuse_nothing(
+    followed: Followed, settings: FollowSettings, impacts: int | None, periods: int, starts: int
+) -> None:
+    """Raise OrbitError if there is no branch: what was tried, values without a scene, and where runs end."""
     if followed.branches:
         return
-    values = seed_values(settings)
-    ends = followed.ends or list(ends_of_runs(followed.scene, followed.parameter, values))
+    scene, parameter, values = followed.scene, followed.parameter, seed_values(settings)
+    refused = _refusals(scene, parameter, values)
+    if len(refused) == len(values):
+        raise refused[0]
+    ends = followed.ends or list(ends_of_runs(scene, parameter, values))
     kind = "an orbit with impacts" if followed.ends else f"a physical orbit P({impacts or 1},{periods})"
+    tried = f" near {starts} trains of impacts at each" if (impacts or 1) > 1 else ""
+    without = (
+        f"The scene refuses {counted(len(refused), 'value')} of these: {refused[0].message} "
+        if refused
+        else ""
+    )
     raise OrbitError(
         message(
             f"follow: expected {kind} at one of {SEEDS} values of "
-            f"{followed.parameter} from {settings.lowest:g} to {settings.highest:g}, got none. ",
+            f"{parameter} from {settings.lowest:g} to {settings.highest:g}, got none{tried}. {without}",
             where_runs_end(ends, (impacts or 1, periods)),
         )
     )
+
+
+def _refusals(scene: Scene, parameter: str, values: Sequence[float]) -> list[VibroimpactError]:
+    """Return the first problem of the scene at each value that its rules refuse."""
+    found: list[VibroimpactError] = []
+    for value in values:
+        try:
+            impacting_body(scene.with_values({parameter: value}), all_kinds=True)
+        except SceneError as problem:
+            found.append(SceneError(problem.problems[:1]))
+        except UsageError as problem:
+            found.append(problem)
+    return found
 
 
 def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:
@@ -238,6 +264,8 @@ def _departed(
             if is_doubling and not doublings:
                 continue
             found = departures(follower, point)
+            if point.kind == BRANCH_POINT:
+                result.crossings[point] = found[0].cause
             if is_graze:
                 result.meetings.append(Meeting(parent, point, found))
                 longest = FOLLOWED_TURNS * point.at.orbit.periods if grazes else 0

@@ -69,12 +69,15 @@ def seed_text(orbit: PeriodicOrbit) -> str:
     return ",".join(f"{phase:.12g}:{stop}" for phase, stop in impacts)
 
 
-def edge_values(tracks: list[Track], axes: tuple[int, int]) -> dict[str, Any]:
-    """Return the variables of `EDGE_ROWS`; `axes` are the plane's displacement and velocity among the variables."""
+def edge_values(tracks: list[Track], axes: tuple[int, int], unit: float) -> dict[str, Any]:
+    """Return the variables of `EDGE_ROWS`; `axes` are the plane's displacement and velocity among the variables.
+
+    `unit` is the displacement for a unit of these variables.
+    """
     most = max([_periods(each) for each in tracks], default=1)
     points = np.full((len(tracks), most, 2), np.nan)
     for place, each in enumerate(tracks):
-        points[place, : _periods(each)] = each.states[-_periods(each) :, list(axes)]
+        points[place, : _periods(each)] = unit * each.states[-_periods(each) :, list(axes)]
     orbits = [each.orbit for each in tracks]
     none = np.full(SHOWN, np.nan)
     return {

@@ -9,14 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits import PeriodicOrbit
-from vibroimpact.analysis.orbits.classify import RunClass, class_of
+from vibroimpact.analysis.orbits.classify import RunClass
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, Either, Message, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.find import long_runs, orbit_of_impacts
+from vibroimpact.orchestrator.orbits.find import class_of_record, end_in_words, long_runs, orbit_of_impacts
 from vibroimpact.orchestrator.run.runner import next_start
 from vibroimpact.orchestrator.scene import Scene
 
@@ -46,7 +45,7 @@ class RunEnd:
         """P(p,q) of its orbit, or its class in words."""
         if self.orbit is not None:
             return self.orbit.name
-        return "a motion of unknown class" if self.kind.kind is OrbitClass.unknown else self.kind.name
+        return end_in_words(self.kind)
 
 
 def ends_of_runs(
@@ -72,16 +71,11 @@ def ends_of_runs(
             yield RunEnd(value, class_of_record(record), orbit_of_impacts(body, record.impacts))
 
 
-def class_of_record(record: RunRecord) -> RunClass:
-    """Return the class of a run that recorded its extrema and strobes."""
-    if record.periods is None:
-        return RunClass(OrbitClass.unknown, reason=f"the run ended by {Outcome(record.outcome).name}")
-    sticks = record.sticks is not None and len(record.sticks) > 0
-    return class_of(record.periods[:, :4], record.periods[:, 4], Outcome(record.outcome), sticks)
-
-
 def where_runs_end(ends: Sequence[RunEnd], sought: tuple[int, int]) -> str:
-    """Return advice for a range without orbits of some impacts and periods: the motions on which runs end there."""
+    """Return advice for a range without orbits of some impacts and periods: the motions on which runs end there.
+
+    There is at least one end.
+    """
     counts = Counter(each.name for each in ends)
     orbits = Counter((each.orbit.phases.size, each.orbit.periods) for each in ends if each.orbit is not None)
     orbits.pop(sought, None)
@@ -90,9 +84,7 @@ def where_runs_end(ends: Sequence[RunEnd], sought: tuple[int, int]) -> str:
         runs = f"{count} of {len(ends)} runs over the range end on P({impacts},{periods}): "
         return message(runs, _asking(impacts, periods), ".")
     others = ", ".join(f"{name} ({count})" for name, count in counts.most_common())
-    return (
-        f"Runs over the range end on {others or 'nothing'}. Try another range, or other impacts and periods."
-    )
+    return f"Runs over the range end on {others}. Try another range, or other impacts and periods."
 
 
 def ends_in_words(ends: Sequence[RunEnd], followed: Callable[[RunEnd], bool]) -> list[str]:

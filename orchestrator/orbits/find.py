@@ -11,14 +11,16 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import IMPACT_COLUMNS, RunRecord
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, Outcome, RunRecord
 from vibroimpact.analysis.dataset.provenance import program_attributes
+from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branches import multiplier_text
+from vibroimpact.analysis.orbits.classify import RunClass, class_of
 from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
-from vibroimpact.analysis.orbits.search import each_orbit, fastest_first, same_orbit
+from vibroimpact.analysis.orbits.search import STARTS, each_orbit, fastest_first, same_orbit
 from vibroimpact.analysis.orbits.yielding_stops.motion import start_near
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
@@ -68,6 +70,7 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
 
     def __post_init__(self) -> None:
         self.scene = self.scene.unswept()
+        self._end = ""
 
     @classmethod
     def reads(cls, options: FindOrbits) -> Sequence[Path]:
@@ -92,8 +95,10 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
         impacts, periods = (1 if count is None else count for count in counts)
         yield from each_orbit(body, impacts, periods, penetrating=self.penetrating)
         self.found.sort(key=fastest_first)
-        reached = orbit_of_run(self.scene) if counts == (None, None) else None
-        if reached is not None and not any(same_orbit(reached, other) for other in self.found):
+        if counts != (None, None) and self._physical:
+            return
+        reached, self._end = end_of_run(self.scene)
+        if counts == (None, None) and reached and not any(same_orbit(reached, one) for one in self.found):
             yield reached
 
     @property
@@ -135,6 +140,8 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             wide_terminal().print(rows)
         many = counted(len(self._physical), "physical orbit")
         say(f"{many}." if self._physical else f"No physical orbit {self._called}.")
+        if self._end and not (self._physical and self._end in {orbit.name for orbit in self._physical}):
+            say(f"A long run of the scene ends on {self._end}.")
         drifts = [orbit.shift for orbit in self.found if orbit.body.drift is not None]
         if drifts:
             say(
@@ -152,7 +159,12 @@ class OrbitsOfScene(Study[PeriodicOrbit]):
             return "near to the seed"
         if self.impacts is None and self.periods is None:
             return "P(1,1), and none that a long run ends on"
-        return f"P({self.impacts or 1},{self.periods or 1})"
+        tried = (
+            ""
+            if self.impacts in (None, 1) or self.scene.period is None
+            else f" near {STARTS} trains of impacts"
+        )
+        return f"P({self.impacts or 1},{self.periods or 1}){tried}"
 
     def conclude(self, options: FindOrbits) -> None:
         """Say that no dataset was written."""
@@ -175,18 +187,16 @@ def find_orbits(
 def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
     if body.has_own_period:
         raise UsageError(
-            "orbit: seed: expected none of a body without a force, whose phases have no force to count from, got one. "
+            "seed: expected none of a body without a force, whose phases have no force to count from, got one. "
             "Give the number of impacts, or a start that leads to the orbit."
         )
     if impacts not in (None, len(seed)):
-        raise UsageError(
-            f"orbit: seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
-        )
+        raise UsageError(f"seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}.")
     for phase, stop in seed:
         if abs(phase) > LARGEST_PHASE:
-            raise UsageError(f"orbit: seed: expected phases up to {LARGEST_PHASE:g} rad, got {phase:g}.")
+            raise UsageError(f"seed: expected phases up to {LARGEST_PHASE:g} rad, got {phase:g}.")
         if not 1 <= stop <= len(body.contacts):
-            raise UsageError(f"orbit: seed: expected stops 1 to {len(body.contacts)}, got {stop}.")
+            raise UsageError(f"seed: expected stops 1 to {len(body.contacts)}, got {stop}.")
     phases, contacts = [phase for phase, _ in seed], [stop - 1 for _, stop in seed]
     orbit = find_orbit(body, phases, contacts, periods)
     if not (orbit.velocities > least_speed(body)).all():
@@ -216,10 +226,30 @@ def _long_record(scene: Scene) -> dict[str, float]:
     return dict(zip(names, (SETTLING_TURNS * turn, RECORDED_TURNS * turn), strict=True))
 
 
-def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
-    """Return the orbit on which a long run of a scene ends; None unless it has few periods."""
+def class_of_record(record: RunRecord) -> RunClass:
+    """Return the class of a run that recorded its extrema and strobes."""
+    if record.periods is None:
+        return RunClass(OrbitClass.unknown, reason=f"the run ended by {Outcome(record.outcome).name}")
+    sticks = record.sticks is not None and len(record.sticks) > 0
+    return class_of(record.periods[:, :4], record.periods[:, 4], Outcome(record.outcome), sticks)
+
+
+def end_of_run(scene: Scene) -> tuple[PeriodicOrbit | None, str]:
+    """Return the orbit on which a long run of a scene ends, None unless it has few periods, and the motion in words.
+
+    Words are empty where only impacts are recorded: without a force.
+    """
     with long_runs(scene) as record_of:
-        return orbit_of_impacts(impacting_body(scene, all_kinds=True), record_of({}, None).impacts)
+        record = record_of({}, None)
+    orbit = orbit_of_impacts(impacting_body(scene, all_kinds=True), record.impacts)
+    if orbit is not None:
+        return orbit, orbit.name
+    return None, "" if record.periods is None else end_in_words(class_of_record(record))
+
+
+def end_in_words(kind: RunClass) -> str:
+    """Return the class of a run for a sentence on where runs end."""
+    return "a motion of unknown class" if kind.kind is OrbitClass.unknown else kind.name
 
 
 def orbit_of_impacts(

@@ -198,7 +198,7 @@ class Following(Study[str]):
         for number, branch in enumerate(self.followed.branches, start=1):
             name = f"{number}  {branch.full_name}"
             for point in branch.points:
-                rows.add_row(name, *_cells(branch, point))
+                rows.add_row(name, *_cells(branch, point, self.followed.crossings.get(point, point.kind)))
             if not branch.points:
                 rows.add_row(name, "nothing", "", "", "")
         wide_terminal().print(rows)
@@ -276,8 +276,8 @@ def _stable_orbits(branch: Branch) -> str:
     return f"{sum(map(len, groups))} stable{f' ({shown})' if shown else ''}"
 
 
-def _cells(branch: Branch, point: SpecialPoint) -> tuple[str, str, str, str]:
-    """Return kind and value of a special point, and velocities and multipliers of its orbit, as texts.
+def _cells(branch: Branch, point: SpecialPoint, kind: str) -> tuple[str, str, str, str]:
+    """Return the kind in words and the value of a special point, velocities and multipliers of its orbit, as texts.
 
     At a corner the largest multiplier of either side is shown.
     """
@@ -290,7 +290,7 @@ def _cells(branch: Branch, point: SpecialPoint) -> tuple[str, str, str, str]:
         largest = " to ".join(map(multiplier_text, sides))
     speeds = ", ".join(f"{speed:.8g}" if speed > 1e-12 else "0" for speed in orbit.velocities)
     digits = UNEXPLAINED_DIGITS if point.kind == STABILITY_CHANGE else EXACT_DIGITS
-    return point.kind, f"{point.at.value:.{digits}g}", speeds, largest
+    return kind, f"{point.at.value:.{digits}g}", speeds, largest
 
 
 def _second_range(options: Follow) -> tuple[float, float] | None:

@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.orbits.further_sines import FurtherSines
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import StructureBody
+from vibroimpact.orchestrator.scene.body_models.structure import BodyAlone
 
 POINTS = 200
 """Default number of starts along each axis."""
@@ -69,7 +70,7 @@ class Plane:
 
 def axes_of(scene: Scene, number: int | None) -> tuple[int, int]:
     """Return the indices of the plane's displacement and velocity among the start values."""
-    if not scene.body.IS_STRUCTURE:
+    if not scene.body.IS_STRUCTURE or _is_lone_mass(scene):
         if number not in (None, 1):
             raise UsageError(f"basins: number: expected 1, an oscillator's only mass, got {number}.")
         return 0, 1
@@ -80,22 +81,37 @@ def axes_of(scene: Scene, number: int | None) -> tuple[int, int]:
     return chosen - 1, size + chosen - 1
 
 
+def _is_lone_mass(scene: Scene) -> bool:
+    """Tell whether the body is an oscillator that starts in its mode, as one under several forces does."""
+    alone = scene.body
+    return isinstance(alone, BodyAlone) and alone.body.ELEMENT == "mass" and alone.body.size == 1
+
+
+def mass_displacement(scene: Scene, body: ImpactingBody) -> float:
+    """Return the displacement of the plane's mass for a unit of its start value; 1 unless an oscillator has modes."""
+    if not _is_lone_mass(scene):
+        return 1.0
+    return float(modal_displacements(scene, np.ones((1, 1)))[0, 0] * body.contacts[0].shape[0])
+
+
 def _first_hit(scene: Scene) -> int:
     """Return the mass that a chain's first stop hits; for a beam 1, its first mode."""
     return integer_parameters(scene).get("contact[1].mass_number", 1)
 
 
-def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[Floats, Floats, Floats]:
+def start_states(
+    scene: Scene, plane: Plane, spans: tuple[Span, Span], unit: float
+) -> tuple[Floats, Floats, Floats]:
     """Return displacements, velocities and the start states of a plane, shape (y * x, variable).
 
-    Phases of sines without a common period are the last variables.
+    `unit` is that of `mass_displacement`. Phases of sines without a common period are the last variables.
     """
     numbers, sines = float_parameters(scene, None), FurtherSines.of(scene)
     own = np.array([numbers.get(name, 0.0) for name in (*scene.body.start_names, *sines.names)])
     across, along = axes_of(scene, plane.number)
     x, y = (np.linspace(*span, count) for span, count in zip(spans, plane.points, strict=True))
     states = np.repeat(own[None], x.size * y.size, axis=0)
-    states[:, across], states[:, along] = np.tile(x, y.size), np.repeat(y, x.size)
+    states[:, across], states[:, along] = np.tile(x, y.size) / unit, np.repeat(y, x.size) / unit
     return x, y, states
 
 
@@ -112,7 +128,7 @@ def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarra
 def spans_of(
     scene: Scene, body: ImpactingBody, plane: Plane
 ) -> tuple[tuple[Span, Span], tuple[float, float]]:
-    """Return the ends of both axes, and the size of the scene's own motion."""
+    """Return the ends of both axes, and displacement and velocity of the scene's own motion as start values."""
     flow = BodyFlow(scene, workers=1)
     try:
         numbers = float_parameters(scene, None)
@@ -126,9 +142,10 @@ def spans_of(
     table = np.nan_to_num(np.abs(np.array([own[0], *seen])))
     size = max(float(table[:, :half].max()), body.scale / float(np.abs(body.contacts[0].shape).max()) * 1e-3)
     speed = max(float(table[:, half : 2 * half].max()), size * body.angular_frequency)
-    x = plane.x or (-REACH * size, REACH * size)
-    y = plane.y or (-REACH * speed, REACH * speed)
-    if plane.x is None and not scene.body.IS_STRUCTURE:
+    unit = abs(mass_displacement(scene, body))
+    x = plane.x or (-REACH * size * unit, REACH * size * unit)
+    y = plane.y or (-REACH * speed * unit, REACH * speed * unit)
+    if plane.x is None and (_is_lone_mass(scene) or not scene.body.IS_STRUCTURE):
         # a plane beyond the stops has no starts
         for contact in body.contacts:
             stop = contact.stop_at(body.phase)
@@ -160,7 +177,7 @@ def _free_span(scene: Scene, body: ImpactingBody, own: Floats, across: int, span
 
 def element_of(scene: Scene, number: int | None) -> str:
     """Return ` of mass 2` and the like, for names of variables; empty for an oscillator."""
-    if not scene.body.IS_STRUCTURE:
+    if not scene.body.IS_STRUCTURE or _is_lone_mass(scene):
         return ""
     place = axes_of(scene, number)[0] + 1
     return f" of {scene.body.ELEMENT} {place}"

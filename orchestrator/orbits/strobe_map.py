@@ -24,8 +24,7 @@ from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
-from vibroimpact.orchestrator.orbits.ends_of_runs import class_of_record
-from vibroimpact.orchestrator.orbits.find import long_runs
+from vibroimpact.orchestrator.orbits.find import class_of_record, long_runs
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene
 

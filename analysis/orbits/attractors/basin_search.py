@@ -70,6 +70,8 @@ MOST_PROBED = 32
 """Largest number of states of an attractor around which probe starts begin."""
 STEP = 1e-8
 """Step of the differences that give the multipliers of an attractor, over the size of the motion."""
+LEAST_MULTIPLIER = 1e-7
+"""Multiplier over all periods of an attractor below which it counts as 0: differences of STEP have this rounding."""
 SAME = 1e-5
 """Distance, over the size of the motion, below which two attractors are equal."""
 
@@ -292,7 +294,7 @@ class _Search(OnTheirWay):
         apart = np.maximum(ends.well[:size].astype(float) + ends.well[size : 2 * size], 1.0) * steps
         jacobian = (there[:size] - there[size : 2 * size]) / apart[:, None]
         largest = float(np.abs(np.linalg.eigvals(jacobian)).max()) if np.isfinite(jacobian).all() else 1.0
-        return -np.log(largest) / len(states) if largest > 0.0 else np.inf
+        return -np.log(largest) / len(states) if largest > LEAST_MULTIPLIER else np.inf
 
     def _tried(self, states: Floats, decay: float) -> float:
         """Return a distance from which all probe starts come back; 0 where none is large enough."""

@@ -250,6 +250,34 @@ def test_starts_of_a_weakly_damped_body_run_until_their_slowest_motion_has_decay
         assert int(run.impact_count) == 0
 
 
+@pytest.mark.parametrize(("path", "multiplier"), [("chatter", 0.0), ("thesis/figure_6_5a", None)])
+def test_a_motion_that_rests_on_a_stop_in_each_period_has_infinitely_many_impacts(
+    path: str, multiplier: float | None
+) -> None:
+    of = scene(EXAMPLES / f"{path}.toml")
+    found = vi.basins(of, points=(3, 3))
+    assert found.attractor_name.values.tolist() == ["P(inf,1)"]
+    assert vi.classify(vi.run(of.with_values(LONG)))[0].name == "P(inf,1)"
+    if multiplier is not None:  # one mode forgets all where it rests
+        assert float(found.attractor_multiplier[0]) == multiplier
+
+
+def test_a_ball_that_locks_on_its_table_is_apart_from_its_orbit() -> None:
+    table = {
+        "body": {"mass": 1.0, "stiffness": 0.0, "displacement_start": -0.5},
+        "exciter": {"gain": 1.0, "offset": 1.0},
+        "forcing": {"amplitude": 1.52, "angular_frequency": 1.0},
+        "stop": [{"position": 0.0, "restitution": 0.5}],
+        "record": {"recorded_periods": 4},
+    }
+    found = vi.basins(table, (-1.2, -0.1), (1.5, 3.0), (8, 8), edges=True)
+    assert set(found.attractor_name.values) == {"P(inf,1)", "P(4,2)"}
+    multipliers = dict(zip(found.attractor_name.values, found.attractor_multiplier.values, strict=True))
+    assert multipliers["P(inf,1)"] == 0.0, "differences of rounding size are no multiplier"
+    assert multipliers["P(4,2)"] ** 2 == pytest.approx(0.475823, abs=1e-5)
+    assert found.edge_orbit.values.tolist() == ["P(2,1)"]
+
+
 def test_a_budget_that_is_too_small_is_printed_and_kept(tmp_path: Path) -> None:
     file = tmp_path / "b.nc"
     sizes = ["--set", "body.damping_ratio=0.001", "--points", "8", "--periods", "200", "-o", str(file)]

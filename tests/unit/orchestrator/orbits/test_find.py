@@ -29,10 +29,10 @@ SCENE = ROOT / "examples" / "bifurcation.toml"
         ),
         (["--seed", ""], "--seed: expected phases in rad"),
         (["--seed", "nan"], "phases: expected ascending ones within 1 turns"),
-        (["--seed", "2.6:3"], "orbit: seed: expected stops 1 to 1, got 3."),
-        (["--seed", "2.6:0"], "orbit: seed: expected stops 1 to 1, got 0."),
-        (["--seed", "0.9,7.2", "--impacts", "3"], "orbit: seed: expected 3 impacts"),
-        (["--seed", "1e308"], "orbit: seed: expected phases up to 1e+06 rad, got 1e+308."),
+        (["--seed", "2.6:3"], "seed: expected stops 1 to 1, got 3."),
+        (["--seed", "2.6:0"], "seed: expected stops 1 to 1, got 0."),
+        (["--seed", "0.9,7.2", "--impacts", "3"], "seed: expected 3 impacts"),
+        (["--seed", "1e308"], "seed: expected phases up to 1e+06 rad, got 1e+308."),
         (["--seed", "3,2"], "phases: expected ascending ones within 1 turns"),
         (["-o", "orbits.png"], "orbits.png"),
     ],
@@ -60,7 +60,18 @@ def test_orbits_are_told_and_drawn(tmp_path: Path) -> None:
         assert said in done.stdout
     assert figure.is_file()
     done = in_this_process("orbit", SCENE, *AT, "--impacts", "3", "--periods", "1")
-    assert (done.returncode, "No physical orbit P(3,1)." in done.stdout) == (0, True)
+    assert done.returncode == 0
+    assert "No physical orbit P(3,1) near 256 trains of impacts.\n" in done.stdout
+    assert "A long run of the scene ends on no impacts.\n" in done.stdout
+
+
+def test_a_motion_that_is_no_orbit_on_which_a_run_ends_is_named() -> None:
+    far = ["--set", "sweep={}", "--set", "stop[1].position=3.0", "--set", "forcing.angular_frequency=3.0"]
+    done = in_this_process("orbit", SCENE, *far)
+    assert "No physical orbit P(1,1), and none that a long run ends on.\n" in done.stdout
+    assert "A long run of the scene ends on no impacts.\n" in done.stdout
+    done = in_this_process("orbit", SCENE, "--set", "sweep={}", "--set", "forcing.angular_frequency=0.72")
+    assert "A long run of the scene ends on chaos.\n" in done.stdout
 
 
 def test_unstable_orbits_of_two_impacts_are_found_and_the_run_ends_on_the_stable_one() -> None:
@@ -142,7 +153,7 @@ def test_the_orbit_of_a_run_is_found_from_its_impacts(tmp_path: Path) -> None:
     )
     np.testing.assert_allclose(orbit.phases, [phase for phase, _ in near.impacts], rtol=0.0, atol=1e-12)
     done = in_this_process("orbit", SCENE, "--from-dataset", file, "--run", "1")
-    assert (done.returncode, done.stderr) == (2, "orbit: seed: expected stops 1 to 1, got 2.\n")
+    assert (done.returncode, done.stderr) == (2, "seed: expected stops 1 to 1, got 2.\n")
 
 
 @pytest.mark.parametrize(

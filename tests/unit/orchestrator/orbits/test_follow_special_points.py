@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,7 @@ def test_a_loss_of_symmetry_is_a_branch_point_at_which_both_broken_branches_begi
     ):
         assert said in out
     assert "no cause was found" not in out
+    assert re.search(r"2  P\(2,1\), 1 at stop 1, 1 at stop 2 +pitchfork +0\.97282429546 ", out)
     with vi.open_dataset(output) as written:
         runs = written.vibroimpact.runs
         branch, value = runs["orbit_branch"].values, runs["angular_frequency"].values
@@ -75,6 +77,29 @@ def test_a_loss_of_symmetry_is_a_branch_point_at_which_both_broken_branches_begi
         assert one["orbit_multiplier_real"].values[1:] == pytest.approx(
             other["orbit_multiplier_real"].values[1:], rel=1e-6
         )
+
+
+def test_a_motion_that_touches_both_stops_meets_orbits_at_one_stop_and_at_both(tmp_path: Path) -> None:
+    path = tmp_path / "two.toml"
+    path.write_text(SYMMETRIC, encoding="utf-8")
+    span = [
+        "--parameter",
+        PARAMETER,
+        "--from",
+        "0.708",
+        "--to",
+        "0.711",
+        "--impacts",
+        "1",
+        "--doublings",
+        "0",
+    ]
+    code, out, err = in_this_process(["follow", str(path), *span, "--step", "0.1"])
+    assert (code, err) == (0, "")
+    higher = "P(2,1), 1 at stop 1, 1 at stop 2, P(3,2), 2 at stop 1, 1 at stop 2 (unstable at higher values)"
+    lower = "P(1,2) at stop 1, P(2,2), 1 at stop 1, 1 at stop 2 (unstable at lower values)"
+    meets = "its graze at 0.70938784829 meets motion without impacts"
+    assert f"1  P(1,1) at stop 1: {meets}; {higher}; {lower}." in out
 
 
 def test_equal_orbits_at_two_stops_are_told_apart_as_mirror_images() -> None:

@@ -118,5 +118,20 @@ def test_the_orbits_on_which_runs_end_are_followed_unless_others_are_wanted(tmp_
     assert "50 runs over the range, up and down, end on P(2,1) (50)." in out
     assert "Index sums over 1 and 2 periods are 1 in 1 of 1 range between special points." in out
     code, _, err = in_this_process([*command, "--impacts", "1"])
-    assert code == 1
+    assert code == 2
     assert err.endswith("50 of 50 runs over the range end on P(2,1): --impacts 2 --periods 1.\n")
+
+
+def test_a_range_without_orbits_says_how_many_starts_were_tried_and_which_values_the_scene_refuses() -> None:
+    scene = vi.Scene.from_dict(swept_scene(angular_frequency=1.1)).with_values({"forcing.amplitude": 0.01})
+    with pytest.raises(
+        OrbitError, match=r"got none near 2 trains of impacts at each\. Runs .* no impacts \(50\)"
+    ):
+        vi.follow(scene, PARAMETER, 1.0, 2.0, impacts=3, starts=2)
+    with pytest.raises(
+        OrbitError,
+        match=r"The scene refuses 12 values of these: .*restitution: expected 0 <= r <= 1, got 1\.0",
+    ):
+        vi.follow(scene, "stop[1].restitution", 0.5, 1.5)
+    with pytest.raises(SceneError, match=r"^.*restitution: expected 0 <= r <= 1, got 1\.21.*$"):
+        vi.follow(scene, "stop[1].restitution", 1.2, 1.5)

@@ -175,5 +175,5 @@ def test_what_has_no_map_is_one_line(arguments: list[str], said: str) -> None:
 
 def test_a_chain_has_no_sets_s_and_w() -> None:
     done = in_this_process("maps", str(CHAIN), "--kind", "discontinuity")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "maps: expected a body of one mode and one stop, got 2 and 1." in done.stderr

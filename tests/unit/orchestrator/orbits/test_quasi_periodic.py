@@ -11,8 +11,10 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits.classify import RunClass, classify
 from vibroimpact.analysis.orbits.rotation import rotation_of
+from vibroimpact.orchestrator.orbits.basins import BasinsOfScene
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
 from vibroimpact.orchestrator.orbits.further_sines import FurtherSines
+from vibroimpact.orchestrator.orbits.planes import Plane
 from vibroimpact.orchestrator.scene import Scene
 
 CHAIN: dict[str, Any] = {
@@ -114,6 +116,24 @@ def test_basins_under_two_frequencies_name_the_curves_on_which_starts_end() -> N
         [found[f"section_{what}"].values[place] for what in ("displacement", "velocity")]
     )
     assert rotation_of(section, RATIO) is not None, "the curve that is drawn"
+
+
+def test_planes_of_an_oscillator_under_several_forces_are_displacements_of_its_mass() -> None:
+    # four times the mass, spring and force is the same motion
+    heavy = {
+        **TWO,
+        "body": {"mass": 4.0, "stiffness": 4.0, "damping_ratio": 0.05},
+        "forcing": [{**force, "amplitude": 4.0 * force["amplitude"]} for force in TWO["forcing"]],
+    }
+    one, other = (BasinsOfScene(Scene.from_dict(each), Plane(points=(3, 3))) for each in (TWO, heavy))
+    assert other.x == pytest.approx(one.x)
+    assert other.y == pytest.approx(one.y)
+    assert one.x[-1] == pytest.approx(0.6), "the stop"
+    found = vi.basins(heavy, (-0.9, 0.9), (-1.0, 1.0), (3, 2))
+    assert found["displacement_start"].attrs["long_name"] == "displacement at the start"
+    assert (found["basin"].values[:, -1] == -2).all(), "0.9 is beyond the stop at 0.6"
+    drawn = found["section_displacement"].values[int(np.argmax(found["basin_fraction"].values))]
+    assert 0.55 < drawn.max() <= 0.6 + 1e-12
 
 
 def test_a_stop_that_moves_with_another_frequency_is_refused_by_basins() -> None:
