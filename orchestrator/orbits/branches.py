@@ -23,7 +23,12 @@ from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.messages import counted, message
-from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, refuse_outside, refuse_without_energy
+from vibroimpact.orchestrator.orbits.bodies import (
+    BodiesAlong,
+    impacting_body,
+    refuse_outside,
+    refuse_without_energy,
+)
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
 from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck
