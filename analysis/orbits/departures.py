@@ -127,7 +127,7 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
     if orbit.body.has_own_period and slow.all():
         return  # the motion vanishes
     fast = _impacts(orbit, ~slow)
-    touching = _impacts(orbit, slow) or _touching_maxima(orbit)
+    touching = _impacts(orbit, slow) or touching_maxima(orbit)
     found = [orbit]
     for turns in range(1, MOST_TURNS + 1):
         if turns * (len(fast) + len(touching)) > MOST_IMPACTS or turns * len(touching) > MOST_TOUCHES:
@@ -139,7 +139,7 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
             if not always and not chosen:
                 continue
             try:
-                other = _orbit_of(orbit, turns, always + chosen)
+                other = orbit_of_impacts(orbit, turns, always + chosen)
             except OrbitError:
                 continue  # contacts of such an orbit overlap
             images = [other, mirror_image(other)]
@@ -164,7 +164,7 @@ def _impacts(orbit: PeriodicOrbit, which: NDArray[np.bool_]) -> list[Impact]:
     ]
 
 
-def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
+def touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     """Return phase and contact of the maximum that touches a stop, and of its mirror image on a symmetric orbit."""
     _, phase, contact = orbit.highest
     contacts = mirrored_contacts(orbit.body)
@@ -173,7 +173,7 @@ def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     return [(phase, contact, 0.0), (phase + 0.5 * TURN * orbit.periods, int(contacts[contact]), 0.0)]
 
 
-def _orbit_of(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> PeriodicOrbit:
+def orbit_of_impacts(like: PeriodicOrbit, turns: int, impacts: list[Impact]) -> PeriodicOrbit:
     """Return the orbit of some turns of another one that has these impacts."""
     phases, hit, speeds = (np.array(each) for each in zip(*impacts, strict=True))
     body, periods, contacts = like.body, turns * like.periods, hit.astype(np.int32)
