@@ -13,13 +13,15 @@ from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.own_period import alternating_slopes
 from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated, tried
 from vibroimpact.analysis.orbits.sign_changes import turning
-from vibroimpact.analysis.orbits.symmetry import is_symmetric, mirrored_contacts
+from vibroimpact.analysis.orbits.symmetry import differences, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 GRAZE, BETWEEN = "graze", "graze between impacts"
 FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
 JUMP = 0.5
 """Change of the phase of the highest maximum, rad, above which it is another maximum."""
+NEARLY_SYMMETRIC = 0.1
+"""Distance of an orbit from its mirror image, rad, below which it is next to a symmetric orbit."""
 DOUBLE = 1e-4
 """Distance from 1 or -1 below which a multiplier is that double one: rounding moves double multipliers by its root."""
 
@@ -155,6 +157,23 @@ class LocusPoint:
     orbit: PeriodicOrbit
     tangent: Floats
     """Direction of the locus, shape (p + 2,)."""
+
+
+def within(place: int, lowest: float, highest: float) -> Callable[[LocusPoint], bool]:
+    """Return a function that tells whether a point lies in the range of its first (0) or second (1) parameter."""
+    return lambda point: lowest <= point.values[place] <= highest
+
+
+def beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
+    """Return a function that is 0 where the first (0) or second (1) parameter has a value."""
+    return lambda point: point.values[place] - bound
+
+
+def nearly_symmetric(orbit: PeriodicOrbit) -> bool:
+    """Tell whether an orbit is next to its mirror image."""
+    image = mirror_image(orbit)
+    apart = None if image is None else differences(orbit, image)
+    return apart is not None and bool(np.abs(apart).max() < NEARLY_SYMMETRIC)
 
 
 @dataclass(slots=True)

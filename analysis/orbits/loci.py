@@ -20,10 +20,13 @@ from vibroimpact.analysis.orbits.bifurcations import (
     Bifurcation,
     Locus,
     LocusPoint,
+    beyond,
     beyond_stop,
     is_other_maximum,
     joined_loci,
     meets_torus,
+    nearly_symmetric,
+    within,
 )
 from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.fold_extrema import kind_of_extremum
@@ -334,12 +337,13 @@ class LocusFollower:
                 if before == bound and not settings.lowest <= after <= settings.highest:
                     yield _Event(0.0, now, END_OF_RANGE)
                 elif (before - bound) * (after - bound) < 0.0:
-                    part, at = self._located(start, now, step, _beyond(place, bound)) or self._last(
-                        start, now, step, _within(place, settings)
+                    part, at = self._located(start, now, step, beyond(place, bound)) or self._last(
+                        start, now, step, within(place, settings.lowest, settings.highest)
                     )
                     if abs(at.values[place] - bound) < AT_BOUND * settings.span:
-                        values = (bound, at.values[1]) if place == 0 else (at.values[0], bound)
-                        at = replace(at, values=values)
+                        at = replace(
+                            at, values=(bound, at.values[1]) if place == 0 else (at.values[0], bound)
+                        )
                     yield _Event(part, at, END_OF_RANGE)
 
     def _grazes(
@@ -395,13 +399,15 @@ class LocusFollower:
             return None, []
         first, second = found.parameters * self._spans
         values = float(first), float(second)
-        beyond = [Bifurcation(GRAZE, orbit, values, impact) for orbit, impact in found.beyond]
-        return LocusPoint(values, found.at, at.tangent), beyond
+        others = [Bifurcation(GRAZE, orbit, values, impact) for orbit, impact in found.beyond]
+        return LocusPoint(values, found.at, at.tangent), others
 
     def _reason_for_end(self, locus: Locus, start: Bifurcation, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
         if locus.kind != BETWEEN:
-            return "cannot be followed further"
+            return (
+                f"cannot be followed further{': its orbits become symmetric' * nearly_symmetric(now.orbit)}"
+            )
         slowest = int(now.orbit.velocities.argmin())
         if len(locus.points) == 1 and grazes(now.orbit)[slowest]:
             return CORNER  # the locus begins there, and leaves in the other direction
@@ -409,12 +415,12 @@ class LocusFollower:
         if now.orbit.velocities[slowest] < SLOW * fastest and len(locus.points) > 1:
             faster = [each for each in locus.points if each.orbit.velocities.min() > SLOW * fastest]
             near = faster[-1] if faster else locus.points[0]
-            at, beyond = self._corner(start, self._without_speed(locus), slowest, near)
+            at, others = self._corner(start, self._without_speed(locus), slowest, near)
             if at is not None:
                 locus.special.append((GRAZE, at))
                 silent = int(at.orbit.velocities.argmin())
                 locus.starts.append(Bifurcation(GRAZE, at.orbit, at.values, silent))
-                locus.beyond += beyond
+                locus.beyond += others
                 return CORNER
         found = self._step(start, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
         if found is not None and is_other_maximum(now.orbit, found[0].orbit):
@@ -488,11 +494,3 @@ class LocusFollower:
             return None
         found = self._step(start, now, part)
         return None if found is None else (part, found[0])
-
-
-def _within(place: int, settings: FollowSettings) -> Callable[[LocusPoint], bool]:
-    return lambda point: settings.lowest <= point.values[place] <= settings.highest
-
-
-def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
-    return lambda point: point.values[place] - bound
