@@ -133,7 +133,8 @@ def follow(
         Each run is an orbit, with `orbit_branch`, `orbit_stable`, `orbit_special`, `orbit_index` and its largest
         multiplier. The attributes `first_orbits` and `index_sums` say where branches start and what is missing. With
         `second`, each run is an orbit at a bifurcation, if any was found. The attribute `curves` names where each
-        bifurcation curve begins; `not_looked_for` tells where curves were not searched.
+        bifurcation curve begins, `isolas` the closed branches; `not_looked_for` tells where curves were not searched.
+        Points of codimension 2 are on `curve_point`.
 
     Raises
     ------

@@ -62,6 +62,20 @@ class SpecialOrbit(IntEnum):
     impact_at_the_yield_velocity = 8
 
 
+class CurvePoint(IntEnum):
+    """Point of a curve of bifurcations over two numbers: the bifurcation that it meets, or an extremum of folds."""
+
+    fold = 1
+    period_doubling = 2
+    torus = 3
+    graze = 4
+    graze_between_impacts = 5
+    another_graze_between_impacts = 6
+    isola_centre = 7
+    crossing_of_branches = 8
+    cusp = 9
+
+
 class OrbitClass(IntEnum):
     """Class of the motion of a run, judged by its recorded periods."""
 
@@ -272,6 +286,14 @@ _RULES = (
         "sign of det(I - M) over its own periods; 0 where it is not defined",
         np.int8,
     ),
+    VariableRule(
+        "curve_point_curve", ("curve_point",), "1", "curve (orbit_branch) that the point is on", np.int32
+    ),
+    VariableRule(
+        "curve_point_kind", ("curve_point",), "1", "what happens there", np.int8, _flags(CurvePoint)
+    ),
+    VariableRule("curve_point_first", ("curve_point",), "1", "value of the first number there"),
+    VariableRule("curve_point_second", ("curve_point",), "1", "value of the second number there"),
     VariableRule("class_kind", ("run",), "1", "class of the motion", np.int8, _flags(OrbitClass)),
     VariableRule("class_impacts", ("run",), "1", "impacts of what repeats; -1: without number", np.int32),
     VariableRule(

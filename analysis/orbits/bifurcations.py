@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,15 @@ from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.own_period import alternating_slopes
 from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated, tried
 from vibroimpact.analysis.orbits.sign_changes import turning
+from vibroimpact.analysis.orbits.symmetry import differences, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 GRAZE, BETWEEN = "graze", "graze between impacts"
 FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
+JUMP = 0.5
+"""Change of the phase of the highest maximum, rad, above which it is another maximum."""
+NEARLY_SYMMETRIC = 0.1
+"""Distance of an orbit from its mirror image, rad, below which it is next to a symmetric orbit."""
 DOUBLE = 1e-4
 """Distance from 1 or -1 below which a multiplier is that double one: rounding moves double multipliers by its root."""
 
@@ -45,6 +51,33 @@ def alternating(orbit: PeriodicOrbit) -> float:
 def beyond_stop(orbit: PeriodicOrbit) -> float:
     """Return the distance of the highest maximum beyond its stop, over the size of the motion; at least -1."""
     return max(orbit.highest[0] / orbit.body.scale, -1.0) - TOUCHES
+
+
+def is_other_maximum(one: PeriodicOrbit, other: PeriodicOrbit, first: int = 0) -> bool:
+    """Tell whether the highest maxima of two orbits differ; the other orbit is counted from one of its impacts.
+
+    On a symmetric orbit a maximum and its mirror image are as high as each other, and count as one.
+    """
+    (_, at, contact), (_, at_other, contact_other) = one.highest, other.highest
+    whole = TURN * one.periods
+    moved = (at_other - other.phases[first]) - (at - one.phases[0])
+    apart = abs(np.mod(moved + 0.5 * whole, whole) - 0.5 * whole)
+    if contact == contact_other and apart <= JUMP:
+        return False
+    contacts = mirrored_contacts(one.body) if abs(apart - 0.5 * whole) <= JUMP else None
+    is_image = contacts is not None and contact >= 0 and contact_other == contacts[contact]
+    return not (is_image and is_symmetric(one))
+
+
+def partner(orbit: PeriodicOrbit, impact: int) -> int | None:
+    """Return the impact that is the mirror image of one of a symmetric orbit; None on another orbit."""
+    contacts = mirrored_contacts(orbit.body) if is_symmetric(orbit) else None
+    if contacts is None:
+        return None
+    turn = TURN * orbit.periods
+    apart = np.mod(orbit.phases - orbit.phases[impact], turn) - 0.5 * turn
+    apart[orbit.contacts != contacts[orbit.contacts[impact]]] = np.inf
+    return int(np.abs(apart).argmin())
 
 
 def meets_torus(multipliers: NDArray[np.complex128]) -> bool:
@@ -98,11 +131,20 @@ class Bifurcation:
             return beyond / orbit.body.scale if contact >= 0 else float(np.nan)
         return SMOOTH[self.kind](orbit)
 
+    @cached_property
+    def _image(self) -> int | None:
+        return partner(self.orbit, self.impact)
+
     def other_speeds(self, orbit: PeriodicOrbit) -> Floats:
-        """Return the speeds of the impacts of an orbit next to it; unbounded for the impact without speed."""
+        """Return the speeds of the impacts of an orbit next to it; unbounded for the impact without speed.
+
+        The mirror image of this impact, on a symmetric orbit, has no speed either.
+        """
         speeds = orbit.velocities.copy()
         if self.kind == GRAZE:
             speeds[self.impact] = np.inf
+            if self._image is not None:
+                speeds[self._image] = np.inf
         return speeds
 
 
@@ -117,6 +159,23 @@ class LocusPoint:
     """Direction of the locus, shape (p + 2,)."""
 
 
+def within(place: int, lowest: float, highest: float) -> Callable[[LocusPoint], bool]:
+    """Return a function that tells whether a point lies in the range of its first (0) or second (1) parameter."""
+    return lambda point: lowest <= point.values[place] <= highest
+
+
+def beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
+    """Return a function that is 0 where the first (0) or second (1) parameter has a value."""
+    return lambda point: point.values[place] - bound
+
+
+def nearly_symmetric(orbit: PeriodicOrbit) -> bool:
+    """Tell whether an orbit is next to its mirror image."""
+    image = mirror_image(orbit)
+    apart = None if image is None else differences(orbit, image)
+    return apart is not None and bool(np.abs(apart).max() < NEARLY_SYMMETRIC)
+
+
 @dataclass(slots=True)
 class Locus:
     """Locus of a bifurcation over two parameters.
@@ -128,8 +187,11 @@ class Locus:
     points : list of LocusPoint
     special : list of tuple of (str, LocusPoint)
         Points of codimension 2, each with the kind of the other bifurcation; `another`: a second graze between impacts.
+        Extrema of folds over the second parameter are `isola centre`, `crossing of branches` or `cusp`.
     starts : list of Bifurcation
         Bifurcations at which the loci begin that leave these points.
+    beyond : list of Bifurcation
+        Grazes of orbits with another number of impacts, whose loci leave its corners.
     ends : list of str
     origin : str
         Branch or locus, and its point, from which it starts.
@@ -139,6 +201,7 @@ class Locus:
     points: list[LocusPoint] = field(default_factory=list)
     special: list[tuple[str, LocusPoint]] = field(default_factory=list)
     starts: list[Bifurcation] = field(default_factory=list)
+    beyond: list[Bifurcation] = field(default_factory=list)
     ends: list[str] = field(default_factory=list)
     origin: str = ""
 
@@ -155,6 +218,7 @@ def joined_loci(backward: Locus, forward: Locus) -> Locus:
         backward.points[::-1] + forward.points[1:],
         backward.special[::-1] + forward.special,
         backward.starts[::-1] + forward.starts,
+        backward.beyond[::-1] + forward.beyond,
         backward.ends + forward.ends,
         backward.origin,
     )

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
-from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
+from vibroimpact.analysis.dataset.schema import CurvePoint, SpecialOrbit, UnitSystem, attributes_of, unit_in
 from vibroimpact.analysis.orbits.bifurcations import Locus
 from vibroimpact.analysis.orbits.branch import Branch, BranchOrbit, SpecialPoint
 from vibroimpact.analysis.orbits.index_sum import index
@@ -24,6 +24,10 @@ SAMPLES = 256
 
 MISSING_ORBITS = "missing_orbits"
 """Attribute with the ranges in which orbits are missing: a line with two values of the parameter for each."""
+_CURVE_POINTS = {str(each.name).replace("_", " "): each for each in CurvePoint} | {
+    "another": CurvePoint.another_graze_between_impacts
+}
+"""Flags of points of loci by their kinds."""
 
 
 def mirror_images(branches: Sequence[Branch]) -> dict[int, Branch]:
@@ -130,11 +134,12 @@ def dataset_of_loci(
     Returns
     -------
     xarray.Dataset
-        As `dataset_of_branches`; `orbit_special` is the bifurcation at each orbit, `orbit_branch` counts the loci.
+        As `dataset_of_branches`; `orbit_special` is the bifurcation at each orbit, `orbit_branch` counts the loci. The
+        points of codimension 2, and the extrema of folds over the second parameter, are on `curve_point`.
     """
     points = [each for locus in loci for each in locus.points]
     kinds = [SpecialOrbit[locus.kind.replace(" ", "_")] for locus in loci for _ in locus.points]
-    return _dataset(
+    found = _dataset(
         [each.orbit for each in points],
         [number for number, locus in enumerate(loci, start=1) for _ in locus.points],
         kinds,
@@ -143,6 +148,27 @@ def dataset_of_loci(
         units,
         attrs,
     )
+    return found.assign(_curve_points(loci, coordinates, unit_of, units))
+
+
+def _curve_points(
+    loci: Sequence[Locus], coordinates: tuple[str, str], unit_of: Mapping[str, str], units: UnitSystem
+) -> dict[str, xr.Variable]:
+    """Return the points of codimension 2 of loci as variables."""
+    met = [(number, *each) for number, locus in enumerate(loci, start=1) for each in locus.special]
+    columns: dict[str, NDArray[Any]] = {
+        "curve_point_curve": np.array([number for number, _, _ in met], dtype=np.int32),
+        "curve_point_kind": np.array([_CURVE_POINTS[kind] for _, kind, _ in met], dtype=np.int8),
+    }
+    for place, name in enumerate(("curve_point_first", "curve_point_second")):
+        columns[name] = np.array([point.values[place] for _, _, point in met], dtype=np.float64)
+    attributes = {name: attributes_of(name, units) for name in columns}
+    for name, coordinate in zip(list(columns)[2:], coordinates, strict=True):
+        attributes[name] |= {
+            "units": unit_in(units, unit_of[coordinate]),
+            "long_name": f"{coordinate} at the point",
+        }
+    return {name: xr.Variable("curve_point", column, attributes[name]) for name, column in columns.items()}
 
 
 def _dataset(

@@ -130,7 +130,7 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
     if orbit.body.has_own_period and slow.all():
         return  # the motion vanishes
     fast = _impacts(orbit, ~slow)
-    touching = _impacts(orbit, slow) or _touching_maxima(orbit)
+    touching = _impacts(orbit, slow) or touching_maxima(orbit)
     turn = orbit.periods
     if slow.all():
         turn, touching = 1, _in_one_period(orbit, touching)
@@ -145,7 +145,7 @@ def _grazing(follower: Follower, at: BranchOrbit) -> Iterator[Departure]:
             if not always and not chosen:
                 continue
             try:
-                other = _orbit_of(orbit, turns, turns * turn, always + chosen)
+                other = orbit_of_impacts(orbit, turns, turns * turn, always + chosen)
             except OrbitError:
                 continue  # contacts of such an orbit overlap
             images = [other, mirror_image(other)]
@@ -170,7 +170,7 @@ def _impacts(orbit: PeriodicOrbit, which: NDArray[np.bool_]) -> list[Impact]:
     ]
 
 
-def _touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
+def touching_maxima(orbit: PeriodicOrbit) -> list[Impact]:
     """Return phase and contact of the maximum that touches a stop, and of its mirror image on a symmetric orbit."""
     _, phase, contact = orbit.highest
     contacts = mirrored_contacts(orbit.body)
@@ -193,7 +193,7 @@ def _in_one_period(orbit: PeriodicOrbit, touching: list[Impact]) -> list[Impact]
     return found
 
 
-def _orbit_of(like: PeriodicOrbit, turns: int, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
+def orbit_of_impacts(like: PeriodicOrbit, turns: int, periods: int, impacts: list[Impact]) -> PeriodicOrbit:
     """Return the orbit of some turns of another one that has these impacts in its forcing periods."""
     phases, hit, speeds = (np.array(each) for each in zip(*impacts, strict=True))
     body, contacts = like.body, hit.astype(np.int32)

@@ -8,7 +8,7 @@ branch; steps of partial length narrow it down to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -401,7 +401,7 @@ class Follower:
             elif (now.value - bound) * (taken.value - bound) < 0.0:
                 found = self._located(now, step, bound)
                 if found is not None:
-                    yield found[0], END, found[1]
+                    yield found[0], END, replace(found[1], value=bound)
 
     def _branch_point(self, now: BranchOrbit, step: float) -> tuple[float, BranchOrbit] | None:
         """Return the place along a step where another branch crosses, and the orbit there: equations.md 4.13."""

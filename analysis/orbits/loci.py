@@ -7,8 +7,8 @@ changes its sign, too. Loci of the other kind leave them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,11 +20,16 @@ from vibroimpact.analysis.orbits.bifurcations import (
     Bifurcation,
     Locus,
     LocusPoint,
+    beyond,
     beyond_stop,
+    is_other_maximum,
     joined_loci,
     meets_torus,
+    nearly_symmetric,
+    within,
 )
 from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
+from vibroimpact.analysis.orbits.fold_extrema import kind_of_extremum
 from vibroimpact.analysis.orbits.following import (
     EASY_NEWTON,
     LOCATED,
@@ -33,16 +38,18 @@ from vibroimpact.analysis.orbits.following import (
     SHORTEST,
     FollowSettings,
 )
-from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, tried
+from vibroimpact.analysis.orbits.locus_corners import CORNER, TwoTouches, corner_of
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, grazes, tried
 from vibroimpact.analysis.orbits.sign_changes import turns_round
+from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
-JUMP = 0.5
-"""Change of the phase of the highest maximum, rad, above which it is another maximum."""
 CHANGE = 1e-6
 """Change of an unknown for derivatives by differences; their error costs a Newton step, but no digit."""
-SLOW = 1e-5
+SLOW = 1e-3
 """Speed of an impact, over the fastest, below which a locus of another kind ends at a graze."""
+BEFORE_GRAZE = 1e-9
+"""Distance of a maximum beyond its stop, over the motion, above which it touched before an impact lost its speed."""
 FOUND = 1e-13
 """Change of the unknowns below which they count as found."""
 ZERO = 1e-6
@@ -51,6 +58,8 @@ OFF_CHORD = 0.05
 """Distance from the line between two points of a locus, over their distance, below which an orbit is on the locus."""
 SAME_POINT = 1e-7
 """Distance from a locus, in ranges of the parameters and radians, below which an orbit is on it."""
+AT_BOUND = 1e-9
+"""Distance from an end of a range, over the range, below which a located point is at this end."""
 END_OF_RANGE = "end of the range"
 
 BodyAt2 = Callable[[float, float], ImpactingBody]
@@ -66,6 +75,7 @@ class _Event:
     """Reason why the locus ends there, if it does."""
     special: str = ""
     start: Bifurcation | None = None
+    beyond: Sequence[Bifurcation] = ()
 
 
 class LocusFollower:
@@ -130,6 +140,7 @@ class LocusFollower:
                     yield event.at
                 locus.special += [(event.special, event.at)] if event.special else []
                 locus.starts += [event.start] if event.start is not None else []
+                locus.beyond += event.beyond
                 if event.end:
                     locus.ends.append(event.end)
                     return
@@ -144,10 +155,29 @@ class LocusFollower:
         locus.ends.append(f"{self._ranges[0].most_orbits} orbits")
 
     def goes_through(self, locus: Locus, start: Bifurcation) -> bool:
-        """Tell whether a locus goes through a bifurcation, from whichever impact and period its orbit is counted."""
-        like, orbit = locus.points[0].orbit, start.orbit
+        """Tell whether a locus goes through a bifurcation or its mirror image."""
+        return len(self.places_on(locus, start)) > 0
+
+    def places_on(self, locus: Locus, start: Bifurcation) -> list[int]:
+        """Return the indices of the points of a locus after which a bifurcation, or its mirror image, lies on it.
+
+        The orbit may be counted from another impact and period.
+        """
+        image = mirror_image(start.orbit)
+        return sorted(
+            {
+                place
+                for each in (start.orbit, image)
+                if each is not None
+                for place in self._near(locus, start, each)
+            }
+        )
+
+    def _near(self, locus: Locus, start: Bifurcation, orbit: PeriodicOrbit) -> Iterator[int]:
+        """Yield the places of a locus next to an orbit that has the bifurcation."""
+        like = locus.points[0].orbit
         if (locus.kind, like.periods, like.phases.size) != (start.kind, orbit.periods, orbit.phases.size):
-            return False
+            return
         path = np.array([self._unknowns(each.orbit, each.values) for each in locus.points])
         steps = np.diff(path, axis=0)
         lengths = np.sqrt((steps**2).sum(axis=1))
@@ -159,13 +189,11 @@ class LocusFollower:
                 apart[:, :-2] -= TURN * np.round(apart[:, :1] / TURN)
             shares = -(apart[:-1] * steps).sum(axis=1) / np.maximum(lengths**2, np.finfo(np.float64).tiny)
             off = apart[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * steps
-            near = np.flatnonzero(np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths)
-            alike = start.kind != BETWEEN or any(
-                not _is_other_maximum(locus.points[each].orbit, orbit, first) for each in near
-            )
-            if near.size and alike:
-                return True
-        return False
+            near = np.flatnonzero(np.sqrt((off**2).sum(axis=1)) < SAME_POINT + OFF_CHORD * lengths).tolist()
+            if start.kind != BETWEEN or any(
+                not is_other_maximum(locus.points[each].orbit, orbit, first) for each in near
+            ):
+                yield from near
 
     # ---- equations ----
 
@@ -247,6 +275,7 @@ class LocusFollower:
         """Return the events of a step, in order, up to the end of the locus; the first point may be a zero itself."""
         events = [
             *self._other_kinds(start, now, taken, step, is_first=is_first),
+            *self._extremum(start, now, taken, step),
             *self._ends_of_range(start, now, taken, step),
             *self._grazes(start, now, taken, step, is_first=is_first),
         ]
@@ -276,6 +305,29 @@ class LocusFollower:
             is_last = start.kind == "torus" and not turns_round(taken.orbit.multipliers)
             yield _Event(part, at, kind if is_last else "", kind, Bifurcation(kind, at.orbit, at.values))
 
+    def _extremum(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float
+    ) -> Iterator[_Event]:
+        """Yield the extremum of the second parameter along a locus of folds."""
+        if start.kind != "fold" or not now.tangent[-1] * taken.tangent[-1] < 0.0:
+            return
+        found = self._located(start, now, step, lambda each: float(each.tangent[-1]))
+        if found is not None:
+            part, at = found
+            unknowns = self._unknowns(at.orbit, at.values)
+            kind = kind_of_extremum(
+                at.tangent, lambda each: self._matrix(at.orbit, each, unknowns[-1:]), unknowns[:-1]
+            )
+            yield _Event(part, at, special=kind)
+
+    def _matrix(self, orbit: PeriodicOrbit, unknowns: Floats, second: Floats) -> Floats:
+        """Return the derivatives of the errors by the unknowns of an orbit and the first parameter."""
+        columns = []
+        for axis in np.eye(unknowns.size) * CHANGE:
+            ends = [self._made(orbit, np.append(unknowns + side * axis, second))[1] for side in (1.0, -1.0)]
+            columns.append((ends[0] - ends[1]) / (2.0 * CHANGE))
+        return np.column_stack(columns)
+
     def _ends_of_range(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float
     ) -> Iterator[_Event]:
@@ -285,51 +337,97 @@ class LocusFollower:
                 if before == bound and not settings.lowest <= after <= settings.highest:
                     yield _Event(0.0, now, END_OF_RANGE)
                 elif (before - bound) * (after - bound) < 0.0:
-                    found = self._located(start, now, step, _beyond(place, bound))
-                    yield _Event(step, taken, END_OF_RANGE) if found is None else _Event(*found, END_OF_RANGE)
+                    part, at = self._located(start, now, step, beyond(place, bound)) or self._last(
+                        start, now, step, within(place, settings.lowest, settings.highest)
+                    )
+                    if abs(at.values[place] - bound) < AT_BOUND * settings.span:
+                        at = replace(
+                            at, values=(bound, at.values[1]) if place == 0 else (at.values[0], bound)
+                        )
+                    yield _Event(part, at, END_OF_RANGE)
 
     def _grazes(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
     ) -> Iterator[_Event]:
         """Yield the graze of a step, after which the orbit is none: of an impact, or of a maximum between impacts."""
-        speeds = start.other_speeds(taken.orbit)
+        speeds, end = start.other_speeds(taken.orbit), CORNER if start.kind in (GRAZE, BETWEEN) else ""
         slowest = int(speeds.argmin())
         if speeds[slowest] <= 0.0:
             if is_first and abs(now.orbit.velocities[slowest]) < ZERO * abs(speeds[slowest]):
-                yield _Event(0.0, now, GRAZE)
+                yield _Event(0.0, now, end or GRAZE)
                 return
             part, at = self._last(start, now, step, lambda each: each.orbit.velocities[slowest] > 0.0)
-            yield _Event(part, at, GRAZE, GRAZE, Bifurcation(GRAZE, at.orbit, at.values, slowest))
+            if start.kind != BETWEEN and beyond_stop(at.orbit) > BEFORE_GRAZE:
+                yield self._touch(start, now, part)
+                return
+            other = Bifurcation(GRAZE, at.orbit, at.values, slowest)
+            yield _Event(part, at, end or GRAZE, GRAZE, other, self._met(start, at, slowest, now))
         elif start.kind == BETWEEN:
-            if _is_other_maximum(now.orbit, taken.orbit):
+            if is_other_maximum(now.orbit, taken.orbit):
                 part, at = self._last(
-                    start, now, step, lambda each: not _is_other_maximum(now.orbit, each.orbit)
+                    start, now, step, lambda each: not is_other_maximum(now.orbit, each.orbit)
                 )
                 other = Bifurcation(BETWEEN, taken.orbit, taken.values)
-                yield _Event(part, at, "another graze between impacts", "another", other)
+                yield _Event(part, at, CORNER, "another", other, self._met(start, at, taken.orbit, now))
         elif beyond_stop(taken.orbit) > 0.0:
             if is_first and abs(beyond_stop(now.orbit)) < ZERO * beyond_stop(taken.orbit):
-                yield _Event(0.0, now, BETWEEN)
+                yield _Event(0.0, now, end or BETWEEN)
                 return
-            found = self._located(start, now, step, lambda each: beyond_stop(each.orbit))
-            part, at = found or self._last(start, now, step, lambda each: beyond_stop(each.orbit) <= 0.0)
-            yield _Event(part, at, BETWEEN, BETWEEN, Bifurcation(BETWEEN, at.orbit, at.values))
+            yield self._touch(start, now, step)
+
+    def _touch(self, start: Bifurcation, now: LocusPoint, step: float) -> _Event:
+        """Return the event of a maximum that touches a stop, for a locus of other bifurcations."""
+        found = self._located(start, now, step, lambda each: beyond_stop(each.orbit))
+        part, at = found or self._last(start, now, step, lambda each: beyond_stop(each.orbit) <= 0.0)
+        other = Bifurcation(BETWEEN, at.orbit, at.values)
+        end = CORNER if start.kind == GRAZE else BETWEEN
+        return _Event(part, at, end, BETWEEN, other, self._met(start, at, at.orbit, now))
+
+    def _met(
+        self, start: Bifurcation, at: LocusPoint, other: int | PeriodicOrbit, near: LocusPoint
+    ) -> list[Bifurcation]:
+        """Return the grazes of other orbits that meet a locus of grazes at its corner."""
+        return self._corner(start, at, other, near)[1] if start.kind in (GRAZE, BETWEEN) else []
+
+    def _corner(
+        self, start: Bifurcation, at: LocusPoint, other: int | PeriodicOrbit, near: LocusPoint
+    ) -> tuple[LocusPoint | None, list[Bifurcation]]:
+        """Return the point of a locus at a corner, None if it is not found, and the grazes of other orbits there."""
+        touches = TwoTouches(start, at.orbit, other, near.orbit)
+        found = corner_of(touches, np.array(at.values) / self._spans, self._made, CHANGE)
+        if found is None:
+            return None, []
+        first, second = found.parameters * self._spans
+        values = float(first), float(second)
+        others = [Bifurcation(GRAZE, orbit, values, impact) for orbit, impact in found.beyond]
+        return LocusPoint(values, found.at, at.tangent), others
 
     def _reason_for_end(self, locus: Locus, start: Bifurcation, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
         if locus.kind != BETWEEN:
-            return "cannot be followed further"
+            return (
+                f"cannot be followed further{': its orbits become symmetric' * nearly_symmetric(now.orbit)}"
+            )
         slowest = int(now.orbit.velocities.argmin())
-        if now.orbit.velocities[slowest] / now.orbit.velocities.max() < SLOW:
-            at = self._without_speed(locus)
-            locus.special.append((GRAZE, at))
-            locus.starts.append(Bifurcation(GRAZE, at.orbit, at.values, slowest))
-            return GRAZE
+        if len(locus.points) == 1 and grazes(now.orbit)[slowest]:
+            return CORNER  # the locus begins there, and leaves in the other direction
+        fastest = max(float(each.orbit.velocities.max()) for each in locus.points)
+        if now.orbit.velocities[slowest] < SLOW * fastest and len(locus.points) > 1:
+            faster = [each for each in locus.points if each.orbit.velocities.min() > SLOW * fastest]
+            near = faster[-1] if faster else locus.points[0]
+            at, others = self._corner(start, self._without_speed(locus), slowest, near)
+            if at is not None:
+                locus.special.append((GRAZE, at))
+                silent = int(at.orbit.velocities.argmin())
+                locus.starts.append(Bifurcation(GRAZE, at.orbit, at.values, silent))
+                locus.beyond += others
+                return CORNER
         found = self._step(start, now, step, most_turn=0.5 * np.pi)  # beyond a corner of two maxima
-        if found is not None and _is_other_maximum(now.orbit, found[0].orbit):
+        if found is not None and is_other_maximum(now.orbit, found[0].orbit):
             locus.special.append(("another", now))
             locus.starts.append(Bifurcation(BETWEEN, found[0].orbit, found[0].values))
-            return "another graze between impacts"
+            locus.beyond += self._met(start, now, found[0].orbit, now)
+            return CORNER
         return "cannot be followed further"
 
     def _without_speed(self, locus: Locus) -> LocusPoint:
@@ -396,15 +494,3 @@ class LocusFollower:
             return None
         found = self._step(start, now, part)
         return None if found is None else (part, found[0])
-
-
-def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
-    return lambda point: point.values[place] - bound
-
-
-def _is_other_maximum(one: PeriodicOrbit, other: PeriodicOrbit, first: int = 0) -> bool:
-    """Tell whether the highest maxima of two orbits differ; the other orbit is counted from one of its impacts."""
-    (_, at, contact), (_, at_other, contact_other) = one.highest, other.highest
-    whole = TURN * one.periods
-    moved = (at_other - other.phases[first]) - (at - one.phases[0])
-    return contact != contact_other or abs(np.mod(moved + 0.5 * whole, whole) - 0.5 * whole) > JUMP

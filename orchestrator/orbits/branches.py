@@ -77,6 +77,8 @@ class Followed:
     """A sentence on the starts of the search for first orbits, and its finds."""
     check: IndexCheck | None = None
     """The self-check by index sums, where orbits of all kinds were looked for."""
+    leaving: set[int] = field(default_factory=set)
+    """Indices of the branches that begin at special points of others."""
     meetings: list[Meeting] = field(default_factory=list)
     """The grazes of these branches, with the orbits that meet there."""
     crossings: dict[SpecialPoint, str] = field(default_factory=dict)
@@ -145,12 +147,13 @@ def follow_branches(
     starts: int = STARTS,
     looking: Callable[[float], None] = lambda value: None,
     required: bool = True,
+    checked: bool = True,
 ) -> Followings:
     """Follow orbits P(p,q), and branches that begin at their special points; yield each orbit with its branch.
 
     Branches go into `followed`, also unfinished branches. `longest` is the largest step: the range of the parameter
     counts as 1, a radian of all phases as 1. For the other arguments see `vibroimpact.follow`. `looking` is called
-    with each value at which orbits of several impacts are searched.
+    with each value at which orbits of several impacts are searched. `checked`: index sums are evaluated.
 
     UsageError: the scene has no such orbits, or the parameter is no number of it. OrbitError: there is no orbit to
     begin with, and one is `required`.
@@ -168,7 +171,7 @@ def follow_branches(
     ):
         found += 1
         if not _is_known(followed.branches, orbit, value, settings):
-            yield from _both_ways(follower, orbit, value, followed)
+            yield from follow_orbit(follower, orbit, value, followed)
     if seed is None and (impacts or 1) > 1:
         followed.search = (
             f"The search at {SEEDS} values or more took {starts} trains of impacts at each and found "
@@ -176,15 +179,15 @@ def follow_branches(
         )
     if seed is None and impacts is None:
         followed.most_begun_impacts = MOST_BEGUN_IMPACTS
-    yield from _departed(follower, followed, doublings, grazes)
-    if seed is None and impacts is None and periods == 1 and scene.period is not None:
+    yield from follow_departures(follower, followed, doublings, grazes)
+    if seed is None and impacts is None and periods == 1 and scene.period is not None and checked:
         followed.check = IndexCheck(scene, parameter, settings, starts)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
     if required:
-        _refuse_nothing(followed, settings, impacts, periods, starts)
+        refuse_nothing(followed, settings, impacts, periods, starts)
 
 
-def _refuse_nothing(
+def refuse_nothing(
     followed: Followed, settings: FollowSettings, impacts: int | None, periods: int, starts: int
 ) -> None:
     """Raise OrbitError if there is no branch: what was tried, values without a scene, and where runs end."""
@@ -224,9 +227,11 @@ def _refusals(scene: Scene, parameter: str, values: Sequence[float]) -> list[Vib
     return found
 
 
-def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed) -> Followings:
-    """Follow an orbit both ways; an interruption keeps the orbits so far."""
-    origin = f"{orbit.full_name} at {value:g}"
+def follow_orbit(
+    follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed, origin: str = ""
+) -> Followings:
+    """Follow an orbit both ways; an interruption keeps the orbits so far. The origin may be given."""
+    origin = origin or f"{orbit.full_name} at {value:g}"
     ways = Branch(origin), Branch(origin)
     try:
         yield from follower.both_ways(*ways, orbit, value)
@@ -244,15 +249,15 @@ def _completed(
         begin = len(result.branches)
         for value, orbit in check.missing(result.branches):
             try:
-                yield from _both_ways(follower, orbit, value, result)
+                yield from follow_orbit(follower, orbit, value, result)
             except OrbitError:
                 continue  # no branch leads on from an orbit at rounding from its end
         if len(result.branches) == begin:
             return
-        yield from _departed(follower, result, doublings, grazes, begin)
+        yield from follow_departures(follower, result, doublings, grazes, begin)
 
 
-def _departed(
+def follow_departures(
     follower: Follower, result: Followed, doublings: int, grazes: int, begin: int = 0
 ) -> Followings:
     """Follow the branches that begin at the special points of others, from branch number `begin` on.
@@ -309,6 +314,8 @@ def _leaving(follower: Follower, departure: Departure, parent: Branch, result: F
             whole.points.sort(key=lambda point: point.place)
         elif not ways[0].orbits:
             result.branches.pop()
+            return
+        result.leaving.add(len(result.branches) - 1)
 
 
 def _bodies(scene: Scene, parameter: str, value: float) -> BodiesAlong:
@@ -334,6 +341,14 @@ def _refuse_without_energy(scene: Scene, body_at: BodiesAlong, values: Sequence[
             continue  # the scene has no body there, such as with a force of frequency 0
     if len(problems) == len(values):
         raise problems[0]
+
+
+def branch_with(
+    branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings
+) -> int | None:
+    """Return the index of the branch that an orbit or its mirror image is on; None without one."""
+    places = (place for place, each in enumerate(branches) if _is_known([each], orbit, value, settings))
+    return next(places, None)
 
 
 def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:

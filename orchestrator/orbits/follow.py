@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -16,6 +16,7 @@ import xarray as xr
 from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
 from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
+from vibroimpact.analysis.orbits.fold_extrema import EXTREMA
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, FollowSettings
 from vibroimpact.analysis.orbits.periodic import grazes
 from vibroimpact.analysis.orbits.search import STARTS
@@ -31,13 +32,16 @@ from vibroimpact.orchestrator.orbits.branches import (
     Followed,
     Meeting,
     follow_branches,
+    refuse_nothing,
 )
 from vibroimpact.orchestrator.orbits.loci import (
     COARSE,
     FollowedLoci,
     at_other_values,
+    find_isolas,
     follow_loci,
     refuse_second,
+    sheets_of,
 )
 from vibroimpact.orchestrator.orbits.seeds import Seed
 from vibroimpact.orchestrator.scene import Scene
@@ -108,20 +112,36 @@ class Following(Study[str]):
         first, *others = self._settings()
         for each in others:
             refuse_second(self.loci, each)
-        yield from self._branches(self.followed, self.step)
+        is_searched = self.seed is None and self.impacts in (None, 1)
+        yield from self._branches(self.followed, self.step, required=not (others and is_searched))
         for each in others:
             yield from self._loci(first, each, self.followed)
-            if self.seed is None and self.impacts in (None, 1):
-                for at_other_value in at_other_values(self.loci, each):
-                    yield from self._branches(at_other_value, max(self.step, COARSE), required=False)
-                    yield from self._loci(first, each, at_other_value)
+            if is_searched:
+                yield from self._over_second(first, each)
+        if self.is_empty:
+            refuse_nothing(self.followed, first, self.impacts, self.periods, self.starts)
+
+    def _over_second(self, first: FollowSettings, second: FollowSettings) -> Generator[str, None, None]:
+        """Follow the branches at further values of the second number, connect them, and follow their bifurcations."""
+        for followed in at_other_values(self.loci, second):
+            yield from self._branches(followed, max(self.step, COARSE), required=False)
+            yield from self._loci(first, second, followed)
+        coarse = replace(first, longest=max(self.step, COARSE))
+        sheets = sheets_of(self.loci, coarse, second, self.doublings, self.grazes)
+        yield from (branch.name for branch, _ in sheets.connect())
+        for _, followed in sheets.levels:
+            yield from self._loci(first, second, followed)
+        known = len(self.loci.levels)
+        yield from (branch.name for branch, _ in find_isolas(self.loci, sheets, first, second))
+        for followed in self.loci.levels[known:]:
+            yield from self._loci(first, second, followed)
 
     def _branches(
         self, followed: Followed, step: float, *, required: bool = True
     ) -> Generator[str, None, None]:
         orbits = follow_branches(
             *(followed, self.start, self.stop),
-            impacts=self.impacts if required else self.impacts or 1,
+            impacts=self.impacts,
             periods=self.periods,
             seed=self.seed,
             doublings=self.doublings,
@@ -130,6 +150,7 @@ class Following(Study[str]):
             starts=self.starts,
             looking=lambda value: self.status(f"{self.begins}, {self.parameter} {value:.6g}"),
             required=required,
+            checked=followed is self.followed,
         )
         for branch, orbit in orbits:
             if len(branch.orbits) % 20 == 1:
@@ -140,7 +161,7 @@ class Following(Study[str]):
     def _loci(
         self, first: FollowSettings, second: FollowSettings, followed: Followed
     ) -> Generator[str, None, None]:
-        for locus in follow_loci(self.loci, first, second, followed):
+        for locus in follow_loci(self.loci, first, second, followed, self.grazes):
             self.status(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")
             yield locus.kind
 
@@ -150,8 +171,8 @@ class Following(Study[str]):
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is no branch."""
-        return not self.followed.branches
+        """Whether there is no branch, and no curve over two numbers."""
+        return not self.followed.branches and not self.loci.loci
 
     def made(self) -> xr.Dataset:
         """Return the curves over two numbers if there are any, else the branches."""
@@ -207,10 +228,10 @@ class Following(Study[str]):
         images = mirror_images(self.followed.branches)
         for number, branch in enumerate(self.followed.branches, start=1):
             low, high = float(branch.values.min()), float(branch.values.max())
-            symmetry = "symmetric; " if branch.is_symmetric else ""
+            symmetry = "closed; " * branch.is_closed + "symmetric; " * branch.is_symmetric
             if number - 1 in images:
                 place = len(self.followed.branches) + 1 + list(images).index(number - 1)
-                symmetry = f"its mirror image is branch {place}, {images[number - 1].full_name}; "
+                symmetry = f"{symmetry}its mirror image is branch {place}, {images[number - 1].full_name}; "
             say(
                 f"{number}  {branch.full_name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
                 f"{_stable_orbits(branch)}; {symmetry}"
@@ -255,9 +276,10 @@ class Following(Study[str]):
                 f"{self.second} from {low[1]:.8g} to {high[1]:.8g}; ends: {', '.join(locus.ends)}."
             )
             for kind, point in locus.special:
-                say(
-                    f"   codimension 2, {locus.kind} and {kind}: {point.values[0]:.11g}, {point.values[1]:.11g}"
-                )
+                words = kind if kind in EXTREMA else f"codimension 2, {locus.kind} and {kind}"
+                say(f"   {words}: {point.values[0]:.11g}, {point.values[1]:.11g}")
+        for line in self.loci.isolas:
+            say(line)
 
 
 def _stable_orbits(branch: Branch) -> str:

@@ -14,13 +14,23 @@ from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci
 from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
-from vibroimpact.analysis.orbits.following import FollowSettings
+from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.messages import counted
 from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, impacting_body, refuse_outside
-from vibroimpact.orchestrator.orbits.branches import Followed
+from vibroimpact.orchestrator.orbits.branches import Followed, Followings, follow_orbit
+from vibroimpact.orchestrator.orbits.sheets import (
+    Apart,
+    Sheets,
+    apart_from,
+    apart_of,
+    fold_near,
+    isola_centres,
+)
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene.keys import coordinate_name
+from vibroimpact.orchestrator.study.preparing import with_modes
 
 SECOND_VALUES = 5
 """Number of further values of the second parameter, ends of its range included, at which branches are followed."""
@@ -42,6 +52,12 @@ class FollowedLoci:
     """Values of the second parameter at which branches were followed, the scene's own first."""
     not_begun: list[Bifurcation] = field(default_factory=list)
     """Bifurcations at which no curve could begin: the orbits next to them are not defined."""
+    levels: list[Followed] = field(default_factory=list)
+    """Branches at further values of the second number."""
+    apart: list[Apart] = field(default_factory=list)
+    """Isolas, and branches apart from those at the scene's own value."""
+    left_at_corners: int = 0
+    """Number of curves of other numbers of impacts that leave corners and are not followed."""
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -57,6 +73,7 @@ class FollowedLoci:
             | {
                 "second_parameter": self.second,
                 "curves": "\n".join(self.names),
+                "isolas": "\n".join(self.isolas),
                 "not_looked_for": self.left_out,
             },
         )
@@ -68,6 +85,24 @@ class FollowedLoci:
             f"{number}  {locus.kind} of {locus.points[0].orbit.full_name}; begun from {locus.origin}"
             for number, locus in enumerate(self.loci, start=1)
         ]
+
+    @property
+    def isolas(self) -> list[str]:
+        """A sentence on each isola, and on each branch apart from those at the scene's own value."""
+        return [self._in_words(each) for each in self.apart]
+
+    def _in_words(self, apart: Apart) -> str:
+        name = next(branch.full_name for _, branch in apart.branches)
+        values = ", ".join(dict.fromkeys(f"{value:.6g}" for value, _ in apart.branches))
+        ends = [each for _, branch in apart.branches for each in (branch.values.min(), branch.values.max())]
+        where = f"{name} at {self.second} = {values}, {self.followed.parameter} from {min(ends):.6g} to {max(ends):.6g}"
+        if not apart.is_isola:
+            own = f"{self.second} = {self.values[0]:.6g}"
+            return f"Branch that no branch at {own} is connected with: {where}."
+        at = [f"shrinks to a point at {_pair(each)}" for each in apart.births]
+        at += [f"meets another branch at {_pair(each)}" for each in apart.crossings]
+        more = "; ".join(at) or "no curve of folds has its birth or end in the range"
+        return f"Isola, a closed branch: {where}; {more}."
 
     @property
     def left_out(self) -> str:
@@ -82,37 +117,95 @@ class FollowedLoci:
         others = [point for point in points if point.kind not in FOLLOWED_KINDS]
         where = [f"{point.kind} at {point.at.value:.8g}" for point in others]
         where += [f"{each.kind} at {each.values[0]:.8g}, {each.values[1]:.8g}" for each in self.not_begun]
+        if self.left_at_corners:
+            where.append(f"{counted(self.left_at_corners, 'curve')} of other orbits at corners")
         if where:
             text += f" Not followed: {'; '.join(where)}."
         return text
 
 
 class _Start(NamedTuple):
-    """A bifurcation at which a curve can begin, and where it was found."""
+    """A bifurcation at which a curve can begin, where it was found, and the number of corners on the way to it."""
 
     at: Bifurcation
     origin: str
+    corners: int = 0
 
 
 def follow_loci(
-    result: FollowedLoci, first: FollowSettings, second: FollowSettings, followed: Followed | None = None
+    result: FollowedLoci,
+    first: FollowSettings,
+    second: FollowSettings,
+    followed: Followed | None = None,
+    corners: int = 0,
 ) -> Iterator[Locus]:
     """Follow the bifurcations of branches over a second parameter; yield each locus as it grows.
 
     Loci begin at the special points of the branches, and at points of codimension 2 of the loci themselves. A locus
     that is found again is left out. The branches are those of `result`, or of a scene with another value of the second
-    parameter. The settings have the ranges of both parameters. The loci go into `result`.
+    parameter. The settings have the ranges of both parameters. The loci go into `result`. Orbits with another number of
+    impacts are taken at up to `corners` corners in a row.
 
     UsageError: the second parameter is no number of the scene.
     """
     followed = followed or result.followed
-    scene, keys = followed.scene, (followed.parameter, result.second)
-    value = float(scene.value(result.second))
-    body_at = BodiesAlong(scene, dict(zip(keys, (0.5 * (first.lowest + first.highest), value), strict=True)))
-    result.values.append(value)
+    value = float(followed.scene.value(result.second))
+    if value not in result.values:
+        result.values.append(value)
     yield from _from_starts(
-        result, LocusFollower(body_at, first, second), _starts(followed.branches, value, result.second)
+        result,
+        LocusFollower(_bodies(followed, first, result.second), first, second),
+        _starts(followed.branches, value, result.second),
+        corners,
     )
+
+
+def _bodies(followed: Followed, first: FollowSettings, second: str) -> BodiesAlong:
+    """Return the bodies over both parameters."""
+    scene, middle = followed.scene, 0.5 * (first.lowest + first.highest)
+    return BodiesAlong(scene, {followed.parameter: middle, second: float(scene.value(second))})
+
+
+def sheets_of(
+    result: FollowedLoci, first: FollowSettings, second: FollowSettings, doublings: int, grazes: int
+) -> Sheets:
+    """Return the branches at all values of the second parameter, connected along the loci of `result`."""
+    levels = [(float(each.scene.value(result.second)), each) for each in (result.followed, *result.levels)]
+    levels.sort(key=lambda level: level[0])
+    bodies = _bodies(result.followed, first, result.second)
+    sheets = Sheets(bodies, first, result.second, levels, doublings, grazes)
+    sheets.connect_along(result.loci, LocusFollower(sheets.body_at, first, second))
+    return sheets
+
+
+def find_isolas(
+    result: FollowedLoci, sheets: Sheets, first: FollowSettings, second: FollowSettings
+) -> Followings:
+    """Put the branches that are apart from those at the scene's own value, and all isolas, into `result`.
+
+    An isola centre may belong to none of the isolas. The branch next to it is then followed from a fold of its curve,
+    and its orbits are yielded. Its value of the second parameter becomes another one of `result`.
+    """
+    follower = LocusFollower(sheets.body_at, first, second)
+    sheets.connect_along(result.loci, follower)
+    result.apart = apart_from(sheets, result.values[0], result.loci, follower)
+    for locus in list(result.loci):
+        for centre in isola_centres(locus):
+            if any(np.allclose(centre.values, each) for apart in result.apart for each in apart.births):
+                continue
+            at = fold_near(locus, centre)
+            level = Followed(
+                result.followed.scene.at({result.second: at.values[1]}), result.followed.parameter
+            )
+            along = Follower(lambda value, fixed=at.values[1]: sheets.body_at(value, fixed), first)  # type: ignore[misc]  # of a lambda with a default
+            passed = along.branch(at.orbit, at.values[0]).orbits
+            start = passed[len(passed) // 3]  # a branch that began at a fold would not report this fold
+            origin = f"an isola centre at {_pair(centre.values)}"
+            yield from follow_orbit(along, start.orbit, start.value, level, origin)
+            result.levels.append(level)
+            result.apart += [
+                apart_of([(at.values[1], branch)], result.loci, follower) for branch in level.branches
+            ]
 
 
 def at_other_values(result: FollowedLoci, second: FollowSettings) -> Iterator[Followed]:
@@ -121,12 +214,15 @@ def at_other_values(result: FollowedLoci, second: FollowSettings) -> Iterator[Fo
     for value in np.linspace(second.lowest, second.highest, SECOND_VALUES):
         if value in result.values:
             continue
-        other = scene.at({result.second: float(value)})
         try:
+            other = with_modes(
+                scene.unswept([parameter, result.second]).with_values({result.second: float(value)})
+            )
             impacting_body(other, all_kinds=True)
-        except UsageError:
+        except (UsageError, SceneError):
             continue  # such as a force of 0
-        yield Followed(other, parameter)
+        result.levels.append(Followed(other, parameter))
+        yield result.levels[-1]
 
 
 def _starts(branches: list[Branch], value: float, second: str) -> list[_Start]:
@@ -142,7 +238,9 @@ def _starts(branches: list[Branch], value: float, second: str) -> list[_Start]:
     ]
 
 
-def _from_starts(result: FollowedLoci, follower: LocusFollower, starts: list[_Start]) -> Iterator[Locus]:
+def _from_starts(
+    result: FollowedLoci, follower: LocusFollower, starts: list[_Start], corners: int
+) -> Iterator[Locus]:
     """Follow loci from starts, and from the points of codimension 2 on them, each locus once."""
     waiting = deque(starts)
     while waiting:
@@ -159,13 +257,30 @@ def _from_starts(result: FollowedLoci, follower: LocusFollower, starts: list[_St
                 found = joined_loci(*ways)
                 result.loci.append(found)
                 number = len(result.loci)
-                waiting += [_Start(each, _met(number, found.kind, each)) for each in found.starts]
+                waiting += [
+                    _Start(each, _met(number, found.kind, each), start.corners) for each in found.starts
+                ]
+                if start.corners < corners:
+                    waiting += [
+                        _Start(each, _at_corner(number, each), start.corners + 1) for each in found.beyond
+                    ]
+                else:
+                    result.left_at_corners += len(found.beyond)
 
 
 def _met(number: int, kind: str, at: Bifurcation) -> str:
     """Return where a locus meets a bifurcation, in words."""
     other = "another" if at.kind == kind else f"a {at.kind}"
     return f"curve {number}, where its {kind} is {other}, at {at.values[0]:.8g}, {at.values[1]:.8g}"
+
+
+def _at_corner(number: int, at: Bifurcation) -> str:
+    """Return the corner of a locus at which the graze of another orbit begins, in words."""
+    return f"the corner of curve {number} at {at.values[0]:.8g}, {at.values[1]:.8g}"
+
+
+def _pair(values: tuple[float, float]) -> str:
+    return f"{values[0]:.8g}, {values[1]:.8g}"
 
 
 def refuse_second(result: FollowedLoci, second: FollowSettings) -> None:

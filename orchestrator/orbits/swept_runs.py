@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset import read_flat
@@ -22,21 +23,28 @@ from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.run.progress import Progress
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, log_axis
 
 VALUES, VALUES_OF_TWO = 401, (121, 81)
 """Default numbers of values: of one parameter, and of each of two."""
 MOST_RUNS = 1_000_000
+EVEN = 1e-9
+"""Difference of the steps of an axis, over its range, up to which its values are evenly spaced."""
 CLASSIFIED_PERIODS, EXPONENT_PERIODS = 40, 400
 """Fewest recorded periods: chaos is told from 40, and 200 of its impacts, which exponents need, take some 400."""
 
 
 class Axis(NamedTuple):
-    """A varied number of a scene: its key, the ends of its range, and the number of values."""
+    """A varied number of a scene: its key, the ends of its range, and the number of values.
+
+    `listed` has the values, ascending, where they are not evenly spaced.
+    """
 
     key: str
     low: float
     high: float
     values: int
+    listed: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, key: str, start: float, stop: float, values: int) -> Axis:
@@ -102,10 +110,22 @@ def _axes_of_sweep(scene: Scene, values: int | None, second_values: int | None) 
     ]
     return _refused_if_many(
         [
-            Axis.of(axis.key, axis.lowest, axis.highest, count)
+            Axis.of(axis.key, axis.lowest, axis.highest, count)._replace(listed=_uneven(axis, count))
             for axis, count in zip(sweep, counts, strict=True)
         ]
     )
+
+
+def _uneven(axis: SweepAxis, count: int) -> tuple[float, ...]:
+    """Return the values of an axis that are not evenly spaced; with another number of them where ratios are equal."""
+    values = np.sort(axis.values)
+    if count < 3 or values.size < 3 or np.ptp(np.diff(values)) <= EVEN * np.ptp(values):
+        return ()
+    if count == values.size:
+        return tuple(values.tolist())
+    if values[0] * values[-1] > 0.0 and np.ptp(np.diff(np.log(np.abs(values)))) <= EVEN:
+        return tuple(log_axis(axis.key, float(values[0]), float(values[-1]), count, "independent").values)
+    return ()
 
 
 def _refused_if_many(axes: list[Axis]) -> list[Axis]:
@@ -180,7 +200,10 @@ class SweptRuns(Study[xr.Dataset]):
 def _swept(scene: Scene, axes: Sequence[Axis]) -> Scene:
     """Return a scene that sweeps one axis both ways, if it can carry states along it, or one or two from its start."""
     sweep: dict[str, dict[str, Any]] = {
-        axis.key: {"start": axis.low, "stop": axis.high, "points": axis.values} for axis in axes
+        axis.key: {"values": list(axis.listed)}
+        if axis.listed
+        else {"start": axis.low, "stop": axis.high, "points": axis.values}
+        for axis in axes
     }
     if len(axes) == 1:
         with suppress(SceneError):  # components, and numbers that change the modes of a structure

@@ -60,19 +60,19 @@ COMMANDS = {
     f"follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second forcing.amplitude --second-from 0.02 "
     "--second-to 0.8 --impacts 1 --doublings 0 --grazes 0 --figure figure_3_5a.png": Shown(
         ("fold: 0.66583281185, 0.56063456", "fold and graze: 0.49937460889, 0.752284281"),
-        (424, 222, 164, 111),
+        (424, 222, 166, 111),
         is_long=True,
     ),
     f'follow {BIFURCATION} {FREQUENCY} --from 0.4 --to 1.6 --second "stop[1].position" --second-from 0.5 '
     "--second-to 5.5 --impacts 1 --doublings 0 --grazes 0 --figure figure_3_5b.png": Shown(
         ("fold: 0.66583281185, 0.89184655", "fold: 0.49937460889, 0.66464235"),
-        (400, 219, 165, 131, 120),
+        (400, 219, 167, 131, 120),
         is_long=True,
     ),
     f"follow {BIFURCATION} --set forcing.amplitude=0.55 {FREQUENCY} --from 0.6 --to 0.75 --second forcing.amplitude "
     "--second-from 0.5 --second-to 0.65 --impacts 1 --doublings 0 --grazes 0 --figure figure_3_10.png": Shown(
         ("graze and period doubling: 0.66583281185, 0.56063456", "graze and fold: 0.66583281185, 0.56063456"),
-        (133, 81, 79),
+        (133, 82, 79),
         is_long=True,
     ),
     **{
@@ -115,6 +115,16 @@ COMMANDS = {
     "plot branches.nc --over sweep -o both.png": Shown((), (16_040, 9688, 313)),
     f"follow {BIFURCATION} {FREQUENCY} --from 0.3 --to 2.2 {SECOND} -o loci.nc --figure loci.png": Shown(
         ("0.99874921777, 0.0999062060", "0.66583281185, 0.56063456"), (424, 402, 212), is_long=True
+    ),
+    f"follow {BIFURCATION} {FREQUENCY} --from 0.5 --to 1.6 --second forcing.amplitude --second-from 0.5 "
+    "--second-to 0.65 --impacts 1 --doublings 0 --grazes 0 --figure isola.png": Shown(
+        (
+            "crossing of branches: 0.643768459",
+            "isola centre: 0.5870291457",
+            "P(1,1) at forcing.amplitude = 0.563125",
+            "shrinks to a point at 0.58702915, 0.55207595; meets another branch at 0.64376846, 0.57407286.",
+        ),
+        is_long=True,
     ),
     "plot loci.nc --over map -o loci_map.png": Shown((), (424, 424, 402), is_long=True),
     "classify campaign -o classes.nc --figure classes.png": Shown(("P(1,1)", "P(1,2)"), (6840, 5500)),

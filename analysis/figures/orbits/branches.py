@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from vibroimpact.analysis.dataset.schema import SpecialOrbit
+from vibroimpact.analysis.dataset.schema import CurvePoint, SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, axes_of, canvas, label, legend_outside, unit_symbol
 from vibroimpact.analysis.figures.sweep.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.sweep.classes import draw_classes
@@ -63,6 +64,13 @@ _MARKS = {
     SpecialOrbit.branch_point: "P",
     SpecialOrbit.impact_at_the_yield_velocity: "<",
 }
+_POINTS_OF_CURVES: tuple[tuple[str, str, tuple[CurvePoint, ...]], ...] = (
+    ("codimension 2", "o", tuple(each for each in CurvePoint if each < CurvePoint.isola_centre)),
+    ("isola centre", "*", (CurvePoint.isola_centre,)),
+    ("crossing of branches", "X", (CurvePoint.crossing_of_branches,)),
+    ("cusp", "^", (CurvePoint.cusp,)),
+)
+"""Name, mark and kinds of the points of curves."""
 
 
 def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None, variable: str | None = None) -> Figure:
@@ -142,6 +150,7 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         for axis in panels:
             axis.plot(runs[x].values[chosen], runs[y].values[chosen], label=shown, **style)
         labelled.add(words)
+    _mark_curve_points(panels, dataset, (x, y), labelled)
     if over is None:
         panels[0].margins(x=0.02)
     else:  # curves may extend beyond the map
@@ -151,6 +160,36 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
     else:
         legend_outside(figure, panels[0], ncols=3 if max(map(len, labelled), default=0) < _LONG else 2)
     return figure
+
+
+def _mark_curve_points(
+    panels: Sequence[Axes], dataset: xr.Dataset, names: tuple[str, str], labelled: set[str]
+) -> None:
+    """Mark the points at which curves of bifurcations meet, and the extrema of folds over the second number."""
+    if "curve_point_kind" not in dataset:
+        return
+    first = str(dataset.attrs.get("parameter", "")).split(".")[-1]
+    values = [dataset[f"curve_point_{which}"].values for which in ("first", "second")]
+    x, y = values if names[0] == first else values[::-1]
+    kinds = dataset["curve_point_kind"].values
+    for words, marker, members in _POINTS_OF_CURVES:
+        chosen = np.isin(kinds, members)
+        if not chosen.any():
+            continue
+        for axis in panels:
+            axis.plot(
+                x[chosen],
+                y[chosen],
+                linestyle="none",
+                marker=marker,
+                markersize=3.6,
+                markerfacecolor="white",
+                markeredgewidth=0.7,
+                color=MARK,
+                label=words,
+                zorder=3,
+            )
+        labelled.add(words)
 
 
 def _name_loci_beside_classes(figure: Figure, panel: Axes) -> None:

@@ -75,7 +75,8 @@ def test_every_variable_of_the_schema_is_stored_with_its_dimensions_type_units_a
     tmp_path: Path,
 ) -> None:
     with netCDF4.Dataset(written(everything(), tmp_path)) as file:
-        assert set(RULES) <= set(file.variables)
+        # curves of bifurcations have points without runs: tests/unit/orchestrator/orbits/test_isolas.py
+        assert {name for name, rule in RULES.items() if rule.dims != ("curve_point",)} <= set(file.variables)
         for name, variable in file.variables.items():
             assert variable.units
             assert variable.long_name

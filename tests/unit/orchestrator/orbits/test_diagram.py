@@ -234,3 +234,14 @@ def test_loci_lie_on_a_map_of_classes_over_two_numbers(
 def test_a_second_number_outside_its_range_moves_to_the_middle(scene: vi.Scene) -> None:
     study = Diagram(scene, *RANGE, second=POSITION, second_range=(2.0, 3.0))
     assert study.scene.value(POSITION) == 2.5
+
+
+@pytest.mark.parametrize(("values", "expected"), [(None, [0.9, 1.08, 1.296]), (5, None)])
+def test_values_of_a_sweep_with_equal_ratios_keep_them(
+    scene: vi.Scene, values: int | None, expected: list[float] | None
+) -> None:
+    swept = scene.with_sweep({FREQUENCY: {"start": 0.9, "stop": 1.296, "points": 3, "spacing": "log"}})
+    (axis,) = Diagram(swept, values=values, parts=["sweep"]).studies["sweep"].scene.sweep
+    ratios = np.divide(axis.values[1:], axis.values[:-1])
+    np.testing.assert_allclose(ratios, 1.2 if expected else 1.44**0.25, rtol=1e-12)
+    assert len(axis.values) == (values or 3)

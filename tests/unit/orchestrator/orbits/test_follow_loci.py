@@ -12,7 +12,6 @@ from support.places import ROOT
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.orbits.following import FollowSettings
-from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.loci import FollowedLoci, follow_loci
@@ -51,7 +50,7 @@ def test_grazes_between_impacts_over_two_numbers_are_those_of_single_followings(
 
 def curves_of_grazes_between_impacts(scene: vi.Scene, impacts: int) -> FollowedLoci:
     branches = whole(
-        Following(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, grazes=0, step=0.05)
+        Following(scene, PARAMETER, 0.4, 0.52, impacts=impacts, doublings=0, grazes=0, step=0.05, starts=64)
     ).followed
     for branch in branches.branches:
         branch.points = [point for point in branch.points if point.kind == "graze between impacts"][:1]
@@ -65,7 +64,6 @@ def test_two_maxima_that_touch_are_the_orbit_of_one_more_impact_that_has_no_spee
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("vibroimpact.orchestrator.orbits.first_orbits.SEEDS", 2)
-    monkeypatch.setitem(orbits_of.__kwdefaults__, "starts", 64)
     scene = vi.Scene.from_file(CHAIN).with_values({PARAMETER: 0.47})
     one = curves_of_grazes_between_impacts(scene.with_values({POSITION: 0.4}), 1)
     two = curves_of_grazes_between_impacts(scene, 2)

@@ -128,7 +128,9 @@ def test_a_range_without_orbits_says_how_many_starts_were_tried_and_which_values
         OrbitError, match=r"got none near 2 trains of impacts at each\. Runs .* no impacts \(50\)"
     ):
         vi.follow(scene, PARAMETER, 1.0, 2.0, impacts=3, starts=2)
-    with pytest.raises(OrbitError, match=r"The scene refuses 12 values of these: .*above the lower stop\[2\]"):
+    with pytest.raises(
+        OrbitError, match=r"The scene refuses 12 values of these: .*above the lower stop\[2\]"
+    ):
         vi.follow(scene.with_values({"forcing.amplitude": 1e-4}), "stop[1].position", -2.0, 2.1)
     with pytest.raises(SceneError, match=r"^.*above the lower stop\[2\].*$"):
         vi.follow(scene, "stop[1].position", -3.0, -2.0)

@@ -108,6 +108,7 @@ def test_the_curves_around_a_point_of_codimension_two_bound_the_regions_of_figur
         FREQUENCY,
         0.6,
         0.75,
+        impacts=1,
         doublings=0,
         grazes=0,
         step=0.03,
@@ -135,7 +136,13 @@ def test_the_curves_of_figure_3_5_bound_its_regions(
     second: str, name: str, bounds: tuple[float, float], body: Callable[..., ImpactingBody]
 ) -> None:
     loci = vi.follow(
-        SCENE, FREQUENCY, 0.3, 2.2, doublings=0, grazes=0, step=0.02, second=second, second_range=bounds
+        *(SCENE, FREQUENCY, 0.3, 2.2),
+        impacts=1,
+        doublings=0,
+        grazes=0,
+        step=0.02,
+        second=second,
+        second_range=bounds,
     )
     grid = np.linspace(0.301, 2.199, 90), np.linspace(bounds[0] + 0.003, bounds[1] - 0.003, 60)
     wrong, counts = unexplained(loci, ("angular_frequency", name), grid, body)
