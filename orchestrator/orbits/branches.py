@@ -312,10 +312,10 @@ def _leaving(follower: Follower, departure: Departure, parent: Branch, result: F
             place = len(ways[0].orbits) - 1
             whole.points.append(SpecialPoint(BRANCH_POINT, whole.orbits[place], place))
             whole.points.sort(key=lambda point: point.place)
-        elif not ways[0].orbits:
+        if result.branches[-1].orbits:
+            result.leaving.add(len(result.branches) - 1)
+        else:
             result.branches.pop()
-            return
-        result.leaving.add(len(result.branches) - 1)
 
 
 def _bodies(scene: Scene, parameter: str, value: float) -> BodiesAlong:
