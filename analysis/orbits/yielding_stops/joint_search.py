@@ -73,9 +73,7 @@ def _first(motion: YieldingMotion, contacts: Contacts, phases: Floats, periods: 
     raise problem
 
 
-def _nearer(
-    motion: YieldingMotion, contacts: Contacts, periods: int, now: _Trial, step: Floats
-) -> _Trial:
+def _nearer(motion: YieldingMotion, contacts: Contacts, periods: int, now: _Trial, step: Floats) -> _Trial:
     size = now.rough.start.size
     part = _part(step[size:], now.rough.phases, periods)
     weights = _weights(motion)
@@ -125,7 +123,10 @@ def _tried(motion: YieldingMotion, contacts: Contacts, periods: int, rough: Roug
     by_phases = np.einsum("ki,kij->kj", rows[:, own], moved[:count]) + np.diag(by_phase)
     slopes = np.block(
         [
-            [weights[:, None] * (by_start[count] - np.eye(weights.size)) / weights, weights[:, None] * moved[count]],
+            [
+                weights[:, None] * (by_start[count] - np.eye(weights.size)) / weights,
+                weights[:, None] * moved[count],
+            ],
             [by_state / weights, by_phases],
         ]
     )

@@ -337,7 +337,8 @@ class YieldingMotion:
         rows, faster = self.beyond[contacts], self.approach[contacts]
         change = moved[:count] + by_start[:count] @ first
         slopes, velocity_slopes = (
-            signs[:, None] * np.einsum("ki,kij->kj", each[:, forced.motion], change) for each in (rows, faster)
+            signs[:, None] * np.einsum("ki,kij->kj", each[:, forced.motion], change)
+            for each in (rows, faster)
         )
         return Evaluation(
             OrbitEnd.done,
