@@ -74,8 +74,9 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     """Return the Lyapunov exponents of a motion from its impacts.
 
     The state follows from the impacts before, by the exact flow. The error of the first state decays with the modes,
-    and impacts count once it is forgotten. The sum rule is checked. A periodic motion with too few impacts takes the
-    multipliers of its orbit, which have no error.
+    and impacts count once it is forgotten. On yielding stops, without a force, and with undamped modes a filter finds
+    the state instead. The sum rule is checked. A periodic motion with too few impacts takes the multipliers of its
+    orbit, which have no error.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     Raises
     ------
     ExponentError
-        There are too few impacts, a mode is undamped, an impact has no speed, or the sum rule does not hold.
+        There are too few impacts, an impact has no speed, or the sum rule does not hold.
     """
     count = impacts.times.size
     if count < 2 or not (impacts.velocities > 0.0).all():

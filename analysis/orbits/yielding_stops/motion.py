@@ -408,13 +408,27 @@ class YieldingMotion:
                     yield self._peak(
                         flow, states[:, k], contact, float(times[k]), float(times[k + 1] - times[k])
                     )
-            law = self.passages[contact]
-            if contact == segment.left and not isinstance(law, RigidPassage):
-                inside = np.cumprod(depths[contact] > 0.0).astype(bool)
-                again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
-                if again.any():
-                    k = 1 + int(np.argmax(again))
-                    yield float(depths[contact, k]), float(times[k]), contact
+            if contact == segment.left and (k := self._pressed_again(contact, depths[contact], states)):
+                yield float(depths[contact, k]), float(times[k]), contact
+
+    def _pressed_again(self, contact: int, depths: Floats, states: Floats) -> int:
+        """Return the first sample after a contact at which its stop is pressed before it is left; 0: there is none."""
+        law = self.passages[contact]
+        if isinstance(law, RigidPassage):
+            return 0
+        inside = np.cumprod(depths > 0.0).astype(bool)
+        again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
+        return 1 + int(np.argmax(again)) if again.any() else 0
+
+    def presses_again(self, train: Train) -> int:
+        """Return the first contact whose stop is pressed again before the body has left it; -1 if there is none."""
+        for segment in (each for each in train.segments if each.left >= 0):
+            times = np.append(np.arange(0.0, segment.duration, segment.path.step), segment.duration)
+            states = segment.path.along(segment.state, times)
+            depths = self.signs[segment.left] * (self.beyond[segment.left] @ states)
+            if self._pressed_again(segment.left, depths, states):
+                return segment.left
+        return -1
 
     def _peak(
         self, flow: Path, state: Floats, contact: int, time: float, step: float
