@@ -92,7 +92,8 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     count = impacts.times.size
     if count < 2 or not (impacts.velocities > 0.0).all():
         raise ExponentError(
-            "lyapunov: expected impacts with a speed, got a motion without, or at rest on a stop."
+            "lyapunov: expected impacts with a speed, got a motion without, at rest on a stop, or pressing a stop again "
+            "before it is left."
         )
     if body.has_own_period:
         return _without_force(body, impacts)
@@ -141,6 +142,11 @@ def _of_few_impacts(body: ImpactingBody, impacts: Impacts, first: int | None = N
     except OrbitError:
         count = impacts.times.size
         first = _first_known(body, impacts) if first is None else first
+        if count >= LEAST and first >= count:
+            raise ExponentError(
+                f"lyapunov: expected contacts that follow from one another, got impact {first - SETTLING} that does "
+                "not: contacts overlap in time, or a stop is pressed again before it is left."
+            ) from None
         raise ExponentError(
             f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
             "Record more periods."
