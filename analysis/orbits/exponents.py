@@ -92,7 +92,7 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     count = impacts.times.size
     if count < 2 or not (impacts.velocities > 0.0).all():
         raise ExponentError(
-            "lyapunov: expected impacts with a speed, got a motion without, at rest on a stop, or pressing a stop again "
+            "lyapunov: expected impacts with a speed, got a motion without, at rest on a stop, or pressing one again "
             "before it is left."
         )
     if body.has_own_period:
