@@ -145,7 +145,7 @@ def _of_few_impacts(body: ImpactingBody, impacts: Impacts, first: int | None = N
         if count >= LEAST and first >= count:
             raise ExponentError(
                 f"lyapunov: expected contacts that follow from one another, got impact {first - SETTLING} that does "
-                "not: contacts overlap in time, or a stop is pressed again before it is left."
+                "not: contacts overlap, a stop is pressed again before it is left, or the filter finds no first state."
             ) from None
         raise ExponentError(
             f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
