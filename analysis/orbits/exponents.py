@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, RecordedOrbit, recorded_orbit
-from vibroimpact.analysis.orbits.yielding_stops.exponents import YieldingStretching
+from vibroimpact.analysis.orbits.yielding_stops.exponents import RecordedStretching
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.exponents import Stretching
 from vibroimpact.fmus.errors import VibroimpactError
@@ -73,8 +74,9 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     """Return the Lyapunov exponents of a motion from its impacts.
 
     The state follows from the impacts before, by the exact flow. The error of the first state decays with the modes,
-    and impacts count once it is forgotten. The sum rule is checked. A periodic motion with too few impacts takes the
-    multipliers of its orbit, which have no error.
+    and impacts count once it is forgotten. On yielding stops, without a force, and with undamped modes a filter finds
+    the state instead. The sum rule is checked. A periodic motion with too few impacts takes the multipliers of its
+    orbit, which have no error.
 
     Parameters
     ----------
@@ -85,59 +87,93 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     Raises
     ------
     ExponentError
-        There are too few impacts, a mode is undamped, an impact has no speed, or the sum rule does not hold.
+        There are too few impacts, an impact has no speed, or the sum rule does not hold.
     """
     count = impacts.times.size
     if count < 2 or not (impacts.velocities > 0.0).all():
         raise ExponentError(
-            "lyapunov: expected impacts with a speed, got a motion without, or at rest on a stop."
+            "lyapunov: expected impacts with a speed, got a motion without, at rest on a stop, or pressing one again "
+            "before it is left."
         )
     if body.has_own_period:
         return _without_force(body, impacts)
     elapsed = np.diff(impacts.times, prepend=impacts.times[0])
+    if body.yields or (body.frequencies.size > 1 and not body.slowest_decay > 0.0):
+        return _of_run(_recorded_logarithms(body, impacts), elapsed) or _of_few_impacts(body, impacts)
     first = _first_that_counts(body, impacts)
-    if count - first < LEAST:
-        try:
-            return _of_orbit(recorded_orbit(body, impacts))
-        except OrbitError:
-            raise ExponentError(
-                f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
-                "Record more periods."
-            ) from None
-    edges = np.linspace(first, count, BLOCKS + 1).astype(int)
-    sums, exact = _stretched(body, impacts, elapsed, edges)
-    counted = count - first
-    interval = float(elapsed[first:].sum()) / counted
-    per_impact = sums.sum(axis=0) / counted
-    means = sums / np.diff(edges)[:, None]
+    if impacts.times.size - first < LEAST:
+        return _of_few_impacts(body, impacts, first)
+    return _of_run(_stretched(body, impacts, elapsed, first), elapsed) or _of_few_impacts(body, impacts)
+
+
+class _Logarithms(NamedTuple):
+    """Stretching of directions from the first impact that counts on."""
+
+    first: int
+    edges: Integers
+    sums: Floats
+    """Between the edges, shape (block, direction)."""
+    exact: float
+    """Exact sum of the exponents per impact."""
+
+
+def _of_run(found: _Logarithms | None, elapsed: Floats) -> Exponents | None:
+    """Return the exponents of a stretching; None without one. ExponentError unless the sum rule holds."""
+    if found is None:
+        return None
+    counted = elapsed.size - found.first
+    per_impact = found.sums.sum(axis=0) / counted
+    means = found.sums / np.diff(found.edges)[:, None]
     order = np.argsort(-per_impact, kind="stable")
-    off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
+    off = abs(float(per_impact.sum()) - found.exact) / max(1.0, float(np.abs(per_impact).sum()))
     if not off <= SUM_RULE:
         raise ExponentError(
-            f"lyapunov: expected exponents whose sum is {exact:.12g}, got {per_impact.sum():.12g}."
+            f"lyapunov: expected exponents whose sum is {found.exact:.12g}, got {per_impact.sum():.12g}."
         )
     error = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
+    interval = float(elapsed[found.first :].sum()) / counted
     return Exponents(per_impact[order], error[order], interval, counted, off)
 
 
-def _stretched(
-    body: ImpactingBody, impacts: Impacts, elapsed: Floats, edges: Integers
-) -> tuple[Floats, float]:
-    """Return the stretching of the directions between the edges, and the exact sum of the exponents per impact."""
-    first, blocks = int(edges[0]), list(itertools.pairwise(edges.tolist()))
-    if body.yields:
-        if body.frequencies.size > 1:
+def _of_few_impacts(body: ImpactingBody, impacts: Impacts, first: int | None = None) -> Exponents:
+    """Return the exponents of the periodic orbit of impacts that are too few; ExponentError without an orbit."""
+    try:
+        return _of_orbit(recorded_orbit(body, impacts))
+    except OrbitError:
+        count = impacts.times.size
+        first = _first_known(body, impacts) if first is None else first
+        if count >= LEAST and first >= count:
             raise ExponentError(
-                "lyapunov: expected a periodic motion or one mode, where stops yield, got several modes: the impacts "
-                "do not show their state."
-            )
-        yielding = YieldingStretching(body, impacts)
-        try:
-            yielding.along(1, first)
-            sums = np.array([yielding.along(*each) for each in blocks])
-        except OrbitError as problem:
-            raise ExponentError(f"lyapunov: {problem}.") from problem
-        return sums, float(yielding.shrinking[first:].mean())
+                f"lyapunov: expected contacts that follow from one another, got impact {first - SETTLING} that does "
+                "not: contacts overlap, a stop is pressed again before it is left, or the filter finds no first state."
+            ) from None
+        raise ExponentError(
+            f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
+            "Record more periods."
+        ) from None
+
+
+def _first_known(body: ImpactingBody, impacts: Impacts) -> int:
+    return RecordedStretching(body, impacts).first_known + SETTLING
+
+
+def _recorded_logarithms(body: ImpactingBody, impacts: Impacts) -> _Logarithms | None:
+    """Return the stretching of a motion whose state a filter finds; None for too few impacts with a known state."""
+    count = impacts.times.size
+    if count < LEAST:
+        return None
+    carried = RecordedStretching(body, impacts)
+    first = carried.first_known + SETTLING
+    if count - first < LEAST:
+        return None
+    edges = np.linspace(first, count, BLOCKS + 1).astype(int)
+    sums = np.add.reduceat(carried.logarithms, edges[:-1], axis=0)
+    return _Logarithms(first, edges, sums, float(carried.shrinking[first:].mean()))
+
+
+def _stretched(body: ImpactingBody, impacts: Impacts, elapsed: Floats, first: int) -> _Logarithms:
+    """Return the stretching by impacts on rigid stops, whose bodies forget the error of the first state."""
+    edges = np.linspace(first, impacts.times.size, BLOCKS + 1).astype(int)
     moving = Stretching(
         body.kernel,
         impacts.contacts.astype(np.int32),
@@ -147,10 +183,10 @@ def _stretched(
         _first_state(body, impacts),
     )
     moving.along(1, first)
-    sums = np.array([moving.along(*each) for each in blocks])
+    sums = np.array([moving.along(*each) for each in itertools.pairwise(edges.tolist())])
     decay = 2.0 * float(elapsed[first:].mean()) * body.decay
     shrinking = body.shrinking(impacts.contacts[first:], impacts.velocities[first:])
-    return sums, float(np.mean(np.log(shrinking))) - decay
+    return _Logarithms(first, edges, sums, float(np.mean(np.log(shrinking))) - decay)
 
 
 def _of_orbit(recorded: RecordedOrbit) -> Exponents:
@@ -172,25 +208,26 @@ def _of_orbit(recorded: RecordedOrbit) -> Exponents:
 
 
 def _without_force(body: ImpactingBody, impacts: Impacts) -> Exponents:
-    """Return the exponents of the periodic orbit of a body without a force: its modes grow, and forget no error."""
+    """Return the exponents of a body without a force: those of its periodic orbit, or else of its recorded motion."""
     try:
         return _of_orbit(recorded_orbit(body, impacts))
     except OrbitError as problem:
+        elapsed = np.diff(impacts.times, prepend=impacts.times[0])
+        timeless = impacts._replace(phases=np.zeros(impacts.times.size))
+        found = _of_run(_recorded_logarithms(body, timeless), elapsed)
+        if found is not None:
+            return found
         reason = str(problem).removeprefix("orbit: ")
         raise ExponentError(
-            f"lyapunov: expected a periodic orbit of a body without a force, got none: {reason}."
+            f"lyapunov: expected a periodic orbit of a body without a force, or {LEAST} impacts after "
+            f"{_first_known(body, timeless)} of a transient, got neither: {reason}."
         ) from None
 
 
 def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
     if body.frequencies.size == 1:
         return 1 + SETTLING
-    slow = body.slowest_decay
-    if not slow > 0.0:
-        raise ExponentError(
-            "lyapunov: expected damping of all modes with springs, without which a state is never forgotten, got none."
-        )
-    forgotten = impacts.times[0] - np.log(FORGOTTEN) / slow
+    forgotten = impacts.times[0] - np.log(FORGOTTEN) / body.slowest_decay
     return int(np.searchsorted(impacts.times, forgotten)) + SETTLING
 
 

@@ -12,6 +12,8 @@ from vibroimpact.analysis.orbits.own_orbits import own_closed_form, own_starts
 from vibroimpact.analysis.orbits.periodic import SAME, TURN, OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.single_impacts import closed_form
 from vibroimpact.analysis.orbits.symmetry import differences
+from vibroimpact.analysis.orbits.yielding_stops.joint_search import near_orbit
+from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
@@ -120,7 +122,10 @@ def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -
 def _near_trains(body: ImpactingBody, impacts: int, periods: int, starts: int) -> Iterator[PeriodicOrbit]:
     for phases, contacts in _trains(impacts, periods, len(body.contacts), starts):
         try:
-            yield find_orbit(body, phases, contacts.tolist(), periods)
+            start = None
+            if body.yields:
+                phases, start = near_orbit(yielding_motion(body), contacts, phases, periods)
+            yield find_orbit(body, phases, contacts.tolist(), periods, start=start)
         except OrbitError:
             continue
 

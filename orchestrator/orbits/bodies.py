@@ -27,7 +27,7 @@ YIELDING = frozenset({"law"})
 """Rows of the table of limits that orbits on stops that yield take."""
 
 
-def impacting_body(scene: Scene, *, all_kinds: bool = False) -> ImpactingBody:
+def impacting_body(scene: Scene, *, all_kinds: bool = False, yielding: bool = False) -> ImpactingBody:
     """Return the modes, the force and the contacts of a scene: an Oscillator, Chain, Beam or Structure on its stops.
 
     Parameters
@@ -38,6 +38,8 @@ def impacting_body(scene: Scene, *, all_kinds: bool = False) -> ImpactingBody:
         Whether stops that yield are taken, too. Whether the scene may be without a force: negative dashpots then keep
         the body moving (equations.md 4.16). And whether nothing need tie the body to the ground: its drift is then
         told apart.
+    yielding : bool
+        Whether stops that yield are taken, alone among these kinds.
 
     Raises
     ------
@@ -45,7 +47,7 @@ def impacting_body(scene: Scene, *, all_kinds: bool = False) -> ImpactingBody:
         The scene is not a body of modes between such stops under forces of one period.
     """
     own = all_kinds and scene.period is None
-    refuse_orbits(scene, seen(scene), OF_OWN_PERIOD if own else YIELDING if all_kinds else ())
+    refuse_orbits(scene, seen(scene), OF_OWN_PERIOD if own else YIELDING if all_kinds or yielding else ())
     found = _points_of(scene).mass_normalised()
     order = np.argsort(found.frequencies != 0.0, kind="stable")
     found = replace(loose_first(found, order), has_own_period=own)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.bodies import ImpactingBody
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.bodies import YIELDING, impacting_body
 from vibroimpact.orchestrator.run.limits import Seen, refuse_orbits, seen
 from vibroimpact.orchestrator.run.parameters import body_points, float_parameters
 from vibroimpact.orchestrator.scene import Scene
@@ -102,8 +102,8 @@ def strobed_body(scene: Scene) -> ImpactingBody:
         The scene has no orbits for another reason than its frequencies, or a stop moves with another frequency.
     """
     if scene.clock is None or scene.clock.is_common:
-        return impacting_body(scene)
-    found: list[Seen] = [each for each in seen(scene) if each.row != "quasi-periodic"]
+        return impacting_body(scene, yielding=True)
+    found: list[Seen] = [each for each in seen(scene) if each.row not in {"quasi-periodic", *YIELDING}]
     refuse_orbits(scene, found)
     if sines_of_stops(scene.stops):
         raise UsageError(

@@ -107,9 +107,8 @@ def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset or path
         As `open_dataset` or `run` gives it, or its file or folder. The body is an oscillator, a chain, a beam or
-        several bodies. On stops that yield, motions of several modes must be periodic. 200 impacts must count, or two
-        rounds of a periodic orbit. Without a force only periodic orbits have exponents; the exponent 0 of the motion
-        along itself is left out.
+        several bodies. 200 impacts must count, or two rounds of a periodic orbit. Without a force the exponent 0 of the
+        motion along itself is left out.
 
     Returns
     -------

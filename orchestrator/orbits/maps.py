@@ -232,8 +232,8 @@ class MapOfScene(Study[str]):
         _print_map(self.dataset)
 
     def _of_impacts(self, scene: Scene) -> Generator[str, None, None]:
-        body = impacting_body(scene)
         is_strobe, has_sets = self.settings.kind == "strobe", self.settings.kind == "discontinuity"
+        body = impacting_body(scene, yielding=not has_sets)
         if has_sets:
             one_mode(body)  # refused before any computation
             self.values |= dict.fromkeys(_SETS.values(), np.empty(0))

@@ -116,10 +116,10 @@ def start_states(
 
 
 def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return a mask of the states at time 0 beyond a stop, shape (state,)."""
+    """Return a mask of the states at time 0 beyond a rigid stop, shape (state,); stops that yield let the body in."""
     modal = modal_displacements(scene, states[:, : states.shape[1] // 2])
     beyond = np.zeros(len(states), np.bool_)
-    for contact in body.contacts:
+    for contact in (each for each in body.contacts if each.press is None):
         at = modal @ contact.shape
         beyond |= contact.direction * (at - contact.stop_at(body.phase)) > 0.0
     return beyond

@@ -100,7 +100,7 @@ class Transients(Study[Floats]):
         self.is_forced = self.scene.period is not None
         if not self.is_forced and self.scene.is_lone_body:
             self.scene = _with_the_first_mode(self.scene)
-        self.body = impacting_body(self.scene)
+        self.body = impacting_body(self.scene, yielding=True)
 
     @classmethod
     def prepare(cls, options: TransientsOf, stack: ExitStack) -> Self:

@@ -68,7 +68,9 @@ LIMITS = {
     "places": Limit(
         thrown_back=f"a Beam shows its motion at {MOST_SENSORS} places, and its stops are at more"
     ),
-    "dragged": Limit(orbits="no damping of bodies that no spring ties to the ground"),
+    "dragged": Limit(
+        orbits="no damping of bodies that no spring ties to the ground, whose place no spring brings back"
+    ),
     "growing": Limit(lanes=True, orbits="springs and dashpots that are not negative beside a force"),
     "held": Limit(orbits="a point that moves"),
     "force": Limit(

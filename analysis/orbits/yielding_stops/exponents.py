@@ -1,4 +1,4 @@
-"""The stretching of small changes by contacts with stops that yield: equations.md 4.11, 4.18."""
+"""The stretching of small changes along recorded contacts, and the states before them: equations.md 4.11, 4.18."""
 
 from __future__ import annotations
 
@@ -7,63 +7,144 @@ import numpy as np
 from vibroimpact.analysis.orbits.errors import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts
 from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.passages import Passage
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
 ARRIVES = 1e-6
-"""Distance of a computed contact from the recorded one, over the size of the motion, above which one is missing."""
+"""Error of a predicted contact, over the size of the motion, above which the state before it was not known."""
+UNKNOWN = 1e8
+"""Variance of the first state, over the variance that each flight adds to the state."""
+MOST_DECAY = 12.0
+"""Decay of the fastest motion, as a logarithm, over which directions are carried without being made orthogonal."""
+MOST_PIECES = 64
+"""Largest number of parts of a flight between which directions are made orthogonal."""
+TINY = np.finfo(np.float64).tiny
 
 
-class YieldingStretching:
-    """Directions carried along a motion of one mode from contact to contact, and their stretching.
+class RecordedStretching:
+    """Directions carried along a recorded motion from contact to contact, and their stretching.
 
-    The state before each contact is known: the point is at its stop with the recorded speed.
+    Each contact shows two numbers of the state: the point is at its stop, with the recorded speed. A filter finds the
+    whole state from all contacts before. It needs no damping: modes may also grow.
 
     Parameters
     ----------
     body : ImpactingBody
-        Of one mode.
+        Without a force the directions stay across the motion: the exponent 0 along it is left out.
     impacts : Impacts
         All contacts, in their order: none may be missing.
+
+    Attributes
+    ----------
+    logarithms : array, shape (contact, direction)
+        Stretching of each direction since the contact before; 2 modes directions, one less without a force.
+    shrinking : array, shape (contact,)
+        Logarithm of the determinant since the contact before, known from durations and speeds alone.
+    errors : array, shape (contact,)
+        Difference of each contact from its prediction, over the size of the motion; infinite without a prediction.
     """
 
     def __init__(self, body: ImpactingBody, impacts: Impacts) -> None:
         self._motion, self._impacts = yielding_motion(body), impacts
-        self._directions = np.eye(2)
-        self.shrinking = np.zeros(impacts.times.size)
-        """Logarithm of the determinant from the contact before, known from its duration alone."""
+        count, self._size = impacts.times.size, 2 * body.frequencies.size
+        directions = self._size - body.has_own_period
+        self._unit = body.slowest if body.has_own_period else body.angular_frequency
+        self._weights = np.repeat([self._unit, 1.0], body.frequencies.size)
+        self._fastest = float(np.abs(body.rates.real).max(initial=0.0))
+        self.logarithms = np.zeros((count, directions))
+        self.shrinking = np.zeros(count)
+        self.errors = np.full(count, np.inf)
+        self._carry()
 
-    def along(self, first: int, last: int) -> Floats:
-        """Continue along contacts `first` to `last` - 1; return the logarithms of the stretching of each direction.
+    @property
+    def first_known(self) -> int:
+        """First contact from which on all contacts are as predicted."""
+        off = np.flatnonzero(~(self.errors <= ARRIVES))
+        return int(off[-1]) + 1 if off.size else 0
 
-        OrbitError: a recorded contact does not follow from the one before.
-        """
-        stretch = np.zeros(2)
-        for k in range(first, last):
-            self._directions, upper = np.linalg.qr(self._from_before(k) @ self._directions)
-            stretch += np.log(np.maximum(np.abs(np.diag(upper)), np.finfo(np.float64).tiny))
-        return stretch
+    def _carry(self) -> None:
+        """Carry the state and the directions along all contacts."""
+        size = self._size
+        state, variance = np.zeros(size), UNKNOWN * np.eye(size)
+        directions = self._across(self._seen(0, state, variance)[0], 0, np.eye(size))
+        for k in range(self._impacts.times.size):
+            state, variance, error = self._seen(k, state, variance)
+            if k:
+                self.errors[k] = error
+                directions = self._across(state, k, directions)
+                directions, upper = np.linalg.qr(directions)
+                self.logarithms[k] += np.log(np.maximum(np.abs(np.diag(upper)), TINY))
+            if k + 1 == self._impacts.times.size:
+                return
+            try:
+                state, variance, directions = self._to_next(k, state, variance, directions)
+            except OrbitError:  # a first state far from the true one
+                state, variance = np.zeros(size), UNKNOWN * np.eye(size)
 
-    def _from_before(self, k: int) -> Floats:
-        """Return the derivative of the state before a contact by the state before the contact before it."""
-        motion, body = self._motion, self._motion.body
-        elapsed = float(self._impacts.times[k] - self._impacts.times[k - 1])
-        before = self._vector(k - 1)
-        law = motion.passages[self._impacts.contacts[k - 1]]
-        passage = law.through(before, elapsed)
-        phase = self._impacts.phases[k - 1] + passage.duration * body.angular_frequency
-        over = motion.forced.free.over(elapsed - passage.duration)
-        off = (over @ motion.forced.vector(passage.after, phase) - self._vector(k))[motion.forced.motion]
-        if not np.abs(off).max() <= ARRIVES * body.scale * max(1.0, body.angular_frequency):
-            raise OrbitError(
-                f"expected contacts that follow from one another, got impact {k + 1} that does not: the body turns "
-                "round before it has left the stop"
-            )
-        decay = 2.0 * float((body.damping_ratios * body.frequencies).sum())
-        self.shrinking[k] = np.log(passage.shrinking) - decay * elapsed
-        return np.asarray(over[motion.forced.motion, motion.forced.motion] @ passage.tangent)
+    def _across(self, state: Floats, k: int, directions: Floats) -> Floats:
+        """Return directions without their part along the motion, where no force has a phase."""
+        body = self._motion.body
+        if not body.has_own_period:
+            return directions
+        flow = self._flow(state, k)
+        length = float(np.linalg.norm(flow))
+        if directions.shape[1] == self._size:
+            basis = np.linalg.qr(np.column_stack([flow, directions]))[0]
+            self._length = length
+            return np.asarray(basis[:, 1:])
+        self.shrinking[k] -= np.log(length / self._length)
+        self._length = length
+        return np.asarray(directions - np.outer(flow, flow @ directions) / length**2)
 
-    def _vector(self, k: int) -> Floats:
-        """Return the vector of the state before a recorded contact."""
-        impacts, motion = self._impacts, self._motion
-        phase, speed = float(impacts.phases[k]), float(impacts.velocities[k])
-        return motion.forced.vector(motion.at_stop(int(impacts.contacts[k]), phase, speed), phase)
+    def _flow(self, state: Floats, k: int) -> Floats:
+        """Return the weighted rate of a state before a contact."""
+        forced = self._motion.forced
+        vector = forced.vector(state, float(self._impacts.phases[k]))
+        return np.asarray(self._weights * (forced.free.matrix @ vector)[forced.motion])
+
+    def _seen(self, k: int, state: Floats, variance: Floats) -> tuple[Floats, Floats, float]:
+        """Return the state that a recorded contact leaves the most likely, its variance, and the error before."""
+        motion, forced = self._motion, self._motion.forced
+        contact, speed = int(self._impacts.contacts[k]), float(self._impacts.velocities[k])
+        rows = np.array([motion.beyond[contact], motion.approach[contact]])
+        seen = rows @ forced.vector(state, float(self._impacts.phases[k]))
+        off = seen - [0.0, motion.signs[contact] * speed]
+        slopes = rows[:, forced.motion] / self._weights
+        gain = np.linalg.solve(slopes @ variance @ slopes.T, slopes @ variance).T
+        state = state - gain @ off / self._weights
+        variance = variance - gain @ slopes @ variance
+        error = float(np.abs(off / [1.0, self._unit]).max()) / motion.body.scale
+        return state, 0.5 * (variance + variance.T), error
+
+    def _to_next(
+        self, k: int, state: Floats, variance: Floats, directions: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return state, variance and directions before the next contact."""
+        motion, impacts, weights = self._motion, self._impacts, self._weights
+        body, forced = motion.body, motion.forced
+        elapsed, phase = float(impacts.times[k + 1] - impacts.times[k]), float(impacts.phases[k])
+        passage = motion.passages[impacts.contacts[k]].through(forced.vector(state, phase), elapsed)
+        away = forced.vector(passage.after, phase + passage.duration * body.angular_frequency)
+        flight = elapsed - passage.duration
+        over = forced.free.over(flight)
+        moved = weights[:, None] * (over[forced.motion, forced.motion] @ passage.slope) / weights
+        self.shrinking[k + 1] = np.log(passage.shrinking) - 2.0 * body.decay * elapsed
+        return (
+            (over @ away)[forced.motion],
+            moved @ variance @ moved.T + np.eye(self._size),
+            self._carried(k + 1, directions, passage, flight),
+        )
+
+    def _carried(self, k: int, directions: Floats, passage: Passage, flight: float) -> Floats:
+        """Return directions after a contact and a flight; parts of a long flight are made orthogonal one by one."""
+        forced, weights = self._motion.forced, self._weights
+        pieces = min(1 + int(self._fastest * flight / MOST_DECAY), MOST_PIECES)
+        piece = forced.free.over(flight / pieces)[forced.motion, forced.motion]
+        directions = passage.tangent @ (directions / weights[:, None])
+        for number in range(pieces):
+            if number:
+                directions, upper = np.linalg.qr(weights[:, None] * directions)
+                self.logarithms[k] += np.log(np.maximum(np.abs(np.diag(upper)), TINY))
+                directions = directions / weights[:, None]
+            directions = piece @ directions
+        return np.asarray(weights[:, None] * directions)

@@ -330,40 +330,52 @@ class YieldingMotion:
         """Return velocities and distances for given phases of the contacts' beginnings; OrbitError without a motion."""
         found = self.periodic(contacts, phases, periods, start)
         forced, count = self.forced, phases.size
-        n = 2 * forced.modes
-        # derivatives of the states before the contacts by the phases, for a fixed first state, then with its change
-        moved, by_start = np.zeros((count + 1, n, count)), np.zeros((count + 1, n, n))
-        by_start[0] = np.eye(n)
-        w = self.body.angular_frequency
-        moved[0][:, 0] = 0.0
-        for k, (flight, passage) in enumerate(zip(found.flights, found.passages, strict=True)):
-            moved[k + 1] = flight @ passage.slope @ moved[k]
-            moved[k + 1][:, k] += flight @ passage.shift / w
-            if k + 1 < count:
-                moved[k + 1][:, k + 1] += found.rates[k + 1] / w
-            by_start[k + 1] = flight @ passage.slope @ by_start[k]
-        # the end moves with the first phase, q periods later
-        moved[count][:, 0] += found.rates[0] / w
-        first = np.linalg.solve(np.eye(n) - by_start[count], moved[count])
-        states = np.array([forced.vector(*each) for each in zip(found.entries, phases, strict=True)])
-        rows, faster = self.beyond[contacts], self.approach[contacts]
+        moved, by_start = self.derivatives(found, count)
+        first = np.linalg.solve(np.eye(found.end.size) - by_start[count], moved[count])
+        states, by_phase, speeds_by_phase = self.at_stops(found, contacts, phases)
         signs = self.signs[contacts]
-        slopes, velocity_slopes = np.empty((count, count)), np.empty((count, count))
-        for k in range(count):
-            change = np.zeros((forced.size, count))
-            change[forced.motion] = moved[k] + by_start[k] @ first
-            own = forced.free.matrix @ states[k] / w
-            own[forced.motion] = 0.0
-            change[:, k] += own
-            slopes[k], velocity_slopes[k] = signs[k] * rows[k] @ change, signs[k] * faster[k] @ change
+        rows, faster = self.beyond[contacts], self.approach[contacts]
+        change = moved[:count] + by_start[:count] @ first
+        slopes, velocity_slopes = (
+            signs[:, None] * np.einsum("ki,kij->kj", each[:, forced.motion], change)
+            for each in (rows, faster)
+        )
         return Evaluation(
             OrbitEnd.done,
             signs * np.einsum("ij,ij->i", faster, states),
             signs * np.einsum("ij,ij->i", rows, states),
-            slopes,
-            velocity_slopes,
+            slopes + np.diag(by_phase),
+            velocity_slopes + np.diag(speeds_by_phase),
             found.entries[0],
         )
+
+    def derivatives(self, train: Train, count: int) -> tuple[Floats, Floats]:
+        """Return derivatives of the states before the contacts, and at the end, by phases and by the first state.
+
+        Shapes (p + 1, 2 modes, p), for a fixed first state, and (p + 1, 2 modes, 2 modes).
+        """
+        n, w = train.end.size, self.body.angular_frequency
+        moved, by_start = np.zeros((count + 1, n, count)), np.zeros((count + 1, n, n))
+        by_start[0] = np.eye(n)
+        for k, (flight, passage) in enumerate(zip(train.flights, train.passages, strict=True)):
+            over = flight @ passage.slope
+            moved[k + 1], by_start[k + 1] = over @ moved[k], over @ by_start[k]
+            moved[k + 1][:, k] += flight @ passage.shift / w
+            # the end moves with the first phase, q periods later
+            moved[k + 1][:, (k + 1) % count] += train.rates[(k + 1) % count] / w
+        return moved, by_start
+
+    def at_stops(self, train: Train, contacts: Contacts, phases: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return vectors before the contacts, and rates per radian of distances and speeds by the stops' own motion."""
+        forced = self.forced
+        states = np.array([forced.vector(*each) for each in zip(train.entries, phases, strict=True)])
+        own = states @ forced.free.matrix.T / self.body.angular_frequency
+        own[:, forced.motion] = 0.0
+        signs = self.signs[contacts]
+        by_phase, faster = (
+            signs * np.einsum("ij,ij->i", each[contacts], own) for each in (self.beyond, self.approach)
+        )
+        return states, by_phase, faster
 
     def highest(self, phases: Floats, train: Train) -> tuple[float, float, int]:
         """Return the highest maximum beside the contacts: its depth beyond the stop (m), phase, contact (-1: none).
@@ -396,13 +408,27 @@ class YieldingMotion:
                     yield self._peak(
                         flow, states[:, k], contact, float(times[k]), float(times[k + 1] - times[k])
                     )
-            law = self.passages[contact]
-            if contact == segment.left and not isinstance(law, RigidPassage):
-                inside = np.cumprod(depths[contact] > 0.0).astype(bool)
-                again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
-                if again.any():
-                    k = 1 + int(np.argmax(again))
-                    yield float(depths[contact, k]), float(times[k]), contact
+            if contact == segment.left and (k := self._pressed_again(contact, depths[contact], states)):
+                yield float(depths[contact, k]), float(times[k]), contact
+
+    def _pressed_again(self, contact: int, depths: Floats, states: Floats) -> int:
+        """Return the first sample after a contact at which its stop is pressed before it is left; 0: there is none."""
+        law = self.passages[contact]
+        if isinstance(law, RigidPassage):
+            return 0
+        inside = np.cumprod(depths > 0.0).astype(bool)
+        again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
+        return 1 + int(np.argmax(again)) if again.any() else 0
+
+    def presses_again(self, train: Train) -> int:
+        """Return the first contact whose stop is pressed again before the body has left it; -1 if there is none."""
+        for segment in (each for each in train.segments if each.left >= 0):
+            times = np.append(np.arange(0.0, segment.duration, segment.path.step), segment.duration)
+            states = segment.path.along(segment.state, times)
+            depths = self.signs[segment.left] * (self.beyond[segment.left] @ states)
+            if self._pressed_again(segment.left, depths, states):
+                return segment.left
+        return -1
 
     def _peak(
         self, flow: Path, state: Floats, contact: int, time: float, step: float

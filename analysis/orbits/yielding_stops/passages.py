@@ -38,7 +38,9 @@ class ForcedModes:
         self.sines = slice(2 * self.modes + count, 2 * self.modes + 2 * count)
         self.one, self.offset, self.impulse = self.size - 3, self.size - 2, self.size - 1
         self.damping = (
-            np.diag(2.0 * body.damping_ratios * body.frequencies) if body.coupling is None else body.coupling
+            np.diag(2.0 * body.damping_ratios * np.abs(body.frequencies))
+            if body.coupling is None
+            else body.coupling
         )
         self._spring = float((body.frequencies**2).max())
         self._drag = float(np.linalg.norm(self.damping, 2))
@@ -54,7 +56,7 @@ class ForcedModes:
         turns = np.diag(self.orders * body.angular_frequency)
         forces = np.array(list(body.harmonics.values())).T
         found[: self.modes, self.velocity] = np.eye(self.modes)
-        found[self.velocity, : self.modes] = -np.diag(body.frequencies**2)
+        found[self.velocity, : self.modes] = -np.diag(body.stiffnesses)
         found[self.velocity, self.velocity] = -self.damping
         found[self.velocity, self.cosines], found[self.velocity, self.sines] = forces.real, -forces.imag
         found[self.velocity, self.one] = body.held

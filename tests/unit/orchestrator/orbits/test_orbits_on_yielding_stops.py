@@ -9,7 +9,11 @@ import pytest
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
+from vibroimpact.analysis.orbits import OrbitError, find_orbit
+from vibroimpact.analysis.orbits.yielding_stops.joint_search import near_orbit
+from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
 
 ONE = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
 CHAIN = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0], "dampings": [0.1, 0.1]}
@@ -172,3 +176,17 @@ def test_what_is_not_taken_is_refused_by_name(command: Any, said: str) -> None:
     relaxing = KELVIN_VOIGT | {"position": 0.5, "relaxation_time": 0.1}
     with pytest.raises(UsageError, match=said):
         command(scene(relaxing))
+
+
+def test_a_rough_train_of_two_contacts_leads_to_an_orbit_by_one_search() -> None:
+    given = vi.Scene.from_dict(scene(KELVIN_VOIGT | {"position": 0.0}, angular_frequency=0.6))
+    body, hit = impacting_body(given, all_kinds=True), np.zeros(2, np.int32)
+    found = []
+    for phases in ([0.5, 3.5], [1.0, 4.0], [2.0, 5.5], [0.2, 1.7]):
+        try:
+            near = near_orbit(yielding_motion(body), hit, np.array(phases), 1)
+        except OrbitError:
+            continue
+        orbit = find_orbit(body, near.phases, [0, 0], 1, start=near.start)
+        found.append(np.sort(orbit.velocities))
+    assert any(np.allclose(each, [0.647, 0.8483], atol=1e-4) for each in found)

@@ -163,10 +163,14 @@ def test_components_are_refused() -> None:
         vi.transients(EXAMPLES / "newtons_cradle.toml")
 
 
-def test_a_stop_that_yields_is_refused() -> None:
-    yielding = scene(1.0).with_values({"stop": [{"position": 1.0, "law": "hertz", "stiffness": 1e6}]})
-    with pytest.raises(UsageError, match=r'stop\[1\].law: expected "restitution"'):
-        vi.transients(yielding)
+def test_on_a_stop_that_yields_the_contraction_is_that_of_its_orbit() -> None:
+    stop = {"position": 0.8, "law": "kelvin_voigt", "stiffness": 50.0, "damping": 1.0}
+    yielding = scene(1.2).with_values({"stop": [stop]})
+    (orbit,) = [each for each in vi.find_orbits(yielding, 1, 1) if each.is_stable]
+    found = vi.transients(yielding, starts=2)
+    assert set(found.end.values) == {FORGOTTEN}
+    # two multipliers of one size turn round each other
+    assert found.contraction.values == pytest.approx(np.full(2, abs(orbit.multipliers[0])), rel=1e-2)
 
 
 def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
