@@ -170,7 +170,7 @@ def follow_branches(
         followed.most_begun_impacts = MOST_BEGUN_IMPACTS
     yield from _departed(follower, followed, doublings, grazes)
     if seed is None and impacts is None and periods == 1 and scene.period is not None:
-        followed.check = IndexCheck(scene, parameter, settings, starts)
+        followed.check = IndexCheck(scene, parameter, settings, starts, followed.ends)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
     if required:
         _refuse_nothing(followed, settings, impacts, periods)
