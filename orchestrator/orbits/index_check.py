@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.following import FollowSettings
@@ -19,6 +18,7 @@ from vibroimpact.analysis.orbits.index_sum import (
     index_sum,
     why_without_sum,
 )
+from vibroimpact.analysis.orbits.recurrences import MOST_RECURRENCES
 from vibroimpact.analysis.orbits.search import each_orbit, same_orbit
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.bodies.impacting_body import Floats
@@ -31,8 +31,10 @@ from vibroimpact.orchestrator.scene import Scene
 
 PERIODS = (1, 2)
 """Forcing periods of the strobe maps that are checked."""
-NARROWEST = 1e-9
-"""Distance of two special points, over the range, below which nothing is checked between them."""
+NARROWEST = 1e-8
+"""Distance of two special points, over the range, below which they are one: grazes of two orbits differ by 1e-9."""
+STEADY_GRAZE = 1e-10
+"""Error of a value at which the motion without impacts meets a stop, over the range."""
 STEADY_VALUES = 65
 """Values of the range between which the motion without impacts is watched for meeting a stop."""
 LOST = "cannot be followed"
@@ -40,7 +42,7 @@ LOST = "cannot be followed"
 MOST_SEARCHES = {True: 64, False: 8}
 """Number of searches for missing orbits of a body of one mode, and of several modes, whose searches take longer."""
 NEAREST_ENDS = 4
-"""Number of nearest runs over the range whose rests are looked for at a value."""
+"""Number of nearest runs over the range whose ends start runs at a value."""
 MOST_IMPACTS_A_PERIOD = 3
 """Impacts in a forcing period up to which a body of several modes is searched."""
 
@@ -193,7 +195,7 @@ class IndexCheck:
                     return
                 self.has_several_modes = body.frequencies.size > 1
                 finds = self._places.setdefault(value, Finds())
-                place = Place(value, body, branches, finds, strobe, self._rests_near(value))
+                place = Place(value, body, branches, finds, strobe, self._starts_near(value))
                 for periods in PERIODS:
                     if place.sum(periods).is_complete:
                         continue
@@ -203,12 +205,10 @@ class IndexCheck:
                         break  # the same orbits are missing in the sums of more periods
                 self.values.append(CheckedValue(value, (low, high), tuple(map(place.sum, PERIODS))))
 
-    def _rests_near(self, value: float) -> list[State]:
-        """Return the last states of the nearest runs over the range that end on an orbit with a rest."""
+    def _starts_near(self, value: float) -> list[State]:
+        """Return the last states of the nearest runs over the range that end on no orbit of equations.md 4.7."""
         nearest = sorted(self.ends, key=lambda each: abs(each.value - value))[:NEAREST_ENDS]
-        return [
-            each.state for each in nearest if each.kind.kind is OrbitClass.sticking and each.state is not None
-        ]
+        return [each.state for each in nearest if each.orbit is None and each.state is not None]
 
     def _steady_grazes(self, strobe: StrobeMap) -> Iterator[float]:
         """Yield the values at which the motion without impacts begins or ends to meet a stop."""
@@ -226,7 +226,7 @@ class IndexCheck:
             if None in (clear[place : place + 2]) or clear[place] == clear[place + 1]:
                 continue
             same, changed = float(values[place]), float(values[place + 1])
-            while abs(changed - same) > 0.1 * NARROWEST * self.settings.span:
+            while abs(changed - same) > STEADY_GRAZE * self.settings.span:
                 middle = 0.5 * (same + changed)
                 same, changed = (middle, changed) if is_clear(middle) == clear[place] else (same, middle)
             yield changed
@@ -249,10 +249,11 @@ class IndexCheck:
             self.started += GRID_STARTS
         else:
             counts = range(1, MOST_IMPACTS_A_PERIOD * periods + 1)
-            candidates = (
+            trains = (
                 orbit for p in counts for orbit in each_orbit(place.body, p, periods, starts=self.starts)
             )
-            self.started += self.starts * (len(counts) - 1)
+            candidates = itertools.chain(trains, place.strobe.passed(place.value, periods, place.starts))
+            self.started += self.starts * (len(counts) - 1) + MOST_RECURRENCES * (1 + len(place.starts))
         yield from self._new(place, candidates)
         if has_one_mode and not place.sum(periods).is_complete:
             located = place.strobe.located(place.value, periods, place.orbits, place.rests(periods))
@@ -312,8 +313,8 @@ class IndexCheck:
             )
         if self.incomplete and self.has_several_modes:
             yield (
-                f"Several modes: orbits with more than {MOST_IMPACTS_A_PERIOD} impacts a period are not searched; "
-                "those with a complete chatter are counted where runs end on them, and missing where they are unstable."
+                f"Several modes: orbits with more than {MOST_IMPACTS_A_PERIOD} impacts a period are found only near "
+                "runs; those with a complete chatter are counted where runs end on them, not where they are unstable."
             )
 
     def _sums(self) -> Iterator[str]:

@@ -17,6 +17,7 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.index_sum import IndexTerm, distinct
+from vibroimpact.analysis.orbits.recurrences import orbits_passed
 from vibroimpact.analysis.orbits.search import same_orbit
 from vibroimpact.analysis.orbits.trigonometric import TURN, SumOfSines
 from vibroimpact.fmus.bodies.impacting_body import Floats
@@ -160,6 +161,19 @@ class StrobeMap:
                     found.append(states)
         return found
 
+    def passed(self, value: float, periods: int, starts: Iterable[State]) -> Iterator[PeriodicOrbit]:
+        """Yield the orbits near which long runs pass: one run from the scene's own state, one from each start."""
+        body = self.body(value)
+        with long_runs(self.scene) as record_of:
+            for start in (None, *starts):
+                rows = record_of({self.parameter: value}, start).impacts
+                if rows is not None and len(rows):
+                    turned = rows[:, 0] * body.angular_frequency - rows[:, 1]
+                    phases = rows[:, 1] + TURN * np.round((turned - turned[0]) / TURN)
+                    yield from orbits_passed(
+                        body, phases, rows[:, 2], rows[:, 4].astype(np.int64) - 1, periods
+                    )
+
     # ---- all fixed points ----
 
     def plane(self, value: float, periods: int) -> StatePlane:
@@ -276,7 +290,7 @@ def _starts(plane: StatePlane, cells: int) -> Floats:
     lower = (lower[:, None] + size * np.indices((PARTS, PARTS)).reshape(2, -1).T).reshape(-1, 2)
     states = (lower[:, None] + size * np.indices((2, 2)).reshape(2, -1).T).reshape(-1, 2)
     lower = lower[_changes_sign(plane.change(states).reshape(-1, 4, 2))]
-    return lower + 0.5 * size
+    return np.asarray(lower + 0.5 * size)
 
 
 def _orbit_of(plane: StatePlane, record: RunRecord) -> PeriodicOrbit | None:

@@ -10,7 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.orbits.index_sum import IndexSum, index_sum
+from vibroimpact.analysis.orbits.index_sum import IndexSum, distinct, index_sum
+from vibroimpact.analysis.orbits.recurrences import orbits_passed
+from vibroimpact.analysis.orbits.search import each_orbit, same_orbit
+from vibroimpact.analysis.orbits.trigonometric import TURN
 from vibroimpact.fmus.bodies import Contact
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.orchestrator.orbits.plane_chart import PlaneChart, Wall
@@ -205,3 +208,28 @@ def test_a_body_at_rest_on_its_stop_is_one_fixed_point_on_the_edge_of_the_plane(
         known = strobe.located(0.5, 1, [], rests)
         assert (known.orbits, known.terms, known.undecided) == ([], [], 0)
     assert str(all_located(scene, 0.5)) == "P(inf,1) +1, sum 1"
+
+
+def test_impacts_that_nearly_repeat_lead_to_their_orbit() -> None:
+    with StrobeMap(two_sided(0.972), PARAMETER) as strobe:
+        body = strobe.body(0.972)
+    saddle = next(each for each in each_orbit(body, 2, 1, starts=16) if not each.is_stable)
+    turns = TURN * np.repeat(np.arange(3), 2)
+    off = 1e-3 * np.array([0.0, 1.0, -2.0, 1.0, 0.0, -1.0])
+    found = list(
+        orbits_passed(
+            body, np.tile(saddle.phases, 3) + turns + off, np.ones(6), np.tile(saddle.contacts, 3), 1
+        )
+    )
+    assert found
+    assert all(same_orbit(each, saddle) for each in found)
+    one = np.zeros(1, dtype=np.int64)
+    assert not list(orbits_passed(body, np.array([0.3]), np.ones(1), one, 1))
+
+
+def test_a_chaotic_run_passes_orbits_that_the_index_sum_needs() -> None:
+    scene = two_sided(0.95)
+    with StrobeMap(scene, PARAMETER) as strobe:
+        found = distinct(strobe.passed(0.95, 1, ()), 1)
+    assert found
+    assert all(each.periods == 1 and each.is_physical for each in found)

@@ -119,11 +119,11 @@ def test_a_fixed_point_that_no_run_shows_is_said(followed: Followed, monkeypatch
     assert "1 further fixed point that no run with at most 2000 impacts a period shows" in said
 
 
-def test_a_chain_counts_an_orbit_with_a_rest_on_which_a_run_over_the_range_ends() -> None:
+def test_the_nearest_runs_over_the_range_that_end_on_no_orbit_start_further_runs() -> None:
     kind = RunClass(OrbitClass.sticking, 1)
     ends = [RunEnd(value, kind, None, (value,)) for value in (1.0, 1.1, 1.2, 1.3, 1.4, 1.5)]
     check = IndexCheck(Scene.from_dict(two_sided()), PARAMETER, FollowSettings(1.0, 1.5), 16, ends)
-    assert sorted(each[0] for each in check._rests_near(1.16)) == [1.0, 1.1, 1.2, 1.3]
+    assert sorted(each[0] for each in check._starts_near(1.16)) == [1.0, 1.1, 1.2, 1.3]
 
 
 def test_ranges_lie_between_special_points_of_all_branches(followed: Followed) -> None:
