@@ -14,6 +14,10 @@ ON_STOP = 2e-9
 """Distance from a stop, over the width of the plane, below which a state counts as one on the stop."""
 
 
+LEAST_KEPT = 1e-3
+"""Share of a velocity that an impact keeps at least: none would make all states before impacts a rest in the chart."""
+
+
 @dataclass(frozen=True, slots=True)
 class Wall:
     """A stop of a body of one mode.
@@ -37,7 +41,8 @@ class Wall:
     def kept(self, velocity: Floats) -> Floats:
         """Return the share of velocities towards the stop that an impact leaves; 1 for other velocities."""
         towards = np.maximum(self.side * velocity, 0.0)
-        return np.where(towards > 0.0, self.contact.restitution_at(self.speed * towards), 1.0)
+        kept = np.maximum(self.contact.restitution_at(self.speed * towards), LEAST_KEPT)
+        return np.where(towards > 0.0, kept, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

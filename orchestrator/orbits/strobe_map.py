@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.dataset.schema import OrbitClass
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
-from vibroimpact.analysis.orbits.index_sum import IndexTerm, distinct
+from vibroimpact.analysis.orbits.index_sum import IndexTerm, clears_stops, distinct, index
 from vibroimpact.analysis.orbits.recurrences import orbits_passed
 from vibroimpact.analysis.orbits.search import same_orbit
 from vibroimpact.analysis.orbits.trigonometric import TURN, SumOfSines
@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.ends_of_runs import class_of_record
 from vibroimpact.orchestrator.orbits.find import long_runs
 from vibroimpact.orchestrator.orbits.state_plane import StatePlane, displacement_at, press_on
-from vibroimpact.orchestrator.orbits.winding import Cell, Search
+from vibroimpact.orchestrator.orbits.winding import Cell, Marks, Search
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
@@ -48,6 +48,8 @@ IMPACT_LIMIT = 2000
 """Impacts in a period above which a state counts as one without an end: a chatter that hardly loses speed."""
 CELLS, EDGE_PARTS = 64, (2, 8, 32)
 """Cells along each axis from which fixed points are located; parts of an edge, until all indices add up to 1."""
+MOST_ROUNDS = 4
+"""Rounds in which fixed points are located, each with the orbits of the earlier ones."""
 RETURNS = 1e-4
 """Change over the periods, over the size of the chart, below which the middle of a smallest cell is a fixed point."""
 
@@ -210,18 +212,20 @@ class StrobeMap:
             Strobe states of each known orbit that rests on a stop.
 
         """
-        known = distinct(orbits, periods)
+        known, located = distinct(orbits, periods), Located()
         with self.plane(value, periods) as plane:
-            marks = plane.marks(known, rests)
-            for parts in EDGE_PARTS:
-                cells = Search(plane.change_in_chart, plane.low, plane.high, CELLS, parts).missing(marks)
-                total = int(marks.indices.sum()) + sum(each.index for each in cells)
-                if total == 1:
+            for _ in range(MOST_ROUNDS):
+                # other points of a new orbit may be in cells with points of the other sign
+                marks, count = plane.marks([*known, *located.orbits], rests), len(located.orbits)
+                cells, missing = _cells_of(plane, marks)
+                located.terms, located.undecided = [], missing
+                for cell in cells:
+                    self._add(located, plane, value, cell)
+                new = sum(index(each, periods) * each.periods for each in located.orbits[count:])
+                total = int(marks.indices.sum()) + new + sum(each.index for each in located.terms)
+                if total == 1 or len(located.orbits) == count:
                     break
-            located = Located(undecided=abs(1 - total))
-            for cell in cells:
-                self._add(located, plane, value, cell)
-            return located
+        return located
 
     def _add(self, located: Located, plane: StatePlane, value: float, cell: Cell) -> None:
         """Add the orbit of a fixed point in a cell, or its term."""
@@ -229,6 +233,8 @@ class StrobeMap:
         impacts = 0 if record.impacts is None else len(record.impacts)
         rests = record.outcome is Outcome.stuck or (record.sticks is not None and bool(len(record.sticks)))
         went_well = record.outcome in (Outcome.ok, Outcome.stuck)
+        if went_well and not impacts and not rests and clears_stops(plane.body):
+            return  # the motion without impacts
         if not (went_well and _repeats(plane, cell) and (rests or impacts)):
             located.undecided += 1
             return
@@ -277,6 +283,16 @@ def _changes_sign(corners: Floats) -> NDArray[np.bool_]:
     """Return for each cell, shape (..., corner, 2), whether both parts of the change change their sign within it."""
     both = (corners.min(axis=-2) <= 0.0) & (corners.max(axis=-2) >= 0.0)
     return np.asarray(both.all(axis=-1))
+
+
+def _cells_of(plane: StatePlane, marks: Marks) -> tuple[list[Cell], int]:
+    """Return the cells of a plane with fixed points that are not marked, and the number of further ones."""
+    for parts in EDGE_PARTS:
+        cells = Search(plane.change_in_chart, plane.low, plane.high, CELLS, parts).missing(marks)
+        total = int(marks.indices.sum()) + sum(each.index for each in cells)
+        if total == 1:
+            break
+    return cells, abs(1 - total)
 
 
 def _starts(plane: StatePlane, cells: int) -> Floats:

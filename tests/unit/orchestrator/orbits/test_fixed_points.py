@@ -199,8 +199,9 @@ def test_two_stops_close_together_have_orbits_with_a_rest_and_without() -> None:
     }
 
 
-def test_a_body_at_rest_on_its_stop_is_one_fixed_point_on_the_edge_of_the_plane() -> None:
-    stop = {"position": -0.5, "restitution": 0.5}
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_body_at_rest_on_its_stop_is_one_fixed_point_on_the_edge_of_the_plane(restitution: float) -> None:
+    stop = {"position": -0.5, "restitution": restitution}
     scene = oscillator(0.5, {"amplitude": 0.3}, {"damping_ratio": 0.3, "displacement_start": -0.5}, [stop])
     with StrobeMap(scene, PARAMETER) as strobe:
         rests = strobe.rests(0.5, 1)
@@ -233,3 +234,9 @@ def test_a_chaotic_run_passes_orbits_that_the_index_sum_needs() -> None:
         found = distinct(strobe.passed(0.95, 1, ()), 1)
     assert found
     assert all(each.periods == 1 and each.is_physical for each in found)
+
+
+def test_the_motion_without_impacts_of_a_body_with_critical_damping_is_decided() -> None:
+    stop = {"position": 1.0, "restitution": 0.7}
+    scene = oscillator(3.0, {"amplitude": 1.3}, {"damping_ratio": 1.0}, [stop])
+    assert str(all_located(scene, 3.0)) == "no impacts +1, sum 1"
