@@ -88,7 +88,11 @@ def index(orbit: PeriodicOrbit, periods: int) -> int:
 
 
 def index_sum(
-    body: ImpactingBody, orbits: Iterable[PeriodicOrbit], periods: int, resting: Sequence[int] = ()
+    body: ImpactingBody,
+    orbits: Iterable[PeriodicOrbit],
+    periods: int,
+    resting: Sequence[int] = (),
+    located: Sequence[IndexTerm] = (),
 ) -> IndexSum:
     """Return the index sum of the known orbits of a body, and of its motion without impacts.
 
@@ -101,18 +105,25 @@ def index_sum(
         q, the forcing periods of the strobe map.
     resting : sequence of int
         Forcing periods of each known orbit that rests on a stop. Such an orbit attracts, so that its index is 1.
+    located : sequence of IndexTerm
+        Further fixed points, located by the strobe map itself.
 
     """
     terms = [IndexTerm(NOTHING, 1, 1)] if clears_stops(body) else []
+    known = distinct(orbits, periods)
+    terms += [IndexTerm(each.name, index(each, periods), each.periods) for each in known]
+    terms += [IndexTerm(f"P(inf,{own})", 1, own) for own in resting if periods % own == 0]
+    return IndexSum(periods, (*terms, *located))
+
+
+def distinct(orbits: Iterable[PeriodicOrbit], periods: int) -> list[PeriodicOrbit]:
+    """Return the shortest orbits whose number of periods divides q, each once."""
     known: list[PeriodicOrbit] = []
     for each in orbits:
         orbit = each.once
-        if periods % orbit.periods or any(same_orbit(orbit, other) for other in known):
-            continue
-        known.append(orbit)
-        terms.append(IndexTerm(orbit.name, index(orbit, periods), orbit.periods))
-    terms += [IndexTerm(f"P(inf,{own})", 1, own) for own in resting if periods % own == 0]
-    return IndexSum(periods, tuple(terms))
+        if periods % orbit.periods == 0 and not any(same_orbit(orbit, other) for other in known):
+            known.append(orbit)
+    return known
 
 
 def clears_stops(body: ImpactingBody) -> bool:

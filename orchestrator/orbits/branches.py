@@ -181,7 +181,7 @@ def follow_branches(
         followed.most_begun_impacts = MOST_BEGUN_IMPACTS
     yield from follow_departures(follower, followed, doublings, grazes)
     if seed is None and impacts is None and periods == 1 and scene.period is not None and checked:
-        followed.check = IndexCheck(scene, parameter, settings, starts)
+        followed.check = IndexCheck(scene, parameter, settings, starts, followed.ends)
         yield from _completed(follower, followed, doublings, grazes, followed.check)
     if required:
         refuse_nothing(followed, settings, impacts, periods, starts)

@@ -16,6 +16,7 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import Argument, Either, Message, message
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import class_of_record, end_in_words, long_runs, orbit_of_impacts
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.run.runner import next_start
 from vibroimpact.orchestrator.scene import Scene
 
@@ -34,11 +35,14 @@ class RunEnd:
     kind : RunClass
     orbit : PeriodicOrbit or None
         The orbit, refined from the last impacts; None for chaos, sticking, no impacts, and more than 16 periods.
+    state : tuple of float or None
+        State at the end, from which a run at a near value may start; None without one.
     """
 
     value: float
     kind: RunClass
     orbit: PeriodicOrbit | None
+    state: State | None = None
 
     @property
     def name(self) -> str:
@@ -68,7 +72,7 @@ def ends_of_runs(
                 continue  # the scene has no run there
             record = record_of({parameter: value}, start)
             start = next_start(record, start)
-            yield RunEnd(value, class_of_record(record), orbit_of_impacts(body, record.impacts))
+            yield RunEnd(value, class_of_record(record), orbit_of_impacts(body, record.impacts), start)
 
 
 def where_runs_end(ends: Sequence[RunEnd], sought: tuple[int, int]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,25 +11,38 @@ import numpy as np
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.following import FollowSettings
-from vibroimpact.analysis.orbits.index_sum import IndexSum, clears_stops, index_sum, why_without_sum
+from vibroimpact.analysis.orbits.index_sum import (
+    IndexSum,
+    IndexTerm,
+    clears_stops,
+    index_sum,
+    why_without_sum,
+)
+from vibroimpact.analysis.orbits.recurrences import MOST_RECURRENCES
 from vibroimpact.analysis.orbits.search import each_orbit, same_orbit
 from vibroimpact.analysis.orbits.symmetry import mirror_image
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import counted
-from vibroimpact.orchestrator.orbits.strobe_map import GRID_STARTS, StrobeMap
+from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd
+from vibroimpact.orchestrator.orbits.strobe_map import GRID_STARTS, IMPACT_LIMIT, StrobeMap
+from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
 
 PERIODS = (1, 2)
 """Forcing periods of the strobe maps that are checked."""
-NARROWEST = 1e-9
-"""Distance of two special points, over the range, below which nothing is checked between them."""
+NARROWEST = 1e-8
+"""Distance of two special points, over the range, below which they are one: grazes of two orbits differ by 1e-9."""
+STEADY_GRAZE = 1e-10
+"""Error of a value at which the motion without impacts meets a stop, over the range."""
 STEADY_VALUES = 65
 """Values of the range between which the motion without impacts is watched for meeting a stop."""
 LOST = "cannot be followed"
 """Beginning of the reason of a branch's end that is no special point."""
 MOST_SEARCHES = {True: 64, False: 8}
 """Number of searches for missing orbits of a body of one mode, and of several modes, whose searches take longer."""
+NEAREST_ENDS = 4
+"""Number of nearest runs over the range whose ends start runs at a value."""
 MOST_IMPACTS_A_PERIOD = 3
 """Impacts in a forcing period up to which a body of several modes is searched."""
 
@@ -58,6 +71,66 @@ class CheckedValue:
 
 
 @dataclass(slots=True)
+class Finds:
+    """The finds of the searches at a value.
+
+    Attributes
+    ----------
+    searched : set of int
+        Forcing periods of the strobe maps that were searched.
+    orbits : list of PeriodicOrbit
+        Further orbits; no branch need hold them.
+    located : dict of int to list of IndexTerm
+        Further fixed points of the strobe map, which are no orbits of equations.md 4.7, by its periods.
+    undecided : int
+        Number of cells in which a fixed point must be and was not found.
+    rests : dict of int to list of array
+        Strobe states of the orbits that rest on a stop, by the periods of the strobe map.
+    of_branches : tuple of int and list of PeriodicOrbit
+        Number of branches, and their orbits at the value.
+    """
+
+    searched: set[int] = field(default_factory=set)
+    orbits: list[PeriodicOrbit] = field(default_factory=list)
+    located: dict[int, list[IndexTerm]] = field(default_factory=dict)
+    undecided: int = 0
+    rests: dict[int, list[Floats]] = field(default_factory=dict)
+    of_branches: tuple[int, list[PeriodicOrbit]] = (0, [])
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A value of the number, with all that is known there."""
+
+    value: float
+    body: ImpactingBody
+    branches: Sequence[Branch]
+    finds: Finds
+    strobe: StrobeMap
+    starts: Sequence[State]
+
+    @property
+    def orbits(self) -> list[PeriodicOrbit]:
+        """The known orbits: those of branches, and finds."""
+        count, known = self.finds.of_branches
+        if count != len(self.branches):
+            known = orbits_at(self.branches, self.body, self.value)
+            self.finds.of_branches = len(self.branches), known
+        return [*known, *self.finds.orbits]
+
+    def rests(self, periods: int) -> list[Floats]:
+        """Return the strobe states of the orbits that rest on a stop."""
+        if periods not in self.finds.rests:
+            self.finds.rests[periods] = self.strobe.rests(self.value, periods, self.starts)
+        return self.finds.rests[periods]
+
+    def sum(self, periods: int) -> IndexSum:
+        """Return the index sum over some periods."""
+        resting = [len(each) for each in self.rests(periods)]
+        return index_sum(self.body, self.orbits, periods, resting, self.finds.located.get(periods, ()))
+
+
+@dataclass(slots=True)
 class IndexCheck:
     """Index sums of the branches of a scene over one number.
 
@@ -83,12 +156,15 @@ class IndexCheck:
         Number of orbits that they found.
     is_cut_short : bool
         Whether sums that are not 1 were left without a search, since there were too many searches.
+    has_several_modes : bool
+        Whether the body has several modes, whose searches are not complete.
     """
 
     scene: Scene
     parameter: str
     settings: FollowSettings
     starts: int
+    ends: Sequence[RunEnd] = ()
     reason: str = ""
     values: list[CheckedValue] = field(default_factory=list)
     steady_grazes: list[float] = field(default_factory=list)
@@ -96,7 +172,8 @@ class IndexCheck:
     started: int = 0
     found: int = 0
     is_cut_short: bool = False
-    _places: set[tuple[float, int]] = field(default_factory=set)
+    has_several_modes: bool = False
+    _places: dict[float, Finds] = field(default_factory=dict)
 
     def missing(self, branches: Sequence[Branch]) -> Iterator[tuple[float, PeriodicOrbit]]:
         """Yield values and orbits that no branch holds there, found where a sum is not 1; keep the sums.
@@ -116,27 +193,22 @@ class IndexCheck:
                 if self.reason:
                     self.values = []
                     return
-                resting = {periods: strobe.resting(value, periods) for periods in PERIODS}
+                self.has_several_modes = body.frequencies.size > 1
+                finds = self._places.setdefault(value, Finds())
+                place = Place(value, body, branches, finds, strobe, self._starts_near(value))
                 for periods in PERIODS:
-                    if self._is_complete(body, value, branches, periods, resting[periods]):
+                    if place.sum(periods).is_complete:
                         continue
-                    for orbit in self._search(strobe, body, value, periods, branches):
+                    for orbit in self._search(place, periods):
                         yield value, orbit
-                    if not self._is_complete(body, value, branches, periods, resting[periods]):
+                    if not place.sum(periods).is_complete:
                         break  # the same orbits are missing in the sums of more periods
-                known = orbits_at(branches, body, value)
-                sums = (index_sum(body, known, each, resting[each]) for each in PERIODS)
-                self.values.append(CheckedValue(value, (low, high), tuple(sums)))
+                self.values.append(CheckedValue(value, (low, high), tuple(map(place.sum, PERIODS))))
 
-    def _is_complete(
-        self,
-        body: ImpactingBody,
-        value: float,
-        branches: Sequence[Branch],
-        periods: int,
-        resting: Sequence[int],
-    ) -> bool:
-        return index_sum(body, orbits_at(branches, body, value), periods, resting).is_complete
+    def _starts_near(self, value: float) -> list[State]:
+        """Return the last states of the nearest runs over the range that end on no orbit of equations.md 4.7."""
+        nearest = sorted(self.ends, key=lambda each: abs(each.value - value))[:NEAREST_ENDS]
+        return [each.state for each in nearest if each.orbit is None and each.state is not None]
 
     def _steady_grazes(self, strobe: StrobeMap) -> Iterator[float]:
         """Yield the values at which the motion without impacts begins or ends to meet a stop."""
@@ -154,37 +226,48 @@ class IndexCheck:
             if None in (clear[place : place + 2]) or clear[place] == clear[place + 1]:
                 continue
             same, changed = float(values[place]), float(values[place + 1])
-            while abs(changed - same) > 0.1 * NARROWEST * self.settings.span:
+            while abs(changed - same) > STEADY_GRAZE * self.settings.span:
                 middle = 0.5 * (same + changed)
                 same, changed = (middle, changed) if is_clear(middle) == clear[place] else (same, middle)
             yield changed
 
-    def _search(
-        self, strobe: StrobeMap, body: ImpactingBody, value: float, periods: int, branches: Sequence[Branch]
-    ) -> Iterator[PeriodicOrbit]:
+    def _search(self, place: Place, periods: int) -> Iterator[PeriodicOrbit]:
         """Yield orbits that are not known, found from many starts; nothing where a search was before.
 
         After `MOST_SEARCHES` there are no more.
         """
-        if (value, periods) in self._places:
+        if periods in place.finds.searched:
             return
-        if self.searched == MOST_SEARCHES[body.frequencies.size == 1]:
+        has_one_mode = place.body.frequencies.size == 1
+        if self.searched == MOST_SEARCHES[has_one_mode]:
             self.is_cut_short = True
             return
-        self._places.add((value, periods))
+        place.finds.searched.add(periods)
         self.searched += 1
-        if body.frequencies.size == 1:
-            candidates = strobe.orbits(value, periods)
+        if has_one_mode:
+            candidates = place.strobe.orbits(place.value, periods)
             self.started += GRID_STARTS
         else:
             counts = range(1, MOST_IMPACTS_A_PERIOD * periods + 1)
-            candidates = (orbit for p in counts for orbit in each_orbit(body, p, periods, starts=self.starts))
-            self.started += self.starts * (len(counts) - 1)
-        for orbit in candidates:
+            trains = (
+                orbit for p in counts for orbit in each_orbit(place.body, p, periods, starts=self.starts)
+            )
+            candidates = itertools.chain(trains, place.strobe.passed(place.value, periods, place.starts))
+            self.started += self.starts * (len(counts) - 1) + MOST_RECURRENCES * (1 + len(place.starts))
+        yield from self._new(place, candidates)
+        if has_one_mode and not place.sum(periods).is_complete:
+            located = place.strobe.located(place.value, periods, place.orbits, place.rests(periods))
+            place.finds.located[periods] = located.terms
+            place.finds.undecided += located.undecided
+            yield from self._new(place, located.orbits)
+
+    def _new(self, place: Place, orbits: Iterable[PeriodicOrbit]) -> Iterator[PeriodicOrbit]:
+        """Yield and keep the physical orbits that are not known."""
+        for orbit in orbits:
             # an orbit found before may have brought a branch that holds this one, too
-            known = orbits_at(branches, body, value)
-            if orbit.is_physical and not any(same_orbit(orbit, other) for other in known):
+            if orbit.is_physical and not any(same_orbit(orbit, other) for other in place.orbits):
                 self.found += 1
+                place.finds.orbits.append(orbit)
                 yield orbit
 
     @property
@@ -215,7 +298,24 @@ class IndexCheck:
             )
         if self.is_cut_short:
             rows.append("There were no more searches: a smaller range has more for each part of it.")
-        return [*rows, *self._sums()]
+        return [*rows, *self._limits(), *self._sums()]
+
+    def _limits(self) -> Iterator[str]:
+        """Yield lines on orbits that are counted and not followed, and on orbits that no search finds."""
+        finds = [self._places[each.value] for each in self.values]
+        located = {term.name for each in finds for terms in each.located.values() for term in terms}
+        if located:
+            yield f"Counted, not followed: {', '.join(sorted(located))}, which the strobe map itself locates."
+        if undecided := sum(each.undecided for each in finds):
+            yield (
+                f"The strobe map has {counted(undecided, 'further fixed point')} that no run with at most "
+                f"{IMPACT_LIMIT} impacts a period shows."
+            )
+        if self.incomplete and self.has_several_modes:
+            yield (
+                f"Several modes: orbits with more than {MOST_IMPACTS_A_PERIOD} impacts a period are found only near "
+                "runs; those with a complete chatter are counted where runs end on them, not where they are unstable."
+            )
 
     def _sums(self) -> Iterator[str]:
         """Yield the terms of the sums; neighbouring ranges with the same terms are one."""

@@ -1,4 +1,4 @@
-"""Branches of random oscillators, chains and beams: stability changes for a cause, and one mode has the sum 1."""
+"""Branches of random oscillators, chains and beams: stability changes for a cause, and one mode has the sums 1."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check(seed: int) -> str | None:
                 return f"{tables}: {branch.full_name} changes its stability at {point.at.value:.12g}"
     if tables["body"].get("modes", 1) > 1 or tables["body"].get("kind") == "chain" or followed.check is None:
         return None
-    missing = [str(each.sums[0]) for each in followed.check.values if not each.sums[0].is_complete]
+    missing = [" and ".join(map(str, each.sums)) for each in followed.check.incomplete]
     return f"{tables}: {'; '.join(missing)}" if missing else None
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from typing import Any
 
-from vibroimpact.analysis.orbits import PeriodicOrbit
 from vibroimpact.analysis.orbits.index_sum import index_sum, why_without_sum
 from vibroimpact.orchestrator.orbits.strobe_map import StrobeMap
 from vibroimpact.orchestrator.scene import Scene
@@ -13,8 +12,6 @@ from vibroimpact.orchestrator.scene import Scene
 CASES, SAMPLE = 500, 2
 SECONDS = 60.0
 FREQUENCY = "forcing.angular_frequency"
-GRIDS = (128, 512)
-"""Cells along each axis, tried until the sum is 1."""
 
 
 def check(seed: int) -> str | None:
@@ -25,13 +22,13 @@ def check(seed: int) -> str | None:
         body = strobe.body(value)
         if reason := why_without_sum(body):
             return f"{tables}: {reason}"
-        resting, found = strobe.resting(value, 1), list[PeriodicOrbit]()
-        for cells in GRIDS:
-            found += strobe.orbits(value, 1, cells)
-            total = index_sum(body, found, 1, resting)
-            if total.is_complete:
-                return None
-    return f"{tables}: the indices are {total}"
+        found, rests = list(strobe.orbits(value, 1)), strobe.rests(value, 1)
+        resting = [len(each) for each in rests]
+        total = index_sum(body, found, 1, resting)
+        if not total.is_complete:
+            located = strobe.located(value, 1, found, rests)
+            total = index_sum(body, [*found, *located.orbits], 1, resting, located.terms)
+    return None if total.is_complete else f"{tables}: the indices are {total}"
 
 
 def oscillator(draw: random.Random) -> dict[str, Any]:

@@ -9,13 +9,16 @@ import pytest
 from soak import index_sums as soak
 
 import vibroimpact as vi
+from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.orbits.classify import RunClass
 from vibroimpact.analysis.orbits.following import FollowSettings
-from vibroimpact.analysis.orbits.index_sum import IndexSum
+from vibroimpact.analysis.orbits.index_sum import IndexSum, IndexTerm
 from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.branches import Followed
+from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd
 from vibroimpact.orchestrator.orbits.follow import Following
 from vibroimpact.orchestrator.orbits.index_check import IndexCheck, between_special_points
-from vibroimpact.orchestrator.orbits.strobe_map import StrobeMap
+from vibroimpact.orchestrator.orbits.strobe_map import Located, StrobeMap
 from vibroimpact.orchestrator.scene import Scene
 
 PARAMETER = "forcing.angular_frequency"
@@ -88,6 +91,41 @@ def test_a_missing_branch_makes_another_sum_which_the_lines_say(
     assert "Orbits are missing from 0.965 to 0.97375272: P(1,1) +2, sum 2 over 1 and 2 periods." in said
 
 
+def test_fixed_points_that_no_branch_holds_are_counted_and_said(
+    followed: Followed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = [branch for branch in followed.branches if branch.name != "P(2,1)"]
+
+    def located(*_: object) -> Located:
+        return Located(terms=[IndexTerm("P(70,1)", -1, 1)])
+
+    monkeypatch.setattr(StrobeMap, "orbits", lambda *_: iter(()))
+    monkeypatch.setattr(StrobeMap, "located", located)
+    check = IndexCheck(Scene.from_dict(two_sided()), PARAMETER, FollowSettings(0.965, 0.97), 16)
+    assert not list(check.missing(left))
+    said = "\n".join(check.lines)
+    assert "Indices from 0.965 to 0.97: P(1,1) +2, P(70,1) -1, sum 1" in said
+    assert "Counted, not followed: P(70,1), which the strobe map itself locates." in said
+
+
+def test_a_fixed_point_that_no_run_shows_is_said(followed: Followed, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = [branch for branch in followed.branches if branch.name != "P(2,1)"]
+    monkeypatch.setattr(StrobeMap, "orbits", lambda *_: iter(()))
+    monkeypatch.setattr(StrobeMap, "located", lambda *_: Located(undecided=1))
+    check = IndexCheck(Scene.from_dict(two_sided()), PARAMETER, FollowSettings(0.965, 0.97), 16)
+    assert not list(check.missing(left))
+    said = "\n".join(check.lines)
+    assert "Orbits are missing from 0.965 to 0.97: P(1,1) +2, sum 2" in said
+    assert "1 further fixed point that no run with at most 2000 impacts a period shows" in said
+
+
+def test_the_nearest_runs_over_the_range_that_end_on_no_orbit_start_further_runs() -> None:
+    kind = RunClass(OrbitClass.sticking, 1)
+    ends = [RunEnd(value, kind, None, (value,)) for value in (1.0, 1.1, 1.2, 1.3, 1.4, 1.5)]
+    check = IndexCheck(Scene.from_dict(two_sided()), PARAMETER, FollowSettings(1.0, 1.5), 16, ends)
+    assert sorted(each[0] for each in check._starts_near(1.16)) == [1.0, 1.1, 1.2, 1.3]
+
+
 def test_ranges_lie_between_special_points_of_all_branches(followed: Followed) -> None:
     ranges = between_special_points(followed.branches, FollowSettings(0.965, 0.985))
     assert ranges[0][0] == 0.965
@@ -123,16 +161,16 @@ def test_a_chain_that_can_meet_two_stops_at_once_is_named() -> None:
 def test_an_orbit_that_rests_on_both_stops_counts_once() -> None:
     scene = Scene.from_dict(two_sided(amplitude=2.0, angular_frequency=0.2))
     with StrobeMap(scene, PARAMETER) as strobe:
-        assert strobe.resting(0.2, 1) == [1]
-        assert strobe.resting(0.2, 2) == [1]
-        assert strobe.resting(1.1, 1) == []
+        assert [len(each) for each in strobe.rests(0.2, 1)] == [1]
+        assert [len(each) for each in strobe.rests(0.2, 2)] == [1]
+        assert strobe.rests(1.1, 1) == []
 
 
 def test_a_body_that_is_always_pressed_on_its_stop_rests() -> None:
     scene = two_sided() | {"stop": [{"position": -1.0, "restitution": 0.7}]}
     scene["body"] = scene["body"] | {"displacement_start": -1.0}
     with StrobeMap(Scene.from_dict(scene), PARAMETER) as strobe:
-        assert strobe.resting(1.1, 1) == [1]
+        assert [len(each) for each in strobe.rests(1.1, 1)] == [1]
 
 
 @pytest.mark.parametrize("seed", [1, 4])
