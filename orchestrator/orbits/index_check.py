@@ -32,7 +32,9 @@ from vibroimpact.orchestrator.scene import Scene
 PERIODS = (1, 2)
 """Forcing periods of the strobe maps that are checked."""
 NARROWEST = 1e-8
-"""Distance of two special points, over the range, below which they are one: grazes of two orbits differ by 1e-9."""
+"""Distance of two special points, over the range, below which nothing is checked between them."""
+SAME_POINT = 1e-9
+"""Distance of two special points, over the range, below which they are one: their errors."""
 STEADY_GRAZE = 1e-10
 """Error of a value at which the motion without impacts meets a stop, over the range."""
 STEADY_VALUES = 65
@@ -158,6 +160,8 @@ class IndexCheck:
         Whether sums that are not 1 were left without a search, since there were too many searches.
     has_several_modes : bool
         Whether the body has several modes, whose searches are not complete.
+    narrow : int
+        Number of ranges between special points that are too narrow to be checked.
     """
 
     scene: Scene
@@ -173,6 +177,7 @@ class IndexCheck:
     found: int = 0
     is_cut_short: bool = False
     has_several_modes: bool = False
+    narrow: int = 0
     _places: dict[float, Finds] = field(default_factory=dict)
 
     def missing(self, branches: Sequence[Branch]) -> Iterator[tuple[float, PeriodicOrbit]]:
@@ -183,7 +188,10 @@ class IndexCheck:
         self.values = []
         with StrobeMap(self.scene, self.parameter) as strobe:
             self.steady_grazes = list(self._steady_grazes(strobe))
-            for low, high in between_special_points(branches, self.settings, self.steady_grazes):
+            ranges = between_special_points(branches, self.settings, self.steady_grazes)
+            widths = np.array([high - low for low, high in ranges]) / self.settings.span
+            self.narrow = int(np.count_nonzero((widths > SAME_POINT) & (widths <= NARROWEST)))
+            for low, high in itertools.compress(ranges, widths > NARROWEST):
                 value = 0.5 * (low + high)
                 try:
                     body = strobe.body(value)
@@ -302,6 +310,8 @@ class IndexCheck:
 
     def _limits(self) -> Iterator[str]:
         """Yield lines on orbits that are counted and not followed, and on orbits that no search finds."""
+        if self.narrow:
+            yield f"Narrower than {NARROWEST:g} of the whole, and not checked: {counted(self.narrow, 'range')}."
         finds = [self._places[each.value] for each in self.values]
         located = {term.name for each in finds for terms in each.located.values() for term in terms}
         if located:
@@ -349,8 +359,8 @@ def between_special_points(
         values += [branch.orbits[place].value for reason, place in reasons if reason.startswith(LOST)]
     inside = [each for each in values if settings.lowest < each < settings.highest]
     ends = sorted({settings.lowest, settings.highest, *inside})
-    narrowest = NARROWEST * settings.span
-    return [(low, high) for low, high in itertools.pairwise(ends) if high - low > narrowest]
+    same = SAME_POINT * settings.span
+    return [(low, high) for low, high in itertools.pairwise(ends) if high - low > same]
 
 
 def orbits_at(branches: Sequence[Branch], body: ImpactingBody, value: float) -> list[PeriodicOrbit]:
