@@ -293,6 +293,9 @@ def _stable_orbits(branch: Branch) -> str:
         if is_stable
     ]
     groups = [each for each in groups if len(each) > 1 or abs(each[0].orbit.multipliers[0]) < 1.0 - MARGINAL]
+    ends = {id(branch.orbits[0]), id(branch.orbits[-1])}
+    if branch.is_closed and len(groups) > 1 and ends == {id(groups[0][0]), id(groups[-1][-1])}:
+        groups[0] += groups.pop()
     ranges = [sorted(each.value for each in group) for group in groups]
     shown = ", ".join(f"{each[0]:.6g} to {each[-1]:.6g}" for each in ranges)
     return f"{sum(map(len, groups))} stable{f' ({shown})' if shown else ''}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, hsv_to_rgb, rgb_to_hsv, to_rgb
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.families import register_results
@@ -14,6 +14,8 @@ from vibroimpact.analysis.figures.sweep.diagrams import edges
 
 COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
 _MARKS = "osD^vPX*"
+STRONG = (1.0, 0.55)
+"""Saturation and brightness of the states of an attractor; the hue is that of its basin."""
 WIDE = 22
 """Characters of a legend's entry up to which two entries fit side by side."""
 _UNDECIDED, _BEYOND = "#FFFFFF", "#5A5A5A"
@@ -48,7 +50,7 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
             markersize=4.5,
             label=_label(names[place], _share(dataset, place)),
         )
-    _draw_sections(axis, dataset)
+    _draw_sections(axis, dataset, colours)
     if "edge_orbit" in dataset:
         _draw_edges(axis, dataset)
     for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop")):
@@ -65,11 +67,14 @@ def draw_basins(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _draw_sections(axis: Axes, dataset: xr.Dataset) -> None:
-    """Draw the states at forcing phase 0 of attractors without a period, where the dataset has them."""
-    if "section_displacement" in dataset:
-        x, y = (dataset[f"section_{what}"].values for what in ("displacement", "velocity"))
-        axis.plot(x.ravel(), y.ravel(), ".", color="black", markersize=1.0, markeredgewidth=0.0)
+def _draw_sections(axis: Axes, dataset: xr.Dataset, colours: list[str]) -> None:
+    """Draw the states at forcing phase 0 of attractors without a period, in a strong tone of its colour."""
+    if "section_displacement" not in dataset:
+        return
+    sections = (dataset[f"section_{what}"].values for what in ("displacement", "velocity"))
+    for colour, x, y in zip(colours, *sections, strict=True):
+        hue, _, _ = rgb_to_hsv(to_rgb(colour))
+        axis.plot(x, y, ".", color=hsv_to_rgb((hue, *STRONG)), markersize=1.0, markeredgewidth=0.0)
 
 
 def _draw_edges(axis: Axes, dataset: xr.Dataset) -> None:
