@@ -138,7 +138,7 @@ class PowerPassage:
         self._approach = contact.direction * forced.approach(contact)
         self._second = self._approach @ forced.free.matrix
         self._kick = np.zeros(forced.size)
-        self._kick[forced.velocity] = contact.shape
+        self._kick[forced.velocity] = contact.direction * contact.shape
         rate = forced.free.rate
         self._back = forced.free.reversed()
         self._rows = LinearFlow(forced.free.matrix.T, rate)
@@ -194,7 +194,7 @@ class PowerPassage:
         times = found.duration * nodes.share
         # forces act on all that comes later: at each node, and at the end
         pushed = found.duration * nodes.weights * found.force
-        after = over @ (before - self.direction * found.kicks @ pushed)
+        after = over @ (before - found.kicks @ pushed)
         rows = self._rows.along(self._beyond, times).T, self._rows.along(self._approach, times).T
         driven = found.by_depth[:, None] * rows[0] + found.by_rate[:, None] * rows[1]
         system = (
@@ -203,7 +203,7 @@ class PowerPassage:
             + found.by_rate[:, None] * found.answer[1]
         )
         changes = np.linalg.solve(system, np.column_stack([driven[:, own], -self.direction * found.by_depth]))
-        ends = -self.direction * (over @ found.kicks)[own] * (found.duration * nodes.weights)
+        ends = -(over @ found.kicks)[own] * (found.duration * nodes.weights)
         flow, by_offset = over[own, own] + ends @ changes[:, :-1], ends @ changes[:, -1]
         normal = np.concatenate([self._contact.shape, np.zeros(forced.modes)])
         drift = self.direction * float(self._approach[2 * forced.modes :] @ before[2 * forced.modes :])
@@ -221,7 +221,7 @@ class PowerPassage:
     def _vectors(self, found: _Contact, before: Floats) -> Floats:
         """Return the vectors at the nodes of a contact, shape (node, size)."""
         pushes = found.duration * found.nodes.integral * found.force
-        starts = before - self.direction * pushes @ found.kicks.T
+        starts = before - pushes @ found.kicks.T
         times = found.duration * found.nodes.share
         return np.array(
             [self._forced.free.over(time) @ each for time, each in zip(times, starts, strict=True)]
@@ -341,7 +341,7 @@ class PowerPassage:
                 known = np.interp(EVEN, even, [*forces, 0.0])
                 return _Hint((len(forces) - 1) * step, known, NODES[0], depth > 0.0)
             forces.append(force)
-            state = half @ (state - step * force * self.direction * self._kick)
+            state = half @ (state - step * force * self._kick)
         raise OrbitError(
             f"orbit: expected a stop that is left within {limit:.6g} s, got one that stays pressed."
         )
