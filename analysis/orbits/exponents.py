@@ -90,10 +90,9 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
         There are too few impacts, an impact has no speed, or the sum rule does not hold.
     """
     count = impacts.times.size
-    if count < 2 or not (impacts.velocities > 0.0).all():
+    if count < 2 or not _can_be_followed(body, impacts):
         raise ExponentError(
-            "lyapunov: expected impacts with a speed, got a motion without, at rest on a stop, or pressing one again "
-            "before it is left."
+            "lyapunov: expected impacts with a speed, got a motion without, or at rest on a stop."
         )
     if body.has_own_period:
         return _without_force(body, impacts)
@@ -104,6 +103,12 @@ def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
     if impacts.times.size - first < LEAST:
         return _of_few_impacts(body, impacts, first)
     return _of_run(_stretched(body, impacts, elapsed, first), elapsed) or _of_few_impacts(body, impacts)
+
+
+def _can_be_followed(body: ImpactingBody, impacts: Impacts) -> bool:
+    """Return whether all impacts have a speed, or press a stop with damping again before it is left."""
+    damped = [each.press is not None and each.press.damping > 0.0 for each in body.contacts]
+    return bool(((impacts.velocities > 0.0) | np.array(damped, dtype=bool)[impacts.contacts]).all())
 
 
 class _Logarithms(NamedTuple):
@@ -145,7 +150,7 @@ def _of_few_impacts(body: ImpactingBody, impacts: Impacts, first: int | None = N
         if count >= LEAST and first >= count:
             raise ExponentError(
                 f"lyapunov: expected contacts that follow from one another, got impact {first - SETTLING} that does "
-                "not: contacts overlap, a stop is pressed again before it is left, or the filter finds no first state."
+                "not: contacts overlap, or the filter finds no first state."
             ) from None
         raise ExponentError(
             f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
