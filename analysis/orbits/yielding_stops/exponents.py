@@ -6,7 +6,7 @@ import numpy as np
 
 from vibroimpact.analysis.orbits.errors import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts
-from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import Law, yielding_motion
 from vibroimpact.analysis.orbits.yielding_stops.passages import Passage
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
@@ -26,7 +26,8 @@ class RecordedStretching:
 
     Each contact shows two numbers of the state: the point is at its stop, with the recorded speed. A contact without
     speed presses a stop again before it is left, and shows one number: its force is 0. A filter finds the whole state
-    from all contacts before. A first state that the contact of a run cannot pass goes roughly by its duration. It needs no damping: modes may also grow.
+    from all contacts before. A first state that cannot pass a recorded contact goes roughly by its duration. The filter
+    needs no damping: modes may also grow.
 
     Parameters
     ----------
@@ -133,11 +134,14 @@ class RecordedStretching:
     def _passage(self, k: int, state: Floats) -> Passage | None:
         """Return the passage of a state through a recorded contact, or roughly by its duration; None: it is unknown."""
         motion, impacts = self._motion, self._impacts
-        law, before = motion.passages[impacts.contacts[k]], motion.forced.vector(state, impacts.phases[k])
+        law: Law = motion.passages[int(impacts.contacts[k])]
+        before = motion.forced.vector(state, float(impacts.phases[k]))
         limit = float(impacts.times[k + 1] - impacts.times[k])
         duration = np.nan if impacts.durations is None else float(impacts.durations[k])
         try:
-            return (law.again if self._again[k] else law.through)(before, limit, recorded=duration)
+            if self._again[k]:
+                return law.again(before, limit, recorded=duration)
+            return law.through(before, limit, recorded=duration)
         except OrbitError:  # a first state far from the true one
             self._is_rough[k + 1] = True
         if not 0.0 < duration < limit:

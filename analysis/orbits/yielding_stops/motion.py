@@ -420,16 +420,6 @@ class YieldingMotion:
         again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
         return 1 + int(np.argmax(again)) if again.any() else 0
 
-    def presses_again(self, train: Train) -> int:
-        """Return the first contact whose stop is pressed again before the body has left it; -1 if there is none."""
-        for segment in (each for each in train.segments if each.left >= 0):
-            times = np.append(np.arange(0.0, segment.duration, segment.path.step), segment.duration)
-            states = segment.path.along(segment.state, times)
-            depths = self.signs[segment.left] * (self.beyond[segment.left] @ states)
-            if self._pressed_again(segment.left, depths, states):
-                return segment.left
-        return -1
-
     def _peak(
         self, flow: Path, state: Floats, contact: int, time: float, step: float
     ) -> tuple[float, float, int]:

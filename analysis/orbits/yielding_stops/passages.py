@@ -240,7 +240,7 @@ class LinearPassage:
 
     @property
     def pressing_again(self) -> tuple[Floats, float]:
-        """Row and value that a vector has where a stop is pressed again before it is left, m/s; OrbitError: it is not."""
+        """Row and value of vectors where a stop is pressed again before it is left, m/s; OrbitError: no dashpot."""
         if not self._damping > 0.0:
             raise OrbitError("orbit: expected a stop with damping, which presses again, got one without.")
         return self.force / self._damping, 0.0

@@ -214,7 +214,7 @@ class PowerPassage:
 
     @property
     def pressing_again(self) -> tuple[Floats, float]:
-        """Row and value that a vector has where a stop is pressed again before it is left, m/s; no damping: no row."""
+        """Row and value of vectors where a stop is pressed again before it is left, m/s; OrbitError: no damping."""
         if not self._press.damping > 0.0:
             raise OrbitError("orbit: expected a stop with damping, which presses again, got one without.")
         return self.direction * self._approach, -self.direction / self._press.damping
@@ -390,7 +390,9 @@ class PowerPassage:
         """Return a contact to about a hundredth, by steps with kicks."""
         forced, press = self._forced, self._press
         speed, back = float(self._approach @ before), float(self._second @ before)
-        usual = self.usual_duration_at(speed) if speed > 0.0 else self._half_turn(float(self._beyond @ before))
+        usual = (
+            self.usual_duration_at(speed) if speed > 0.0 else self._half_turn(float(self._beyond @ before))
+        )
         step = (min(usual, 2.0 * speed / -back) if back < 0.0 < speed else usual) / steps
         half, state, forces = forced.free.over(0.5 * step), before.copy(), [0.0]
         for _ in range(min(MOST_COARSE, int(limit / step) + 2)):

@@ -82,6 +82,17 @@ def test_a_contact_below_is_the_mirror_image_of_a_contact_above(
         np.testing.assert_allclose(getattr(below, name), -getattr(above, name), rtol=1e-9, atol=1e-9)
 
 
+def test_a_contact_outlasts_a_fast_mode_that_brakes_its_beginning() -> None:
+    stop = Contact(np.ones(2), 1.0, 0.0, 0.0, press=Press("hertz", 150.0, 0.0, 1.5))
+    rates = np.array([1.0, 20.0])
+    body = ImpactingBody(rates, 0.02 * np.ones(2), np.zeros(2), np.zeros(2), 1.0, 0.0, (stop,), np.ones(2))
+    motion = yielding_motion(body)
+    before = motion.forced.vector(np.array([-0.05, 0.05, 0.9, 0.0]), 0.0)
+    passage = motion.passages[0].through(before, 10.0)
+    assert passage.duration > 0.2  # with the first acceleration alone: 0.09
+    assert passage.after[:2].sum() == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("press", LAWS, ids=NAMES)
 def test_the_slopes_of_distances_and_speeds_are_their_differences(press: Press) -> None:
     body, contacts = oscillator(press), np.zeros(1, np.int32)
