@@ -77,6 +77,8 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
     # counted from the period of the first impact
     begin = TURN * np.floor(first / TURN)
     velocities, hit = impacts.velocities[last], impacts.contacts[last]
+    if not (velocities > 0.0).all():
+        raise OrbitError("an orbit that presses a stop again before it is left, which is not followed")
     lasting = None if impacts.durations is None else impacts.durations[last]
     start = start_near(body, hit, phases[last] - begin, periods, velocities, lasting)
     found = find_orbit(body, phases[last] - begin, hit.tolist(), periods, start=start)

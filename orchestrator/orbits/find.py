@@ -21,7 +21,7 @@ from vibroimpact.analysis.orbits.found import FoundOrbits
 from vibroimpact.analysis.orbits.own_orbits import own_orbit_of_impacts
 from vibroimpact.analysis.orbits.periodic import least_speed
 from vibroimpact.analysis.orbits.search import STARTS, each_orbit, fastest_first, same_orbit
-from vibroimpact.analysis.orbits.yielding_stops.motion import start_near, yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import start_near
 from vibroimpact.analysis.study import Study, whole
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import UsageError
@@ -302,7 +302,4 @@ def _nearest(orbit: PeriodicOrbit) -> str:
         return "none"
     if orbit.is_physical:
         return f"{-beyond:.3g} below stop {contact + 1}"
-    again = yielding_motion(orbit.body).presses_again(orbit.train) if orbit.body.yields else -1
-    if again >= 0:
-        return f"presses stop {again + 1} again before it is left"
     return f"penetrates stop {contact + 1} by {beyond:.3g}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from vibroimpact.analysis.orbits.errors import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts
-from vibroimpact.analysis.orbits.yielding_stops.motion import yielding_motion
+from vibroimpact.analysis.orbits.yielding_stops.motion import Law, yielding_motion
 from vibroimpact.analysis.orbits.yielding_stops.passages import Passage
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 
@@ -24,8 +24,10 @@ TINY = np.finfo(np.float64).tiny
 class RecordedStretching:
     """Directions carried along a recorded motion from contact to contact, and their stretching.
 
-    Each contact shows two numbers of the state: the point is at its stop, with the recorded speed. A filter finds the
-    whole state from all contacts before. It needs no damping: modes may also grow.
+    Each contact shows two numbers of the state: the point is at its stop, with the recorded speed. A contact without
+    speed presses a stop again before it is left, and shows one number: its force is 0. A filter finds the whole state
+    from all contacts before. A first state that cannot pass a recorded contact goes roughly by its duration. The filter
+    needs no damping: modes may also grow.
 
     Parameters
     ----------
@@ -46,6 +48,7 @@ class RecordedStretching:
 
     def __init__(self, body: ImpactingBody, impacts: Impacts) -> None:
         self._motion, self._impacts = yielding_motion(body), impacts
+        self._again = ~(impacts.velocities > 0.0)
         count, self._size = impacts.times.size, 2 * body.frequencies.size
         directions = self._size - body.has_own_period
         self._unit = body.slowest if body.has_own_period else body.angular_frequency
@@ -54,6 +57,7 @@ class RecordedStretching:
         self.logarithms = np.zeros((count, directions))
         self.shrinking = np.zeros(count)
         self.errors = np.full(count, np.inf)
+        self._is_rough = np.zeros(count, dtype=bool)
         self._carry()
 
     @property
@@ -70,16 +74,17 @@ class RecordedStretching:
         for k in range(self._impacts.times.size):
             state, variance, error = self._seen(k, state, variance)
             if k:
-                self.errors[k] = error
+                self.errors[k] = np.inf if self._is_rough[k] else error
                 directions = self._across(state, k, directions)
                 directions, upper = np.linalg.qr(directions)
                 self.logarithms[k] += np.log(np.maximum(np.abs(np.diag(upper)), TINY))
             if k + 1 == self._impacts.times.size:
                 return
-            try:
-                state, variance, directions = self._to_next(k, state, variance, directions)
-            except OrbitError:  # a first state far from the true one
+            passage = self._passage(k, state)
+            if passage is None:
                 state, variance = np.zeros(size), UNKNOWN * np.eye(size)
+            else:
+                state, variance, directions = self._to_next(k, passage, variance, directions)
 
     def _across(self, state: Floats, k: int, directions: Floats) -> Floats:
         """Return directions without their part along the motion, where no force has a phase."""
@@ -105,25 +110,53 @@ class RecordedStretching:
     def _seen(self, k: int, state: Floats, variance: Floats) -> tuple[Floats, Floats, float]:
         """Return the state that a recorded contact leaves the most likely, its variance, and the error before."""
         motion, forced = self._motion, self._motion.forced
-        contact, speed = int(self._impacts.contacts[k]), float(self._impacts.velocities[k])
-        rows = np.array([motion.beyond[contact], motion.approach[contact]])
-        seen = rows @ forced.vector(state, float(self._impacts.phases[k]))
-        off = seen - [0.0, motion.signs[contact] * speed]
+        rows, known, units = self._shown(k)
+        off = rows @ forced.vector(state, float(self._impacts.phases[k])) - known
         slopes = rows[:, forced.motion] / self._weights
         gain = np.linalg.solve(slopes @ variance @ slopes.T, slopes @ variance).T
         state = state - gain @ off / self._weights
         variance = variance - gain @ slopes @ variance
-        error = float(np.abs(off / [1.0, self._unit]).max()) / motion.body.scale
+        error = float(np.abs(off / units).max()) / motion.body.scale
         return state, 0.5 * (variance + variance.T), error
 
+    def _shown(self, k: int) -> tuple[Floats, Floats, Floats]:
+        """Return rows of the vector that a recorded contact shows, their values, and the units of their errors."""
+        motion, contact = self._motion, int(self._impacts.contacts[k])
+        if not self._again[k]:
+            rows = np.array([motion.beyond[contact], motion.approach[contact]])
+            speed = motion.signs[contact] * float(self._impacts.velocities[k])
+            return rows, np.array([0.0, speed]), np.array([1.0, self._unit])
+        row, value = motion.passages[contact].pressing_again
+        modes = slice(0, motion.forced.modes)
+        steep = float(np.linalg.norm(row[modes]) / np.linalg.norm(motion.beyond[contact, modes]))
+        return row[None], np.array([value]), np.array([max(self._unit, steep)])
+
+    def _passage(self, k: int, state: Floats) -> Passage | None:
+        """Return the passage of a state through a recorded contact, or roughly by its duration; None: it is unknown."""
+        motion, impacts = self._motion, self._impacts
+        law: Law = motion.passages[int(impacts.contacts[k])]
+        before = motion.forced.vector(state, float(impacts.phases[k]))
+        limit = float(impacts.times[k + 1] - impacts.times[k])
+        duration = np.nan if impacts.durations is None else float(impacts.durations[k])
+        try:
+            if self._again[k]:
+                return law.again(before, limit, recorded=duration)
+            return law.through(before, limit, recorded=duration)
+        except OrbitError:  # a first state far from the true one
+            self._is_rough[k + 1] = True
+        if not 0.0 < duration < limit:
+            return None
+        over, own = motion.fixed(int(impacts.contacts[k]), duration), motion.forced.motion
+        flow = over[own, own]
+        return Passage(0.0, 0.0, duration, 0.0, (over @ before)[own], flow, np.zeros(self._size), flow, 1.0)
+
     def _to_next(
-        self, k: int, state: Floats, variance: Floats, directions: Floats
+        self, k: int, passage: Passage, variance: Floats, directions: Floats
     ) -> tuple[Floats, Floats, Floats]:
         """Return state, variance and directions before the next contact."""
         motion, impacts, weights = self._motion, self._impacts, self._weights
         body, forced = motion.body, motion.forced
         elapsed, phase = float(impacts.times[k + 1] - impacts.times[k]), float(impacts.phases[k])
-        passage = motion.passages[impacts.contacts[k]].through(forced.vector(state, phase), elapsed)
         away = forced.vector(passage.after, phase + passage.duration * body.angular_frequency)
         flight = elapsed - passage.duration
         over = forced.free.over(flight)

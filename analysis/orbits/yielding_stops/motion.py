@@ -291,7 +291,7 @@ class YieldingMotion:
         gaps = _gaps(phases, periods) / self.body.angular_frequency
         whole, added = np.eye(2 * forced.modes), np.zeros(2 * forced.modes)
         for contact, phase, gap, duration in zip(contacts, phases, gaps, durations, strict=True):
-            over = forced.free.over(gap - duration) @ self._fixed(int(contact), duration)
+            over = forced.free.over(gap - duration) @ self.fixed(int(contact), duration)
             none = forced.vector(np.zeros(2 * forced.modes), phase)
             whole = over[forced.motion, forced.motion] @ whole
             added = over[forced.motion, forced.motion] @ added + (over @ none)[forced.motion]
@@ -304,7 +304,7 @@ class YieldingMotion:
         moved = self.beyond[contact] @ vector, self.approach[contact] @ vector
         return np.array([-moved[0] / shape, (self.signs[contact] * speed - moved[1]) / shape])
 
-    def _fixed(self, contact: int, duration: float) -> Floats:
+    def fixed(self, contact: int, duration: float) -> Floats:
         """Return the linear map of a contact of a given duration, with the surface of the stop in its place."""
         law = self.passages[contact]
         return law.matrix if isinstance(law, RigidPassage) else law.fixed(duration)
@@ -419,16 +419,6 @@ class YieldingMotion:
         inside = np.cumprod(depths > 0.0).astype(bool)
         again = (inside & law.presses(states))[1:]  # the contact has just ended at the first
         return 1 + int(np.argmax(again)) if again.any() else 0
-
-    def presses_again(self, train: Train) -> int:
-        """Return the first contact whose stop is pressed again before the body has left it; -1 if there is none."""
-        for segment in (each for each in train.segments if each.left >= 0):
-            times = np.append(np.arange(0.0, segment.duration, segment.path.step), segment.duration)
-            states = segment.path.along(segment.state, times)
-            depths = self.signs[segment.left] * (self.beyond[segment.left] @ states)
-            if self._pressed_again(segment.left, depths, states):
-                return segment.left
-        return -1
 
     def _peak(
         self, flow: Path, state: Floats, contact: int, time: float, step: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -159,7 +159,7 @@ class RigidPassage:
         )
         return found
 
-    def through(self, before: Floats, limit: float) -> Passage:
+    def through(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
         """Return the passage of a vector of `ForcedModes`; a rigid impact has no duration."""
         forced, contact = self._forced, self._contact
         free, sign, own = forced.free.matrix, contact.direction, forced.motion
@@ -182,6 +182,15 @@ class RigidPassage:
             *(after[own], jump, by_time - rates[1], jump + salted),
             float(contact.restitution_slope(speed)) * kept,
         )
+
+    @property
+    def pressing_again(self) -> tuple[Floats, float]:
+        """Raise OrbitError: a rigid stop is not pressed."""
+        raise OrbitError("orbit: expected a stop that yields, which presses again, got a rigid one.")
+
+    def again(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
+        """Raise OrbitError: a rigid stop is not pressed."""
+        raise OrbitError("orbit: expected a stop that yields, which presses again, got a rigid one.")
 
 
 class LinearPassage:
@@ -214,14 +223,38 @@ class LinearPassage:
         """Return the linear map of a contact of a given duration, s, with the surface of the stop in its place."""
         return self.flow.over(duration)
 
-    def through(self, before: Floats, limit: float) -> Passage:
-        """Return the passage of a vector of `ForcedModes`; OrbitError if it takes longer than a limit, s."""
+    def through(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
+        """Return the passage of a vector of `ForcedModes`; OrbitError if it takes longer than a limit, s.
+
+        A `recorded` duration (s) makes the passage linear in the vector.
+        """
         forced = self._forced
         speed = self._contact.direction * float(self._approach @ before)
         pressed = before.copy()
         pressed[forced.offset] = self._beyond @ before if self._is_shifted else 0.0
+        if speed > 0.0 and 0.0 < recorded < limit:
+            return self._of_duration(pressed, recorded)
         return self._of_duration(
             pressed, self.release(pressed, limit) if speed > 0.0 else -self._began(pressed)
+        )
+
+    @property
+    def pressing_again(self) -> tuple[Floats, float]:
+        """Row and value of vectors where a stop is pressed again before it is left, m/s; OrbitError: no dashpot."""
+        if not self._damping > 0.0:
+            raise OrbitError("orbit: expected a stop with damping, which presses again, got one without.")
+        return self.force / self._damping, 0.0
+
+    def again(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
+        """Return the passage of a vector within a stop whose force begins at 0; OrbitError beyond a limit, s."""
+        own, is_known = self._forced.motion, 0.0 < recorded < limit
+        duration = recorded if is_known else self.release(before, limit, from_zero=True)
+        flow = self.flow.over(duration)[own, own]
+        return replace(
+            self._of_duration(before, duration),
+            slope=flow,
+            shift=-flow @ (self.flow.matrix @ before)[own],
+            tangent=flow,  # the force does not jump
         )
 
     def _of_duration(self, pressed: Floats, duration: float) -> Passage:
@@ -249,8 +282,12 @@ class LinearPassage:
             self.flow if duration > 0.0 else None,
         )
 
-    def release(self, pressed: Floats, limit: float) -> float:
-        """Return the time after which the force is 0 again, s; OrbitError if it takes longer than a limit."""
+    def release(self, pressed: Floats, limit: float, *, from_zero: bool = False) -> float:
+        """Return the time after which the force is 0 again, s; OrbitError if it takes longer than a limit.
+
+        The force begins at 0 without a dashpot, or where a stop is pressed again (`from_zero`).
+        """
+        from_zero |= self._damping == 0.0 and self._is_shifted
         state, passed, step = pressed, 0.0, self.flow.step
         rows = np.vstack([self.force, self._rate])
         for bit in range(FIRST_SAMPLES, 63):
@@ -258,7 +295,7 @@ class LinearPassage:
             ahead = np.column_stack([samples, self.flow.one_step @ samples[:, -1]])
             forces, rates = rows @ ahead
             if (
-                not self._is_shifted and passed == 0.0 and forces[0] < 0.0
+                not self._is_shifted and not from_zero and passed == 0.0 and forces[0] < 0.0
             ):  # beside an orbit a stop may be met late
                 if not (forces > 0.0).any():
                     raise OrbitError(
@@ -266,7 +303,7 @@ class LinearPassage:
                     )
                 forces[: int(np.argmax(forces > 0.0)) + 1] = np.inf
             for k in _may_release(forces, rates, step):
-                time = self._zero(ahead[:, k], passed == 0.0 and k == 0)
+                time = self._zero(ahead[:, k], from_zero and passed == 0.0 and k == 0)
                 if time is not None:
                     return passed + float(k) * step + time
             passed += samples.shape[1] * step
@@ -287,12 +324,12 @@ class LinearPassage:
             return time
         raise OrbitError("orbit: expected contacts with a speed towards their stops, got one away from it.")
 
-    def _zero(self, state: Floats, is_first: bool) -> float | None:
+    def _zero(self, state: Floats, from_zero: bool) -> float | None:
         """Return the time within a step from a state at which the force falls through 0; None without one."""
         step = self.flow.step
         series = self.flow.polynomial(self.force[None], state)[:, 0]
-        if is_first and self._damping == 0.0 and self._is_shifted:
-            series = series[1:]  # the force begins at 0
+        if from_zero:
+            series = series[1:]
         return _first_fall(series, step)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from typing import NamedTuple
 
@@ -32,8 +32,8 @@ EVEN = np.linspace(0.0, 1.0, 65)
 """Shares of the duration of a contact at which the forces of a first guess are known."""
 WEAK = 0.05
 """Force of a contact, over the force that brings the body back, below which it hardly changes the motion."""
-COARSE_STEPS = 64
-"""Number of steps over a contact without other forces in the first search for its end."""
+COARSE_STEPS = (64, 512)
+"""Numbers of steps over a contact without other forces in the search for its end; the second for recorded contacts."""
 MOST_COARSE = 400_000
 SPEEDS = 10.0 ** np.arange(-1.5, 1.0, 0.5)
 """Speeds, over that of the force's motion, for which an equivalent spring and dashpot guesses orbits."""
@@ -135,10 +135,11 @@ class PowerPassage:
         self._forced, self._contact, self._press = forced, contact, press
         self.direction = contact.direction
         self._beyond = contact.direction * forced.beyond(contact)
+        self._beyond[forced.offset] = -contact.direction  # depths count from the offset of the surface
         self._approach = contact.direction * forced.approach(contact)
         self._second = self._approach @ forced.free.matrix
         self._kick = np.zeros(forced.size)
-        self._kick[forced.velocity] = contact.shape
+        self._kick[forced.velocity] = contact.direction * contact.shape
         rate = forced.free.rate
         self._back = forced.free.reversed()
         self._rows = LinearFlow(forced.free.matrix.T, rate)
@@ -175,26 +176,66 @@ class PowerPassage:
             drag = 2.0 * min(lost, 0.7) * np.sqrt(spring * self._contact.mass)
             yield speed, LinearPassage(self._forced, self._contact, spring, drag)
 
+    def _half_turn(self, depth: float) -> float:
+        """Return half the period of small motions about a depth, s; OrbitError unless the depth is positive."""
+        if not depth > 0.0:
+            raise OrbitError("orbit: expected a stop that is pressed again within it, got a point outside.")
+        press = self._press
+        spring = press.exponent * press.stiffness * depth ** (press.exponent - 1.0)
+        return float(np.pi * np.sqrt(self._contact.mass / spring))
+
     # ---- one contact ----
 
     def presses(self, states: Floats) -> NDArray[np.bool_]:
         """Return whether the force of a stop in its place would be positive at vectors, shape (size, n)."""
         return np.asarray(1.0 + self._press.damping * (self._approach @ states) > 0.0)
 
-    def through(self, before: Floats, limit: float) -> Passage:
-        """Return the passage of a vector of `ForcedModes`; OrbitError if it takes longer than a limit, s."""
-        forced = self._forced
-        own, speed = forced.motion, float(self._approach @ before)
-        begins = (forced.free.matrix @ before)[own]
+    def through(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
+        """Return the passage of a vector of `ForcedModes`; OrbitError if it takes longer than a limit, s.
+
+        A contact with a `recorded` duration (s) has an end, so finer steps search for it.
+        """
+        forced, speed = self._forced, float(self._approach @ before)
         if not speed > 0.0:
-            same = np.eye(2 * forced.modes)
+            own, same = forced.motion, np.eye(2 * forced.modes)
+            begins = (forced.free.matrix @ before)[own]
             return Passage(speed, -speed, 0.0, 0.0, before[own], same, -begins, same, 1.0)
-        found = self._contact_of(before, limit)
+        entry = before.copy()
+        entry[forced.offset] = self.direction * float(self._beyond @ before)
+        found = self._contact_of(entry, limit, COARSE_STEPS if recorded > 0.0 else COARSE_STEPS[:1])
+        passage, by_offset = self._passed(entry, found)
+        normal = np.concatenate([self._contact.shape, np.zeros(forced.modes)])
+        drift = self.direction * float(self._approach[2 * forced.modes :] @ before[2 * forced.modes :])
+        return replace(
+            passage,
+            slope=passage.slope + np.outer(by_offset, normal),
+            shift=passage.shift + by_offset * drift,
+        )
+
+    @property
+    def pressing_again(self) -> tuple[Floats, float]:
+        """Row and value of vectors where a stop is pressed again before it is left, m/s; OrbitError: no damping."""
+        if not self._press.damping > 0.0:
+            raise OrbitError("orbit: expected a stop with damping, which presses again, got one without.")
+        return self.direction * self._approach, -self.direction / self._press.damping
+
+    def again(self, before: Floats, limit: float, *, recorded: float = np.nan) -> Passage:
+        """Return the passage of a vector within a stop whose force begins at 0; OrbitError beyond a limit, s."""
+        found = self._near(before, self._coarse(before, limit, COARSE_STEPS[-1]), limit)
+        if found is None:
+            raise OrbitError(f"orbit: expected a stop that is pressed again within {limit:.6g} s, got none.")
+        return self._passed(before, found[0])[0]
+
+    def _passed(self, before: Floats, found: _Contact) -> tuple[Passage, Floats]:
+        """Return the passage of a vector with a fixed offset, and the derivative of its end by the offset."""
+        forced, speed = self._forced, float(self._approach @ before)
+        own = forced.motion
+        begins = (forced.free.matrix @ before)[own]
         over, nodes = forced.free.over(found.duration), found.nodes
         times = found.duration * nodes.share
         # forces act on all that comes later: at each node, and at the end
         pushed = found.duration * nodes.weights * found.force
-        after = over @ (before - self.direction * found.kicks @ pushed)
+        after = over @ (before - found.kicks @ pushed)
         rows = self._rows.along(self._beyond, times).T, self._rows.along(self._approach, times).T
         driven = found.by_depth[:, None] * rows[0] + found.by_rate[:, None] * rows[1]
         system = (
@@ -203,47 +244,64 @@ class PowerPassage:
             + found.by_rate[:, None] * found.answer[1]
         )
         changes = np.linalg.solve(system, np.column_stack([driven[:, own], -self.direction * found.by_depth]))
-        ends = -self.direction * (over @ found.kicks)[own] * (found.duration * nodes.weights)
+        ends = -(over @ found.kicks)[own] * (found.duration * nodes.weights)
         flow, by_offset = over[own, own] + ends @ changes[:, :-1], ends @ changes[:, -1]
-        normal = np.concatenate([self._contact.shape, np.zeros(forced.modes)])
-        drift = self.direction * float(self._approach[2 * forced.modes :] @ before[2 * forced.modes :])
         lost = self._press.damping * self._press.stiffness * found.depth**self._press.exponent
         after[forced.impulse] = pushed.sum()
-        return Passage(
+        passage = Passage(
             *(speed, -float(self._approach @ after), found.duration, float(pushed.sum()), after[own]),
-            flow + np.outer(by_offset, normal),
-            by_offset * drift - flow @ begins,
-            flow,
+            *(flow, -flow @ begins, flow),
             float(np.exp(-found.duration * nodes.weights @ lost / self._contact.mass)),
             PressedPath(found.duration, nodes, partial(self._vectors, found, before)),
         )
+        return passage, by_offset
 
     def _vectors(self, found: _Contact, before: Floats) -> Floats:
         """Return the vectors at the nodes of a contact, shape (node, size)."""
         pushes = found.duration * found.nodes.integral * found.force
-        starts = before - self.direction * pushes @ found.kicks.T
+        starts = before - pushes @ found.kicks.T
         times = found.duration * found.nodes.share
         return np.array(
             [self._forced.free.over(time) @ each for time, each in zip(times, starts, strict=True)]
         )
 
-    def _contact_of(self, before: Floats, limit: float) -> _Contact:
+    def _contact_of(self, before: Floats, limit: float, coarse: tuple[int, ...]) -> _Contact:
         """Return the contact of a state, near to the last contact or near to a coarse one."""
-        for known in dict.fromkeys((self._hint, None)):
-            hint = known if known is not None else self._coarse(before, limit)
-            for count in (each for each in NODES if each >= hint.count):
-                found = self._solved(before, grid(count), hint, limit)
-                if found is None:  # a long contact needs more nodes
-                    continue
-                forces = np.interp(EVEN, found.nodes.share, found.force)
-                hint = _Hint(found.duration, forces, count, hint.pulls)
-                tail = np.abs(found.nodes.to_series[-2:] @ found.force).max()
-                if tail <= TAIL * np.abs(found.force).max() or count == NODES[-1]:
-                    self._hint = hint
-                    return found
+        for hint in self._hints(before, limit, coarse):
+            near = self._near(before, hint, limit)
+            if near is not None:
+                found, self._hint = near
+                return found
         raise OrbitError(
             f"orbit: expected contacts that {NODES[-1]} values of the force describe, got a longer one on a power law."
         )
+
+    def _hints(self, before: Floats, limit: float, coarse: tuple[int, ...]) -> Iterator[_Hint]:
+        """Yield contacts that are known roughly; OrbitError if the finest steps find no end."""
+        if self._hint is not None:
+            yield self._hint
+        weak = self._weak(before)
+        if weak is not None:
+            yield weak
+        for steps in coarse:
+            try:
+                yield self._coarse(before, limit, steps)
+            except OrbitError:  # steps may miss a short way out of the stop
+                if steps == coarse[-1]:
+                    raise
+
+    def _near(self, before: Floats, hint: _Hint, limit: float) -> tuple[_Contact, _Hint] | None:
+        """Return the contact near to a hint, with as few nodes as suffice, and its own hint; None without one."""
+        for count in (each for each in NODES if each >= hint.count):
+            found = self._solved(before, grid(count), hint, limit)
+            if found is None:  # a long contact needs more nodes
+                continue
+            forces = np.interp(EVEN, found.nodes.share, found.force)
+            hint = _Hint(found.duration, forces, count, hint.pulls)
+            tail = np.abs(found.nodes.to_series[-2:] @ found.force).max()
+            if tail <= TAIL * np.abs(found.force).max() or count == NODES[-1]:
+                return found, hint
+        return None
 
     def _solved(self, before: Floats, nodes: Grid, hint: _Hint, limit: float) -> _Contact | None:
         """Return the contact with a duration near to a hint; None without one."""
@@ -282,11 +340,11 @@ class PowerPassage:
         rows = np.vstack([self._beyond, self._approach])
         if times[-1] <= flow.step:
             series = flow.polynomial(rows, before)
-            series[0, 0] = 0.0  # no digits are lost to the place of the stop
+            if float(self._approach @ before) > 0.0:
+                series[0, 0] = 0.0  # no digits are lost to the place of the stop
             depth, rate = np.polynomial.polynomial.polyval(times, series)
         else:
             depth, rate = rows @ flow.along(before, times)
-            depth = depth - self._beyond @ before
         return depth, rate
 
     def _forces(self, before: Floats, nodes: Grid, duration: float, force: Floats) -> _Contact | None:
@@ -317,31 +375,36 @@ class PowerPassage:
             least = change
         return None
 
-    def _coarse(self, before: Floats, limit: float) -> _Hint:
+    def _weak(self, before: Floats) -> _Hint | None:
+        """Return a contact that hardly changes the motion; None for a strong one, or a motion that does not turn."""
+        press, speed, back = self._press, float(self._approach @ before), float(self._second @ before)
+        if not back < 0.0 < speed:
+            return None
+        time = 2.0 * speed / -back
+        arc, rates = speed * time * EVEN * (1.0 - EVEN), speed * (1.0 - 2.0 * EVEN)
+        weak = press.stiffness * arc**press.exponent * (1.0 + press.damping * rates)
+        is_weak = weak.max() < WEAK * -back * self._contact.mass and press.damping * speed < 1.0
+        return _Hint(time, weak, NODES[0]) if is_weak else None
+
+    def _coarse(self, before: Floats, limit: float, steps: int) -> _Hint:
         """Return a contact to about a hundredth, by steps with kicks."""
         forced, press = self._forced, self._press
-        speed = float(self._approach @ before)
-        back = float(self._approach @ forced.free.matrix @ before)
-        step = self.usual_duration_at(speed) / COARSE_STEPS
-        if back < 0.0:
-            time = 2.0 * speed / -back
-            arc, rates = speed * time * EVEN * (1.0 - EVEN), speed * (1.0 - 2.0 * EVEN)
-            weak = press.stiffness * arc**press.exponent * (1.0 + press.damping * rates)
-            if weak.max() < WEAK * -back * self._contact.mass and press.damping * speed < 1.0:
-                return _Hint(time, weak, NODES[0])
-            step = min(step, time / COARSE_STEPS)
-        half, state = forced.free.over(0.5 * step), before.copy()
-        offset, forces = float(self._beyond @ before), [0.0]
+        speed, back = float(self._approach @ before), float(self._second @ before)
+        usual = (
+            self.usual_duration_at(speed) if speed > 0.0 else self._half_turn(float(self._beyond @ before))
+        )
+        step = (min(usual, 2.0 * speed / -back) if back < 0.0 < speed else usual) / steps
+        half, state, forces = forced.free.over(0.5 * step), before.copy(), [0.0]
         for _ in range(min(MOST_COARSE, int(limit / step) + 2)):
             state = half @ state
-            depth, rate = float(self._beyond @ state) - offset, float(self._approach @ state)
+            depth, rate = float(self._beyond @ state), float(self._approach @ state)
             force = press.stiffness * max(depth, 0.0) ** press.exponent * (1.0 + press.damping * rate)
             if len(forces) > 1 and not force > 0.0:
                 even = np.linspace(0.0, 1.0, len(forces) + 1)
                 known = np.interp(EVEN, even, [*forces, 0.0])
                 return _Hint((len(forces) - 1) * step, known, NODES[0], depth > 0.0)
             forces.append(force)
-            state = half @ (state - step * force * self.direction * self._kick)
+            state = half @ (state - step * force * self._kick)
         raise OrbitError(
             f"orbit: expected a stop that is left within {limit:.6g} s, got one that stays pressed."
         )

@@ -48,6 +48,51 @@ def moved_body() -> ImpactingBody:
     )
 
 
+def mirrored_body(press: Press, side: float) -> ImpactingBody:
+    """Return two modes at a stop that moves, above (1) or below (-1), under a force of the same sign."""
+    stop = Contact(np.array([0.8, -0.5]), side, side * 0.3, 0.0, {1: side * (0.04 + 0.02j)}, press=press)
+    forces, held = side * np.array([0.5, -0.2]), side * np.array([0.1, 0.3])
+    return ImpactingBody(np.array([1.0, 2.7]), 0.03 * np.ones(2), forces, held, 1.2, 0.0, (stop,), np.ones(2))
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    st.sampled_from(LAWS),
+    st.floats(0.0, 6.2),
+    st.floats(0.2, 3.0),
+    st.floats(-1.0, 1.0),
+)
+def test_a_contact_below_is_the_mirror_image_of_a_contact_above(
+    press: Press, phase: float, speed: float, swing: float
+) -> None:
+    passed = []
+    for side in (1.0, -1.0):
+        motion = yielding_motion(mirrored_body(press, side))
+        rows = np.array([motion.beyond[0], motion.approach[0]])
+        vector = motion.forced.vector(side * np.array([0.3, swing, 0.1, -swing]), phase)
+        own = motion.forced.motion
+        off = rows @ vector - [0.0, side * speed]
+        vector[own] -= np.linalg.lstsq(rows[:, own], off, rcond=None)[0]
+        passed.append(motion.passages[0].through(vector, 30.0))
+    above, below = passed
+    assert above.impulse > 0.0
+    for name in ("speed", "rebound", "duration", "impulse", "slope", "tangent", "shrinking"):
+        np.testing.assert_allclose(getattr(below, name), getattr(above, name), rtol=1e-9, atol=1e-9)
+    for name in ("after", "shift"):
+        np.testing.assert_allclose(getattr(below, name), -getattr(above, name), rtol=1e-9, atol=1e-9)
+
+
+def test_a_contact_outlasts_a_fast_mode_that_brakes_its_beginning() -> None:
+    stop = Contact(np.ones(2), 1.0, 0.0, 0.0, press=Press("hertz", 150.0, 0.0, 1.5))
+    rates = np.array([1.0, 20.0])
+    body = ImpactingBody(rates, 0.02 * np.ones(2), np.zeros(2), np.zeros(2), 1.0, 0.0, (stop,), np.ones(2))
+    motion = yielding_motion(body)
+    before = motion.forced.vector(np.array([-0.05, 0.05, 0.9, 0.0]), 0.0)
+    passage = motion.passages[0].through(before, 10.0)
+    assert passage.duration > 0.2  # with the first acceleration alone: 0.09
+    assert passage.after[:2].sum() == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("press", LAWS, ids=NAMES)
 def test_the_slopes_of_distances_and_speeds_are_their_differences(press: Press) -> None:
     body, contacts = oscillator(press), np.zeros(1, np.int32)
