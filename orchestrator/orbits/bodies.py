@@ -114,11 +114,15 @@ class BodiesAlong:
 
 
 def refuse_outside(scene: Scene, key: str, ends: Iterable[float], options: str) -> None:
-    """Raise UsageError if a range of a key, given by these options, holds numbers that no scene has."""
+    """Raise UsageError if a range of a key, given by these options, holds numbers that no scene has.
+
+    A stop may lose its stiffness at the end of a range: without it there is still a body.
+    """
     field = scene.field(key)
     low, high, is_open = bounds_of(field)
+    excludes_low = is_open and not key.startswith("stop")
     for value in ends:
-        if not low <= value <= high or (is_open and value == low):
+        if not low <= value <= high or (excludes_low and value == low):
             rule = rule_of(field)
             raise UsageError(f"{options}: {key}: expected {rule.item or rule.expected}, got {value:g}.")
 
