@@ -143,7 +143,7 @@ class Follower:
                 return
             if found is None or too_near or (born and not found[0].orbit.is_physical):
                 step *= 0.5
-                if step < SHORTEST * longest:
+                if step < SHORTEST * longest or (found is None and self._is_at_end(now)):
                     branch.ends.append(f"cannot be followed beyond {now.value:.11g}{self._obstacle(now)}")
                     return
                 continue
@@ -179,6 +179,11 @@ class Follower:
         yield branch.orbits[-1]
         return orbit.turns > 1
 
+    def _is_at_end(self, now: BranchOrbit) -> bool:
+        """Return whether a branch is at the end of the range, as closely as its steps can be told apart."""
+        bound = self.settings.lowest if now.tangent[-1] < 0.0 else self.settings.highest
+        return abs(now.value - bound) < SHORTEST * self.settings.span
+
     def _last(self, now: BranchOrbit, step: float) -> BranchOrbit | None:
         """Return the orbit at the end of the range that a step would pass, where there is no body beyond; else None."""
         lowest, highest, span = self.settings.lowest, self.settings.highest, self.settings.span
@@ -186,7 +191,8 @@ class Follower:
         bound = min(max(ahead, lowest), highest)
         if bound in (ahead, now.value):
             return None
-        unknowns = now.orbit.unknowns + now.tangent[:-1] * (bound - now.value) / (now.tangent[-1] * span)
+        share = (bound - now.value) / (now.tangent[-1] * span)
+        unknowns = expected = now.orbit.unknowns + share * now.tangent[:-1]
         close, least = CLOSE * now.orbit.body.scale, np.inf
         try:
             for _ in range(MOST_NEWTON):
@@ -194,7 +200,8 @@ class Follower:
                 error = float(np.abs(errors).max())
                 if error <= close and (error >= 0.5 * least or orbit.body.yields):
                     found = self.on_branch(orbit, bound, now.tangent, slopes)
-                    return found if found.tangent @ now.tangent >= np.cos(MOST_TURN) else None
+                    is_next = np.abs(unknowns - expected).max() <= step
+                    return found if is_next and found.tangent @ now.tangent >= np.cos(MOST_TURN) else None
                 least = min(least, error)
                 unknowns = unknowns - np.linalg.solve(slopes, errors)
         except (OrbitError, np.linalg.LinAlgError):

@@ -232,6 +232,14 @@ def test_a_branch_reaches_the_bounds_of_its_number() -> None:
     assert special == pytest.approx([0.51349590817], abs=1e-10)
 
 
+def test_a_branch_does_not_jump_where_a_number_changes_its_meaning() -> None:
+    """A yield velocity of 0 is a constant restitution; next to 0 there is hardly any."""
+    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({})
+    found = vi.follow(scene, "stop[1].yield_velocity", 0.0, 0.2, step=0.1, impacts=1)
+    assert (found["orbit_special"].values != SpecialOrbit.stability_change).all()
+    assert 0.0 < found["yield_velocity"].values.min() < 1e-8
+
+
 def test_what_was_followed_before_an_error_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
