@@ -21,6 +21,14 @@ def connection_name(connection: ConnectionSpec) -> str:
     return f"{'.'.join(connection.source)} -> {'.'.join(connection.target)}"
 
 
+def unlisted_dependence(output: ConnectionSpec, source: ConnectionSpec) -> str:
+    """Return the remark that the output of a connection depends on the input of another, against its description."""
+    return (
+        f"{'.'.join(output.source)} depends on {'.'.join(source.target)}, "
+        "which its list of dependencies leaves out"
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class TransferOrder:
     """Connections in the order in which they are moved, and the algebraic loops among them."""

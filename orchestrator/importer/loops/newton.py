@@ -72,14 +72,17 @@ class Loop:
         """Forget slopes and sizes of an earlier run."""
         self._g: Floats | None = None
         self._inverse: Floats | None = None
+        self._first, self._ratios = _joined(self.links)
         self._units = np.ones(len(self.links))
         self._is_stale = True
         self._seen = np.zeros(len(self.links))
         self.residual, self.worst, self.is_singular = 0.0, 0.0, False
 
     def take_start(self) -> None:
-        """Begin the next solution at the present values of the inputs."""
-        self.x = np.array([link.start() for link in self.links])
+        """Begin the next solution at the present values of the inputs, of which one output gives like values."""
+        starts = np.array([link.start() for link in self.links])
+        self._first, self._ratios = _joined(self.links)
+        self.x = np.where(self._real, self._ratios @ starts[self._first], starts)
 
     def solve(self, time: float) -> None:
         """Make the inputs consistent at `time`, s; ComponentError with names and residual if they do not become so."""
@@ -178,19 +181,19 @@ class Loop:
         """Make a Newton step, halved until it makes the residual smaller; a step that may be halved corrects G."""
         if self._inverse is None:
             self._inverse = self._pseudo_inverse()
-        weights = 1.0 / self._units
-        before = float(np.linalg.norm(weights * rest))
+        weights, scale = 1.0 / self._units, self._scale(values)
+        before = _sizes(rest, weights, scale)
         start, step, share = self.x, self._inverse @ rest, 1.0
         if not np.all(np.isfinite(step)):
             return None
         for _ in range(halvings + 1):
             self.x = start + share * step
             there = self._evaluate(self.x)
-            after = float(np.linalg.norm(weights * self._rest(there)))
-            if after <= (1.0 - LEAST_DECREASE * share) * before:  # false for NaN
-                if halvings and after > EXACT * before:  # else the response to the step is rounding
+            after = _sizes(self._rest(there), weights, scale)
+            if np.any(after <= (1.0 - LEAST_DECREASE * share) * before):  # false for NaN
+                if halvings and after[0] > EXACT * before[0]:  # else the response to the step is rounding
                     self._correct(self.x - start, there - values, weights)
-                    self._is_stale = after > SLOW * before
+                    self._is_stale = bool(after[0] > SLOW * before[0])
                 return there
             share /= 2.0
         self.x = start
@@ -199,15 +202,23 @@ class Loop:
 
     def _pseudo_inverse(self) -> Floats:
         """Return (I - G)^-1 without the combinations of inputs that the loop leaves open; NaN where G is not finite."""
-        assert self._g is not None
-        d = self._units
-        matrix = np.eye(len(d)) - self._g * d[None, :] / d[:, None]
+        g = self._joint_slopes()
+        d = scaling_of(g)
+        matrix = np.eye(len(d)) - g * d[None, :] / d[:, None]
         if not np.all(np.isfinite(matrix)):
-            return np.full(matrix.shape, np.nan)
+            return np.full((len(self.x), len(self.x)), np.nan)
         u, sizes, v = np.linalg.svd(matrix)
         is_open = sizes <= SINGULAR * max(1.0, float(sizes[0]))
         shares = np.where(is_open, 0.0, 1.0) / np.where(is_open, 1.0, sizes)
-        found: Floats = (d * self._real)[:, None] * (v.T * shares @ u.T) / d[None, :]
+        found = np.zeros((len(self.x), len(self.x)))
+        found[:, self._first] = self._ratios @ (d[:, None] * (v.T * shares @ u.T) / d[None, :])
+        found[~self._real] = 0.0
+        return found
+
+    def _joint_slopes(self) -> Floats:
+        """Return the slopes over one input of each output: inputs that share an output depend on nothing more."""
+        assert self._g is not None
+        found: Floats = self._g[self._first] @ self._ratios
         return found
 
     def _correct(self, moved: Floats, responded: Floats, weights: Floats) -> None:
@@ -223,7 +234,8 @@ class Loop:
     def _renew(self, values: Floats) -> None:
         """Evaluate the slopes at the present inputs, at which the outputs give `values`."""
         self._g = self._slopes.at(self.links, self._depends, self.x, values)
-        self._units, self._inverse = scaling_of(self._g), None
+        units = np.abs(self._ratios) @ scaling_of(self._joint_slopes())
+        self._units, self._inverse = np.where(units > 0.0, units, 1.0), None
         self._is_stale = False
 
     # ---- residuals ----
@@ -256,8 +268,7 @@ class Loop:
 
     def _smallest(self) -> float:
         """Return the smallest singular value of I - G, over the largest and at least over 1."""
-        assert self._g is not None
-        sizes = singular_values(self._g)
+        sizes = singular_values(self._joint_slopes())
         return float(sizes[-1] / max(1.0, sizes[0]))
 
     def _verdict(self) -> str:
@@ -265,7 +276,8 @@ class Loop:
         assert self._g is not None
         if not np.all(np.isfinite(self._g)):
             return "slopes that are not finite"
-        smallest, gain = self._smallest(), 1.0 - float(np.linalg.det(np.eye(len(self.x)) - self._g))
+        slopes = self._joint_slopes()
+        smallest, gain = self._smallest(), 1.0 - float(np.linalg.det(np.eye(len(slopes)) - slopes))
         numbers = f"smallest singular value of I - G {smallest:.3g}, gain 1 - det(I - G) = {gain:.6g}"
         if smallest <= SINGULAR:
             return f"a singular loop without a solution ({numbers})"
@@ -279,3 +291,27 @@ class Loop:
             "Break the loop with a component that has a state, or change its gain.",
             time=time,
         )
+
+
+def _sizes(rest: Floats, weights: Floats, scale: Floats) -> Floats:
+    """Return two sizes of a residual: in the units of the inputs, and relative to the terms of which they are sums.
+
+    The first is rounding where large inputs are solved before small ones.
+    """
+    return np.array([np.linalg.norm(weights * rest), np.max(np.abs(rest) / scale, initial=0.0)])
+
+
+def _joined(links: Sequence[Link]) -> tuple[NDArray[np.intp], Floats]:
+    """Return the links with an output of their own, and the ratios of all inputs to those of these links.
+
+    Real links from one output are joined: the largest gain stands for them.
+    """
+    groups: dict[object, list[int]] = {}
+    for i, link in enumerate(links):
+        groups.setdefault(link.connection.source if link.is_real else i, []).append(i)
+    first = [max(group, key=lambda i: abs(links[i].gain)) for group in groups.values()]
+    ratios = np.zeros((len(links), len(first)))
+    for k, group in enumerate(groups.values()):
+        for i in group:
+            ratios[i, k] = 1.0 if i == first[k] else links[i].gain / (links[first[k]].gain or 1.0)
+    return np.array(first), ratios

@@ -11,6 +11,7 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.orchestrator.fmi.capabilities import DERIVATIVE, gives_derivatives
 from vibroimpact.orchestrator.fmi.instance import FATAL, WARNING
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.feedthrough import unlisted_dependence
 from vibroimpact.orchestrator.importer.loops.link import Link
 
 Floats = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Slopes:
         self, links: Sequence[Link], depends: Sequence[frozenset[int]], j: int, x: Floats, values: Floats
     ) -> Floats:
         component = links[j].target
-        rows = [i for i, link in enumerate(links) if link.is_real and link.source is component]
+        rows = _rows(links, j)
         if component.name not in self._gives:
             self._gives[component.name] = gives_derivatives(component.instance.fmu.folder)
         given = None
@@ -69,7 +70,7 @@ class Slopes:
         compared = (links[j].name, *(links[i].name for i in rows))
         if given is not None and compared not in self._compared:
             self._compared.add(compared)
-            given = self._compare(links, rows, j, x, values, given)
+            given = self._compare(links, depends, j, x, values, given)
         return _differences(links, rows, j, x, values) if given is None else given
 
     def _derivatives(self, links: Sequence[Link], rows: Sequence[int], j: int) -> Floats | None:
@@ -93,9 +94,16 @@ class Slopes:
         return found
 
     def _compare(
-        self, links: Sequence[Link], rows: Sequence[int], j: int, x: Floats, values: Floats, given: Floats
+        self,
+        links: Sequence[Link],
+        depends: Sequence[frozenset[int]],
+        j: int,
+        x: Floats,
+        values: Floats,
+        given: Floats,
     ) -> Floats | None:
         """Return a column of derivatives if they lie between the differences of both sides; else None."""
+        rows = _rows(links, j)
         size = abs(links[j].near(x[j], abs(values[j]), 1.0) - x[j])
         rounding = links[j].tolerance * np.abs(values) / size
         sides = np.array([_differences(links, rows, j, x, values, side) for side in (1.0, -1.0)])
@@ -104,6 +112,10 @@ class Slopes:
         if not np.any(outside > room):  # false for NaN: the FMU discards the values for the difference
             return given
         row = int(np.nanargmax(outside - room))
+        if j not in depends[row]:  # the derivative was not asked for
+            self._gives[links[j].target.name] = False
+            self.remarks[unlisted_dependence(links[row].connection, links[j].connection)] = None
+            return None
         pair = f"{links[row].name}: derivative {given[row]:.6g}, difference {sides[0, row]:.6g}"
         self._distrust(links[j].target, pair)
         return None
@@ -112,6 +124,11 @@ class Slopes:
         """Use a component's derivatives no more, and say why."""
         self._gives[component.name] = False
         self.remarks[f"{component.name} declares {DERIVATIVE}, and they are not used: {why}"] = None
+
+
+def _rows(links: Sequence[Link], j: int) -> list[int]:
+    """Return the real connections from the component whose input a connection feeds."""
+    return [i for i, link in enumerate(links) if link.is_real and link.source is links[j].target]
 
 
 def _differences(

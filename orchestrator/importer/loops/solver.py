@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.importer.feedthrough import (
     loops_of,
     starting_graph,
     undeclared_graph,
+    unlisted_dependence,
 )
 from vibroimpact.orchestrator.importer.loops.link import Link
 from vibroimpact.orchestrator.importer.loops.newton import Loop
@@ -55,7 +56,6 @@ class LoopSolver:
         self._main = transfers
         self._links: dict[int, Link] = {}
         self._slopes = Slopes()
-        self._lists: dict[str, None] = {}
         self._made: dict[tuple[tuple[int, ...], tuple[frozenset[int], ...]], Loop] = {}
         self._declared = declared_graph(self._connections, components)
         self._starting = starting_graph(self._connections, components)
@@ -87,7 +87,7 @@ class LoopSolver:
             for loop in self._active
             if loop.is_singular
         ]
-        return [*self._lists, *self._slopes.remarks, *open_loops]
+        return [*self._slopes.remarks, *open_loops]
 
     def solves_first(self, transfer: Transfer) -> bool:
         """Are all connections of a transfer in loops of initialization?"""
@@ -222,11 +222,8 @@ class LoopSolver:
 
     def _note_list(self, i: int, inputs: set[int]) -> None:
         """Say that an output's list of dependencies leaves inputs out."""
-        if not inputs or self._undeclared[i] >= inputs:
-            return
-        names = ", ".join(sorted(".".join(self._connections[j].target) for j in inputs))
-        source = ".".join(self._connections[i].source)
-        self._lists[f"{source} depends on {names}, which its list of dependencies leaves out"] = None
+        for j in sorted(inputs - self._undeclared[i]):
+            self._slopes.remarks[unlisted_dependence(self._connections[i], self._connections[j])] = None
 
     def _responding(self, j: int, rows: Sequence[int]) -> list[int]:
         """Return the connections, among those given, whose output changes with the input of connection `j`."""

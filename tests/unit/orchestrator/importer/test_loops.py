@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support import fmu_factory
 from support.coupled_parts import EXCHANGES, VERSIONS, body, link, part, values
@@ -36,6 +36,11 @@ DECLARED = ' providesDirectionalDerivative{}="true"'
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def any_version(folder: Path, request: pytest.FixtureRequest) -> Path:
+    return fmu_factory.feedthrough(folder, str(request.param))
 
 
 @pytest.fixture(scope="module", params=VERSIONS)
@@ -283,6 +288,44 @@ def test_an_fmu_behind_a_loop_sees_its_solution_alone(made: list[Importer], fmu:
     parts = [part("r", fmu, law=ROOT), part("a", fmu, k=2.0, b=-4.0)]
     importer = run(made, parts, [link("a.y", "r.u"), link("a.y", "a.u")])
     assert values(importer, "r", "y") == pytest.approx([2.0], rel=SOLVED)
+
+
+SIZES = st.tuples(st.sampled_from([-1.0, 1.0]), st.floats(-4.0, 4.0)).map(
+    lambda drawn: drawn[0] * 10.0 ** drawn[1]
+)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_any_system_of_linear_fmus_is_solved_to_rounding(data: st.DataObject, any_version: Path) -> None:
+    n = data.draw(st.integers(1, 5))
+    rows = st.lists(SIZES, min_size=n, max_size=n)
+    k, w, b = (np.array(data.draw(rows)) for _ in range(3))
+    of_u, of_w = (data.draw(st.lists(st.integers(0, n - 1), min_size=n, max_size=n)) for _ in range(2))
+    matrix = np.eye(n)
+    np.subtract.at(matrix, (np.arange(n), of_u), k)
+    np.subtract.at(matrix, (np.arange(n), of_w), w)
+    assume(np.linalg.cond(matrix) < 1e6)
+    parts = [part(f"g{i}", any_version, k=k[i], l=w[i], b=b[i]) for i in range(n)]
+    links = [link(f"g{j}.y", f"g{i}.u") for i, j in enumerate(of_u)]
+    links += [link(f"g{j}.y", f"g{i}.w") for i, j in enumerate(of_w)]
+    importer = Importer(parts, links, macro_step=0.1)
+    importer.begin()
+    importer.advance(0.2)
+    y, u, v = (np.array([values(importer, f"g{i}", name)[0] for i in range(n)]) for name in "yuw")
+    importer.free()
+    terms = np.max(np.abs([k * u, w * v, b]), axis=0)
+    assert np.all(np.abs(u - y[of_u]) <= 1e-12 * terms[of_u])
+    assert np.all(np.abs(v - y[of_w]) <= 1e-12 * terms[of_w])
+
+
+def test_inputs_that_share_an_output_cancel_without_a_singular_loop(made: list[Importer], fmu: Path) -> None:
+    # b = 1e4 a - 1e4 a - 1, a = -a - 100 b - 1
+    parts = [part("a", fmu, k=-1.0, l=-100.0, b=-1.0), part("b", fmu, k=1e4, l=-1e4, b=-1.0)]
+    importer = run(
+        made, parts, [link("a.y", "a.u"), link("a.y", "b.u"), link("b.y", "a.w"), link("a.y", "b.w")]
+    )
+    assert values(importer, "a", "y") == pytest.approx([49.5], rel=SOLVED)
 
 
 # ---- initialization ----
