@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from vibroimpact.fmus.safe_xml import root_of
 from vibroimpact.orchestrator.fmi.clocks import InputClock, clocks_of
 
 if TYPE_CHECKING:
@@ -59,7 +60,9 @@ NEEDS_TOOL = "needsExecutionTool"
 ASYNCHRONOUS = "canRunAsynchronuously"
 EVENT_MODE = "hasEventMode"
 _COMMON = (NEEDS_TOOL, ONLY_ONCE)
+DERIVATIVE = "providesDirectionalDerivative"
 _NEVER = "no such call is made"
+_IN_LOOPS = "asked for in algebraic loops alone, and compared once with a difference"
 _BY_INTERFACE = "an FMU for it alone is refused by its name"
 
 FLAGS: tuple[Flag, ...] = (
@@ -93,8 +96,8 @@ FLAGS: tuple[Flag, ...] = (
     _heeded("maxOutputDerivativeOrder", "2.0, 3.0", _NEVER),
     _heeded("canSerializeFMUstate", "2.0", _NEVER),
     _heeded("canSerializeFMUState", "3.0", _NEVER),
-    _heeded("providesDirectionalDerivative", "2.0", _NEVER),
-    _heeded("providesDirectionalDerivatives", "3.0", _NEVER),
+    _heeded(DERIVATIVE, "2.0", _IN_LOOPS),
+    _heeded(f"{DERIVATIVE}s", "3.0", _IN_LOOPS),
     _heeded("providesAdjointDerivatives", "3.0", _NEVER),
     _heeded("providesPerElementDependencies", "3.0", _NEVER),
     _heeded("providesEvaluateDiscreteStates", "3.0", _NEVER),
@@ -220,3 +223,14 @@ def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities
         clocks=clocks,
         refusals=refusals,
     )
+
+
+def gives_derivatives(folder: Path) -> bool:
+    """Does the FMU in a folder declare directional derivatives for co-simulation?
+
+    FMPy does not read this flag of FMI 3.0.
+    """
+    root = root_of((folder / "modelDescription.xml").read_bytes(), "modelDescription.xml")
+    interface = root.find(CO_SIMULATION)
+    flags = {} if interface is None else interface.attrib
+    return any(flags.get(name, "").strip() in ("true", "1") for name in (DERIVATIVE, f"{DERIVATIVE}s"))

@@ -323,6 +323,36 @@ class Instance(ABC):
         """Start of the last step, or of the step under way, s."""
         return self._step_time.value
 
+    # ---- derivatives ----
+
+    def directional_derivative(self, unknowns: Sequence[int], known: int) -> tuple[int, NDArray[np.float64]]:
+        """Return FMI's status and the derivatives of real variables over one input, at the present values.
+
+        Parameters
+        ----------
+        unknowns : sequence of int
+            Value references of n variables that depend on the input.
+        known : int
+            Value reference of the input.
+
+        Returns
+        -------
+        status : int
+        derivatives : ndarray, shape (n,)
+            Without meaning unless the status is OK or WARNING.
+        """
+        count = len(unknowns)
+        found = np.full(count, np.nan)
+        seed = c_double(1.0)
+        sizes = (ctypes.c_size_t(1), ctypes.c_size_t(count))
+        places = ((ctypes.c_uint32 * count)(*unknowns), ctypes.c_size_t(count))
+        inputs = (ctypes.byref(ctypes.c_uint32(known)), ctypes.c_size_t(1))
+        values = (ctypes.byref(seed), c_void_p(found.ctypes.data))
+        with_sizes = (values[0], sizes[0], values[1], sizes[1])
+        seeds = with_sizes if self.fmi_version == "3.0" else values
+        call = self._function("GetDirectionalDerivative")
+        return call(self._pointer, *places, *inputs, *seeds), found
+
     # ---- states ----
 
     def _bind_states(self) -> None:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Call = Callable[[], int]
+#: FMI's status of a call that an FMU cannot carry out with these values.
+DISCARDED = 2
 
 
 class Owner(Protocol):
@@ -85,6 +87,21 @@ class VariableGroup:
         status = self.set_call()
         if status > 1:
             self.instance.check(status, "Set" + self.name)
+
+    def try_get(self) -> bool:
+        """Read the variables; returns false where the FMU discards the call, and the buffer has no values."""
+        return self._is_kept(self.get_call(), "Get")
+
+    def try_set(self) -> bool:
+        """Write the buffer to the variables; returns false where the FMU discards the call, and takes no value."""
+        return self._is_kept(self.set_call(), "Set")
+
+    def _is_kept(self, status: int, direction: str) -> bool:
+        if status == DISCARDED:
+            return False
+        if status:
+            self.instance.check(status, direction + self.name)
+        return True
 
 
 #: C types of values by FMI type, for each version.

@@ -41,6 +41,7 @@ METHODS = {
     "restore": "SetFMUState",
     "set_clocks": "SetClock",
     "clock_times": "GetIntervalDecimal",
+    "directional_derivative": "GetDirectionalDerivative",
 }
 
 
@@ -217,9 +218,9 @@ def _call_in(frame: FrameType) -> tuple[Instance, str, float] | None:
 def _python_call_in(frame: FrameType, owner: object, method: str) -> tuple[Instance, str] | None:
     if isinstance(owner, Instance) and method in METHODS:
         return owner, METHODS[method]
-    if isinstance(owner, VariableGroup) and method in ("get", "set"):
+    if isinstance(owner, VariableGroup) and method in ("get", "set", "try_get", "try_set"):
         instance = owner.instance
-        return (instance, method.capitalize() + owner.name) if isinstance(instance, Instance) else None
+        return (instance, method[-3:].capitalize() + owner.name) if isinstance(instance, Instance) else None
     if isinstance(owner, CallList):
         found = owner.find(frame.f_locals.get("call"))
         return (found.instance, found.function) if found is not None else None

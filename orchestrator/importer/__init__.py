@@ -13,7 +13,8 @@ It takes any co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step o
 - FMUs without states are stepped last, once the end of the step is agreed.
 
 `specification` has the parts of an importer, and `component` is one FMU in it. `wiring` moves values between
-components and solves algebraic loops. `order` sorts the components, `step_plan` lists the work of a step, `master`
-makes the steps, `plain_loop` makes plain steps in C. `events` resolves events, `ticks` has the clocks. `contacts` are
-all places where bodies touch something. `sampling` and `energy` watch without disturbing.
+components, in the order of `feedthrough`, and `loops` solves algebraic loops. `order` sorts the components,
+`step_plan` lists the work of a step, `master` makes the steps, `plain_loop` makes plain steps in C. `events` resolves
+events, `ticks` has the clocks. `contacts` are all places where bodies touch something. `sampling` and `energy` watch
+without disturbing.
 """

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
+from vibroimpact.orchestrator.importer.feedthrough import connection_name
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import ContactBond
@@ -29,7 +30,6 @@ from vibroimpact.orchestrator.importer.stop_contacts.plain_contacts import (
     plain_contact,
 )
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import POINTS, WEIGHTS
-from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: Names of force inputs (last part), each with the displacement on which it does work.
 CONJUGATE = {"force": "displacement", "applied_force": "displacement"}

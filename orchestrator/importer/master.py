@@ -107,7 +107,7 @@ class Importer:
         self.components, self._order = parts.named, parts.components
         self.macro_step = macro_step
         self.watches, self.contacts = parts.watches, parts.contacts
-        self.transfers, self.loops, self._looping = parts.transfers, parts.loops, parts.looping
+        self.transfers, self.loops = parts.transfers, parts.loops
         self.tuning, self.ticks = parts.tuning, parts.ticks
         self._progress = Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
@@ -161,6 +161,7 @@ class Importer:
                 component.instance.only_step = self.macro_step
         self._has_started = True
         settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
+        self._plan.keep_up()
         self.tuning.begin()
         self.ticks.begin(start_time)
         for component in self._order:
@@ -269,6 +270,8 @@ class Importer:
         now.standstill = 0 if end > time else now.standstill + 1
         if now.standstill > STANDSTILLS:
             raise standstill_error(self._stopper.instance, STANDSTILLS, time)
+        if self.loops.names and end > time and not self.wants_to_end:
+            self._solve_loops(end)
         for watcher in self.watchers:
             watcher.after(time, end)
         now.note_step(end)
@@ -297,9 +300,10 @@ class Importer:
 
     def _solve_loops(self, time: float) -> None:
         self.loops.solve(time)
-        for transfer in self._looping:
+        for transfer in self._plan.looping:
             transfer.take()
         self._plan.moves_after_loops()
+        self.loops.hold()
 
     def _save_start(self) -> None:
         for component in self._plan.saved:
@@ -452,6 +456,7 @@ class Importer:
         target = self._reached
         inputs = SettlingInputs(self.transfers, STEP_TOLERANCE)
         for _ in range(STEP_ITERATIONS):
+            self.loops.solve(target)
             if inputs.have_settled():
                 break
             self._restore_start()

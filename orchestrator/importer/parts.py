@@ -9,6 +9,8 @@ from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.contacts import ContactBonds
+from vibroimpact.orchestrator.importer.feedthrough import order_of
+from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
 from vibroimpact.orchestrator.importer.order import stepping_order
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import (
@@ -20,7 +22,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
-from vibroimpact.orchestrator.importer.wiring import LoopSolver, Transfer, order_of, transfers_of
+from vibroimpact.orchestrator.importer.wiring import Transfer, transfers_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +34,6 @@ class Parts:
     components: Sequence[Component]
     """The components, in the order in which they are stepped."""
     transfers: Sequence[Transfer]
-    looping: Sequence[Transfer]
-    """The transfers that belong to algebraic loops."""
     loops: LoopSolver
     watches: Sequence[Watch]
     contacts: ContactBonds
@@ -66,16 +66,14 @@ def parts_of(
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
     tuned = [c for c in connections if is_tunable(c, named)]
     connections = [c for c in connections if c not in tuned]
-    order = order_of(connections, named)
-    transfers = transfers_of(order, named)
+    transfers = transfers_of(order_of(connections, named), named)
     parts = Parts(
         named=named,
         components=stepping_order(named, connections),
         transfers=transfers,
-        looping=[t for t in transfers if order.loops_back(t.connections[0])],
         watches=watches,
         tuning=Tuning(named, tuned, transfers),
-        loops=LoopSolver(order.loops, named),
+        loops=LoopSolver(connections, named, transfers),
         ticks=Ticks(named.values()),
         contacts=ContactBonds(named, transfers, connections, contacts, pairs, contact_steps),
     )

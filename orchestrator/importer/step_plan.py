@@ -30,10 +30,10 @@ class StepPlan:
         Steps are repeated until the inputs at their end agree.
     saves : bool
         States are saved before a step, which may have to be repeated.
-    prepares : bool
-        A step needs more than moves before it.
     saved : list of Component
         The components with states.
+    looping : list of Transfer
+        The transfers that loops solve for.
     start_moves, moves_after_loops : CallList or None, CallList
         Moves before a step, and after its loops are solved.
     paths : list of (Component, CallList or None)
@@ -48,13 +48,11 @@ class StepPlan:
         self._parts, self._progress = parts, progress
         order = parts.components
         sources = [c for c in order if c.event_mode or self._is_looked_at(c)]
-        alone = len(sources) == 1 and sources[0] is order[0] and sources[0].event_mode
+        is_alone = len(sources) == 1 and sources[0] is order[0] and sources[0].event_mode
         self.iterates = exchange == "iterated"
-        self.saves = self.iterates or not (alone or not sources)
-        self.prepares = self.saves or bool(parts.loops.names)
+        self.saves = self.iterates or not (is_alone or not sources)
         self.saved = [c for c in order if c.has_states]
-        incoming = {c.name: [t for t in parts.transfers if t.target is c] for c in order}
-        self._fresh = fresh_inputs(list(order), incoming, jacobi=exchange == "jacobi")
+        self._is_jacobi = exchange == "jacobi"
         self.plan_moves()
 
     def _is_looked_at(self, component: Component) -> bool:
@@ -64,11 +62,17 @@ class StepPlan:
 
     def plan_moves(self) -> None:
         """Bind the calls of all moves; again after a transfer's buffers changed."""
-        parts, fresh = self._parts, self._fresh
+        parts = self._parts
+        self._arrangement = parts.loops.arrangement
+        # moves in a loop, between two solutions, would multiply changes by its gain
+        self.looping = [t for t in parts.transfers if parts.loops.solves(t)]
+        straight = [t for t in parts.transfers if t not in self.looping]
+        incoming = {c.name: [t for t in straight if t.target is c] for c in parts.components}
+        fresh = fresh_inputs(parts.components, incoming, jacobi=self._is_jacobi)
         refreshed = [t for ts in fresh.values() for t in ts]
         behind = [t for t in parts.transfers if t not in refreshed]
-        self.start_moves = moves_of(behind) or None
-        self.moves_after_loops = moves_of(t for t in behind if t not in parts.looping)
+        self.start_moves = moves_of(t for t in behind if t not in self.looping) or None
+        self.moves_after_loops = moves_of(straight)
         paths = [(c, moves_of(fresh[c.name]) or None) for c in parts.components]
         # components that cannot go back wait for the last repetition
         repeats = self.iterates or bool(parts.contacts)
@@ -78,9 +82,21 @@ class StepPlan:
         self._loop: PlainLoop | None = None
         self._is_plain: bool | None = None
 
+    def keep_up(self) -> None:
+        """Plan the moves again if initialization has found algebraic loops that no list declares, or no longer has."""
+        if self._arrangement != self._parts.loops.arrangement:
+            self.plan_moves()
+
+    @property
+    def prepares(self) -> bool:
+        """Does a step need more than moves before it? Initialization may find algebraic loops that no list declares."""
+        return self.saves or bool(self._parts.loops.names)
+
     @property
     def plain_loop(self) -> PlainLoop | None:
         """The loop that makes these steps in C; None where more than components and connections takes part in them."""
+        if self._parts.loops.names:
+            return None
         if self._is_plain is None:
             self._loop = self._made_loop()
             self._is_plain = self._loop is not None
@@ -88,14 +104,7 @@ class StepPlan:
 
     def _made_loop(self) -> PlainLoop | None:
         parts = self._parts
-        if (
-            self.iterates
-            or self.stateless_paths
-            or parts.loops.names
-            or parts.watches
-            or parts.tuning
-            or parts.ticks
-        ):
+        if self.iterates or self.stateless_paths or parts.watches or parts.tuning or parts.ticks:
             return None
         components, inputs = zip(*self.paths, strict=True)
         events = self.event_mode

@@ -10,8 +10,9 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS
+from vibroimpact.orchestrator.importer.feedthrough import order_of
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
-from vibroimpact.orchestrator.importer.wiring import Transfer, order_of, transfers_of
+from vibroimpact.orchestrator.importer.wiring import Transfer, transfers_of
 
 
 def is_tunable(connection: ConnectionSpec, components: Mapping[str, Component]) -> bool:

@@ -4,78 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
-from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.feedthrough import Connections, TransferOrder
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
-
-Connections = Sequence[ConnectionSpec]
-
-
-def connection_name(connection: ConnectionSpec) -> str:
-    """Return `component.output -> component.input`."""
-    return f"{'.'.join(connection.source)} -> {'.'.join(connection.target)}"
-
-
-@dataclass(frozen=True, slots=True)
-class TransferOrder:
-    """Connections in the order in which they are moved, and the algebraic loops among them."""
-
-    connections: tuple[ConnectionSpec, ...]
-    loops: tuple[tuple[ConnectionSpec, ...], ...]
-
-    def loops_back(self, connection: ConnectionSpec) -> bool:
-        """Is the connection part of an algebraic loop?"""
-        return any(connection in loop for loop in self.loops)
-
-
-def order_of(connections: Connections, components: dict[str, Component]) -> TransferOrder:
-    """Order connections so that each is moved after those that its output depends on directly.
-
-    Connections that depend on each other in a circle are an algebraic loop; they are moved last, by iteration.
-    """
-    before = {i: _feeding(connections, components, c) for i, c in enumerate(connections)}
-    loops: list[tuple[int, ...]] = []
-    while True:
-        try:
-            ranked = list(TopologicalSorter(before).static_order())
-        except CycleError as error:
-            cycle = tuple(sorted(set(error.args[1])))
-            loops.append(cycle)
-            before = {i: {j for j in js if not (i in cycle and j in cycle)} for i, js in before.items()}
-            continue
-        break
-    merged = _merged(loops)
-    return TransferOrder(
-        tuple(connections[i] for i in ranked),
-        tuple(tuple(connections[i] for i in loop) for loop in merged),
-    )
-
-
-def _feeding(connections: Connections, components: dict[str, Component], c: ConnectionSpec) -> set[int]:
-    """Return the connections into inputs that the output of `c` depends on directly."""
-    component, variable = c.source
-    needed = components[component].depends.get(variable, frozenset())
-    return {
-        j for j, other in enumerate(connections) if other.target[0] == component and other.target[1] in needed
-    }
-
-
-def _merged(cycles: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Merge cycles that share a connection into one loop."""
-    loops: list[set[int]] = []
-    for cycle in cycles:
-        touching = [loop for loop in loops if loop & set(cycle)]
-        joined = set(cycle).union(*touching)
-        loops = [loop for loop in loops if loop not in touching] + [joined]
-    return [tuple(sorted(loop)) for loop in loops]
 
 
 def drawn_inputs(connections: Connections) -> set[str]:
@@ -343,81 +281,3 @@ def _group_for(
         if any(c.target[0] == connection.source[0] and c.target[1] in needed for c in group):
             return None
     return None
-
-
-#: Iteration of algebraic loops: relative change at which it ends, and most iterations.
-LOOP_TOLERANCE = 1e-12
-LOOP_ITERATIONS = 100
-#: Relative response of a loop to a combination of inputs, below which the combination counts as having no solution.
-SMALLEST_RESPONSE = 1e-10
-
-
-def _next_step(
-    guesses: Sequence[NDArray[np.float64]], changes: Sequence[NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Return Anderson's step from the last guess: along the straight line through the last guesses to zero change."""
-    newest = changes[-1]
-    memory = min(len(changes) - 1, len(newest))
-    if memory == 0:
-        return newest
-    moved = np.diff(np.array(guesses[-memory - 1 :]), axis=0).T
-    responded = np.diff(np.array(changes[-memory - 1 :]), axis=0).T
-    size = float(np.linalg.norm(responded))
-    if size <= SMALLEST_RESPONSE * float(np.linalg.norm(moved)):
-        return newest
-    cut = min(1.0, SMALLEST_RESPONSE * float(np.linalg.norm(moved)) / size)
-    weights = np.linalg.lstsq(responded, newest, rcond=cut)[0]
-    step: NDArray[np.float64] = newest - (moved + responded) @ weights
-    return step
-
-
-class LoopSolver:
-    """Solves the algebraic loops of an exchange by fixed-point iteration with Anderson's acceleration.
-
-    A linear loop of n connections settles after n + 1 iterations, for any gain but 1.
-    """
-
-    def __init__(
-        self, loops: tuple[tuple[ConnectionSpec, ...], ...], components: dict[str, Component]
-    ) -> None:
-        self._loops = loops
-        self.names = tuple(" , ".join(connection_name(c) for c in loop) for loop in loops)
-        inside = [c for loop in loops for c in loop]
-        self.transfers = [Transfer(components[c.source[0]], components[c.target[0]], [c]) for c in inside]
-        self.residual = 0.0
-        """Largest relative change of a loop's inputs in the last iteration."""
-        self.iterations = 0
-        """Iterations that the last solution took."""
-
-    def _values(self) -> NDArray[np.float64]:
-        return np.array([float(transfer.take()[0]) for transfer in self.transfers])
-
-    def _write(self, values: NDArray[np.float64]) -> None:
-        for transfer, value in zip(self.transfers, values, strict=True):
-            transfer.write.values[0] = value
-            transfer.write.set()
-
-    def solve(self, time: float) -> None:
-        """Iterate the loops' inputs until they are consistent; ComponentError with the loop if they do not settle."""
-        if not self.transfers:
-            return
-        guess = self._values()
-        guesses, changes = [guess], []
-        for self.iterations in range(1, LOOP_ITERATIONS + 1):
-            self._write(guess)
-            change = self._values() - guess
-            scale = np.maximum(1e-300, np.abs(guess) + np.abs(change))
-            self.residual = float(np.max(np.abs(change) / scale))
-            if self.residual <= LOOP_TOLERANCE:
-                return
-            if not np.all(np.isfinite(change)):
-                break
-            changes.append(change)
-            guess = guess + _next_step(guesses, changes)
-            guesses.append(guess)
-        raise ComponentError(
-            f"algebraic loop {'; '.join(self.names)} at time {time:.17g}: expected an iteration that settles, "
-            f"got a relative residual of {self.residual:.3g} after {self.iterations} iterations. "
-            "Break the loop with a component that has a state, or reduce the gain.",
-            time=time,
-        )

@@ -27,6 +27,7 @@ MODELS = {
     "Buffer": "buffer.c",
     "Clocked": "clocked.c",
     "Faulty": "faulty.c",
+    "Feedthrough": "feedthrough.c",
     "Gain": "gain.c",
     "Mass": "mass.c",
     "Single": "single.c",
@@ -94,6 +95,14 @@ def single(folder: Path, fmi: str = "3.0") -> Path:
 def faulty(folder: Path, fmi: str = "3.0") -> Path:
     """Write an integrator y' = u with the parameters `fault` (kind of fault) and `fault_time`."""
     return _write("Faulty", fmi, folder)
+
+
+def feedthrough(folder: Path, fmi: str = "3.0") -> Path:
+    """Write y = law(u) + l w with directional derivatives, which are wrong by `lie`; laws and parameters: see its XML.
+
+    Output `latched` depends on u until initialization has ended.
+    """
+    return _write("Feedthrough", fmi, folder)
 
 
 def gain(folder: Path, token: str = "") -> Path:

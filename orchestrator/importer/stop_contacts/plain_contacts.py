@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.feedthrough import connection_name
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import AskedStop, ContactWork
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import StepPath
-from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: Variables of an ImpactStop (the first is its force); other components with a force need not be stops.
 FORCE, ANSWER, DISPLACEMENT, VELOCITY = "applied_force", "applied_restitution", "displacement", "velocity"

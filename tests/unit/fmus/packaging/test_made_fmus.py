@@ -28,6 +28,7 @@ WRITERS = {
     "Buffer": fmu_factory.buffer,
     "Clocked": lambda folder, _: fmu_factory.clocked(folder),
     "Faulty": fmu_factory.faulty,
+    "Feedthrough": fmu_factory.feedthrough,
     "Gain": lambda folder, _: fmu_factory.gain(folder),
     "Mass": fmu_factory.mass,
     "Single": fmu_factory.single,

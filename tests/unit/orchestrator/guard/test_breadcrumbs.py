@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.coupled_parts import P11, body, contact, external, stop
+from support.coupled_parts import P11, body, contact, external, link, part, stop
+from support.fmu_factory import feedthrough
 
 from vibroimpact.fmus.core.coupling import CouplingEnd, advance_coupled
 from vibroimpact.orchestrator.fmi.log import callback
@@ -83,6 +84,27 @@ def test_the_frames_of_a_thread_show_the_call_that_it_is_in(
         instance.step(time, 0.5)
     importer.free()
     assert [(name, function) for name, function, _ in seen] == [("b", "fmi3DoStep")] * 2
+
+
+def test_the_frames_of_a_thread_show_the_call_of_an_algebraic_loop(
+    notes: tuple[Breadcrumbs, Breadcrumbs], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer, reader = notes
+    importer = Importer([part("g", feedthrough(tmp_path), b=1.0, k=0.5)], [link("g.y", "g.u")])
+    importer.begin()
+    (transfer,) = importer.loops.transfers
+    group = transfer.read
+    get, seen = group.get_call, []
+
+    def noted_get() -> int:
+        writer.note_frame(sys._getframe())
+        seen.append(reader.last_call()[:2])
+        return get()
+
+    monkeypatch.setattr(group, "get_call", noted_get)
+    importer.loops.solve(0.0)
+    importer.free()
+    assert set(seen) == {("g", "fmi3GetFloat64")}
 
 
 def test_calls_made_in_c_are_noted_as_those_of_python(notes: tuple[Breadcrumbs, Breadcrumbs]) -> None:

@@ -18,9 +18,10 @@ from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.importer.component import Component, Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
+from vibroimpact.orchestrator.importer.feedthrough import order_of
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
-from vibroimpact.orchestrator.importer.wiring import equal_values, order_of, transfers_of
+from vibroimpact.orchestrator.importer.wiring import equal_values, transfers_of
 
 LOOP = 1e-9
 """Solution of a loop: its residual, 1e-12 relative, over the distance of its gain from 1."""
