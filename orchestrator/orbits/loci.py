@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci
+from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci, kind_of
 from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
@@ -114,7 +114,7 @@ class FollowedLoci:
             "and at each point of codimension 2 of a curve: curves that meet none of these were not looked for."
         )
         points = [point for each in self.followed.branches for point in each.points]
-        others = [point for point in points if point.kind not in FOLLOWED_KINDS]
+        others = [point for point in points if kind_of(point) not in FOLLOWED_KINDS]
         where = [f"{point.kind} at {point.at.value:.8g}" for point in others]
         where += [f"{each.kind} at {each.values[0]:.8g}, {each.values[1]:.8g}" for each in self.not_begun]
         if self.left_at_corners:
@@ -234,7 +234,7 @@ def _starts(branches: list[Branch], value: float, second: str) -> list[_Start]:
         )
         for number, branch in enumerate(branches, start=1)
         for point in branch.points
-        if point.kind in FOLLOWED_KINDS
+        if kind_of(point) in FOLLOWED_KINDS
     ]
 
 
