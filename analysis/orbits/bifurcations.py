@@ -131,7 +131,9 @@ class Bifurcation:
     def of(cls, point: SpecialPoint, values: tuple[float, float]) -> Bifurcation:
         """Return the bifurcation at a special point of a branch, with the values of both parameters."""
         orbit = point.at.orbit
-        return cls(kind_of(point), orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1)
+        return cls(
+            kind_of(point), orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1
+        )
 
     def test(self, orbit: PeriodicOrbit) -> float:
         """Return the function that is 0 along the locus, for an orbit next to it."""
@@ -144,7 +146,7 @@ class Bifurcation:
 
     @property
     def smooth(self) -> dict[str, Callable[[PeriodicOrbit], float]]:
-        """Functions of the smooth bifurcations that orbits of the locus can have: `SMOOTH`, or those that keep symmetry.
+        """Functions of the smooth bifurcations of orbits of the locus: `SMOOTH`, or those that keep the symmetry.
 
         Symmetric orbits double their period in no generic way: the multipliers of half an orbit are squared (4.20).
         """

@@ -1,4 +1,4 @@
-"""Bifurcations followed over two parameters: folds, period doublings, tori, pitchforks and grazes: equations.md 4.5 to 4.7.
+"""Bifurcations followed over two parameters, equations.md 4.5 to 4.7: folds, doublings, tori, pitchforks and grazes.
 
 At points of codimension 2 the function of another bifurcation changes its sign, too. Loci of the other kind leave them.
 """
@@ -361,18 +361,17 @@ class LocusFollower(LocusSteps):
 
     def _reason_for_end(self, locus: Locus, start: Bifurcation, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
-        is_nearly = nearly_symmetric(now.orbit)
-        if locus.kind == "fold" and start.halves is None and is_nearly:
+        is_nearly = start.halves is None and nearly_symmetric(now.orbit)
+        if locus.kind == "fold" and is_nearly:
             degenerate = self._degenerate_near(now)
             if degenerate is not None:
                 locus.points.append(degenerate)
                 locus.special.append((DEGENERATE, degenerate))
                 locus.starts.append(Bifurcation(PITCHFORK, degenerate.orbit, degenerate.values))
                 return DEGENERATE
+        no_further = f"cannot be followed further{': its orbits become symmetric' * is_nearly}"
         if locus.kind != BETWEEN:
-            return (
-                f"cannot be followed further{': its orbits become symmetric' * is_nearly}"
-            )
+            return no_further
         slowest = int(now.orbit.velocities.argmin())
         if len(locus.points) == 1 and grazes(now.orbit)[slowest]:
             return CORNER  # the locus begins there, and leaves in the other direction
@@ -393,7 +392,7 @@ class LocusFollower(LocusSteps):
             locus.starts.append(Bifurcation(BETWEEN, found[0].orbit, found[0].values))
             locus.beyond += self._met(start, now, found[0].orbit, now)
             return CORNER
-        return "cannot be followed further"
+        return no_further
 
     def _without_speed(self, locus: Locus) -> LocusPoint:
         """Return the point where an impact has no speed, along the line through points next to it.

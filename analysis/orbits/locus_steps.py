@@ -143,9 +143,7 @@ class LocusSteps:
         off = float(np.linalg.norm(left - part * step))
         return 0.0 < part <= 1.0 and off < OFF_CHORD * length and bool(first.tangent @ step > 0.0)
 
-    def _matrix(
-        self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats, second: Floats
-    ) -> Floats:
+    def _matrix(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats, second: Floats) -> Floats:
         """Return the derivatives of the errors by the unknowns of an orbit and the first parameter."""
         columns = []
         for axis in np.eye(unknowns.size) * CHANGE:

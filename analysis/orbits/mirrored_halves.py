@@ -1,4 +1,4 @@
-"""The equations of symmetric orbits in two halves, of equal and of opposite changes of an impact and its image: 4.20."""
+"""Equations of symmetric orbits, split for equal and opposite changes of an impact and its image: equations.md 4.20."""
 
 from __future__ import annotations
 
@@ -84,13 +84,15 @@ def halves_like(orbit: PeriodicOrbit) -> Halves | None:
     # the unknowns are the period, the phases less that of the first impact, and the speeds
     none, period = np.zeros((count, half)), np.eye(2 * count)[:, :1]
     kept, broken = equal - equal[0], opposite - opposite[0]
-    rows = np.kron(np.eye(2), apart)
+    rows, means, differences = (
+        np.kron(np.eye(2), each).astype(np.float64) for each in (apart, mean, difference)
+    )
     rows[:, 0] = 0.0  # the phase of the first impact is 0
     return Halves(
         np.hstack([period, np.vstack([kept, none])[:, 1:], np.vstack([none, equal])]),
         np.block([[broken, none], [none, opposite]]),
-        np.kron(np.eye(2), mean),
-        np.kron(np.eye(2), difference),
+        means,
+        differences,
         rows,
         np.concatenate([offset, np.zeros(half)]),
     )

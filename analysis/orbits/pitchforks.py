@@ -34,7 +34,7 @@ Made = Callable[[PeriodicOrbit, Floats], tuple[PeriodicOrbit, Floats]]
 
 
 class Breaking(NamedTuple):
-    """How orbits leave a pitchfork: x + s `across` + s^2/2 `bend`, and the cubic term of their equation."""
+    """Broken orbits x + s `across` + s^2/2 `bend` next to a pitchfork x, and the cubic term of their equation."""
 
     across: Floats
     bend: Floats
@@ -55,7 +55,7 @@ def is_pitchfork(orbit: PeriodicOrbit) -> bool:
 
 
 def breaking_of(halves: Halves, orbit: PeriodicOrbit, slopes_at: Callable[[Floats], Floats]) -> Breaking:
-    """Return how orbits leave a pitchfork; the sign of `cubic` is continuous along a locus.
+    """Return the directions of broken orbits next to a pitchfork; `cubic` is continuous along a locus.
 
     `slopes_at` has the slopes for other unknowns of the orbit, those of its body.
     """
@@ -146,7 +146,9 @@ def _newton(
     try:
         for _ in range(MOST_STEPS):
             axes = slope_step * np.eye(unknowns.size)
-            slopes = [(errors(unknowns + each) - errors(unknowns - each)) / (2.0 * slope_step) for each in axes]
+            slopes = [
+                (errors(unknowns + each) - errors(unknowns - each)) / (2.0 * slope_step) for each in axes
+            ]
             change = np.linalg.solve(np.column_stack(slopes), -errors(unknowns))
             unknowns = unknowns + change
             if not np.abs(unknowns - begin).max() < NEAR:

@@ -13,9 +13,12 @@ import xarray as xr
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci, kind_of
 from vibroimpact.analysis.orbits.branch import Branch
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
+from vibroimpact.analysis.orbits.pitchforks import PITCHFORK
+from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, impacting_body, refuse_outside
@@ -121,6 +124,10 @@ class FollowedLoci:
             where.append(f"{counted(self.left_at_corners, 'curve')} of other orbits at corners")
         if where:
             text += f" Not followed: {'; '.join(where)}."
+        if any(each.kind == PITCHFORK for each in self.not_begun):
+            text += " Pitchforks are followed over numbers that keep the mirror symmetry."
+        if any(point.kind == BRANCH_POINT for point in others):
+            text += " Branch points without mirror symmetry exist in general at single values of the second number."
         return text
 
 
@@ -257,9 +264,7 @@ def _from_starts(
                 found = joined_loci(*ways)
                 result.loci.append(found)
                 number = len(result.loci)
-                waiting += [
-                    _Start(each, _met(number, found.kind, each), start.corners) for each in found.starts
-                ]
+                waiting += [_Start(each, _met(number, found, each), start.corners) for each in found.starts]
                 if start.corners < corners:
                     waiting += [
                         _Start(each, _at_corner(number, each), start.corners + 1) for each in found.beyond
@@ -268,10 +273,14 @@ def _from_starts(
                     result.left_at_corners += len(found.beyond)
 
 
-def _met(number: int, kind: str, at: Bifurcation) -> str:
+def _met(number: int, locus: Locus, at: Bifurcation) -> str:
     """Return where a locus meets a bifurcation, in words."""
-    other = "another" if at.kind == kind else f"a {at.kind}"
-    return f"curve {number}, where its {kind} is {other}, at {at.values[0]:.8g}, {at.values[1]:.8g}"
+    where = f"at {at.values[0]:.8g}, {at.values[1]:.8g}"
+    middle = locus.points[len(locus.points) // 2].orbit
+    if {locus.kind, at.kind} == {"fold", PITCHFORK} and not (is_symmetric(at.orbit) and is_symmetric(middle)):
+        return f"curve {number}, next to its degenerate pitchfork, {where}"
+    other = "another" if at.kind == locus.kind else f"a {at.kind}"
+    return f"curve {number}, where its {locus.kind} is {other}, {where}"
 
 
 def _at_corner(number: int, at: Bifurcation) -> str:

@@ -1,4 +1,4 @@
-"""Loci of pitchforks against their explicit form of one mode, and against pitchforks over one number: equations.md 4.20."""
+"""Loci of pitchforks against their explicit form, and against pitchforks over one number: equations.md 4.20."""
 
 from __future__ import annotations
 
@@ -64,9 +64,7 @@ def follower() -> LocusFollower:
 @pytest.fixture(scope="module")
 def pitchforks(follower: LocusFollower) -> Locus:
     along = Follower(lambda value: oscillator(value, 0.5), FollowSettings(0.95, 1.0, 0.05))
-    (point,) = along.branch(
-        find_orbit(oscillator(0.99, 0.5), [0.1, 0.1 + np.pi], [0, 1]), 0.99
-    ).points
+    (point,) = along.branch(find_orbit(oscillator(0.99, 0.5), [0.1, 0.1 + np.pi], [0, 1]), 0.99).points
     assert kind_of(point) == "pitchfork"
     return follower.locus(point, (point.at.value, 0.5))
 
