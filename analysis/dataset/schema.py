@@ -60,6 +60,7 @@ class SpecialOrbit(IntEnum):
     stability_change = 6
     branch_point = 7
     impact_at_the_yield_velocity = 8
+    pitchfork = 9
 
 
 class CurvePoint(IntEnum):
@@ -74,6 +75,8 @@ class CurvePoint(IntEnum):
     isola_centre = 7
     crossing_of_branches = 8
     cusp = 9
+    pitchfork = 10
+    degenerate_pitchfork = 11
 
 
 class OrbitClass(IntEnum):

@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
+from vibroimpact.analysis.orbits.mirrored_halves import Halves, slopes_of
 from vibroimpact.analysis.orbits.own_period import alternating_slopes
-from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated, tried
+from vibroimpact.analysis.orbits.periodic import TOUCHES, TURN, PeriodicOrbit, evaluated
+from vibroimpact.analysis.orbits.pitchforks import PITCHFORK, is_pitchfork
 from vibroimpact.analysis.orbits.sign_changes import turning
 from vibroimpact.analysis.orbits.symmetry import differences, is_symmetric, mirror_image, mirrored_contacts
 from vibroimpact.fmus.bodies.impacting_body import Floats
 
 GRAZE, BETWEEN = "graze", "graze between impacts"
-FOLLOWED_KINDS = ("fold", "period doubling", "torus", GRAZE, BETWEEN)
+FOLLOWED_KINDS = ("fold", "period doubling", "torus", PITCHFORK, GRAZE, BETWEEN)
 JUMP = 0.5
 """Change of the phase of the highest maximum, rad, above which it is another maximum."""
 NEARLY_SYMMETRIC = 0.1
@@ -28,8 +31,7 @@ DOUBLE = 1e-4
 
 def folding(orbit: PeriodicOrbit) -> float:
     """Return a function that is 0 at a fold, and smooth through a graze: the determinant of the errors' slopes."""
-    slopes = tried(orbit.body, orbit, orbit.unknowns).slopes
-    return float(np.linalg.det(slopes / orbit.body.scale))
+    return float(np.linalg.det(slopes_of(orbit)))
 
 
 def alternating(orbit: PeriodicOrbit) -> float:
@@ -96,6 +98,12 @@ SMOOTH: dict[str, Callable[[PeriodicOrbit], float]] = {
 """Functions with a zero at the bifurcations that a locus of another kind passes without an end."""
 
 
+def kind_of(point: SpecialPoint) -> str:
+    """Return the kind of the locus that passes a special point: a branch point of symmetric orbits is a pitchfork."""
+    is_breaking = point.kind == BRANCH_POINT and is_pitchfork(point.at.orbit)
+    return PITCHFORK if is_breaking else point.kind
+
+
 @dataclass(frozen=True, eq=False)
 class Bifurcation:
     """An orbit at a bifurcation, at which a locus can begin.
@@ -109,18 +117,23 @@ class Bifurcation:
         Values of both parameters.
     impact : int
         Index of the impact without speed; -1 unless the kind is a graze.
+    halves : Halves or None
+        Split of the equations, on a locus of symmetric orbits alone.
     """
 
     kind: str
     orbit: PeriodicOrbit
     values: tuple[float, float]
     impact: int = -1
+    halves: Halves | None = None
 
     @classmethod
     def of(cls, point: SpecialPoint, values: tuple[float, float]) -> Bifurcation:
         """Return the bifurcation at a special point of a branch, with the values of both parameters."""
         orbit = point.at.orbit
-        return cls(point.kind, orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1)
+        return cls(
+            kind_of(point), orbit, values, int(orbit.velocities.argmin()) if point.kind == GRAZE else -1
+        )
 
     def test(self, orbit: PeriodicOrbit) -> float:
         """Return the function that is 0 along the locus, for an orbit next to it."""
@@ -129,7 +142,17 @@ class Bifurcation:
         if self.kind == BETWEEN:
             beyond, _, contact = orbit.highest
             return beyond / orbit.body.scale if contact >= 0 else float(np.nan)
-        return SMOOTH[self.kind](orbit)
+        return self.smooth[self.kind](orbit)
+
+    @property
+    def smooth(self) -> dict[str, Callable[[PeriodicOrbit], float]]:
+        """Functions of the smooth bifurcations of orbits of the locus: `SMOOTH`, or those that keep the symmetry.
+
+        Symmetric orbits double their period in no generic way: the multipliers of half an orbit are squared (4.20).
+        """
+        if self.halves is None:
+            return SMOOTH
+        return {"fold": self.halves.folding, PITCHFORK: self.halves.breaking, "torus": SMOOTH["torus"]}
 
     @cached_property
     def _image(self) -> int | None:

@@ -1,13 +1,11 @@
-"""Bifurcations followed over two parameters, equations.md 4.5 to 4.7: folds, period doublings, tori and grazes.
+"""Bifurcations followed over two parameters, equations.md 4.5 to 4.7: folds, doublings, tori, pitchforks and grazes.
 
-The unknowns are the phases of the impacts and both parameters. The equations of the orbit are joined by one more: the
-function with the sign change at the bifurcation. At points of codimension 2 the function of another bifurcation
-changes its sign, too. Loci of the other kind leave them.
+At points of codimension 2 the function of another bifurcation changes its sign, too. Loci of the other kind leave them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +14,6 @@ from vibroimpact.analysis.orbits.bifurcations import (
     BETWEEN,
     FOLLOWED_KINDS,
     GRAZE,
-    SMOOTH,
     Bifurcation,
     Locus,
     LocusPoint,
@@ -30,39 +27,31 @@ from vibroimpact.analysis.orbits.bifurcations import (
 )
 from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
 from vibroimpact.analysis.orbits.fold_extrema import kind_of_extremum
-from vibroimpact.analysis.orbits.following import (
-    EASY_NEWTON,
-    LOCATED,
-    MOST_NEWTON,
-    MOST_TURN,
-    SHORTEST,
-    FollowSettings,
-)
+from vibroimpact.analysis.orbits.following import EASY_NEWTON, SHORTEST
 from vibroimpact.analysis.orbits.locus_corners import CORNER, TwoTouches, corner_of
-from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, grazes, tried
+from vibroimpact.analysis.orbits.locus_steps import CHANGE, OFF_CHORD, ZERO, LocusSteps
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, grazes
+from vibroimpact.analysis.orbits.pitchforks import (
+    DEGENERATE,
+    PITCHFORK,
+    cubic_of,
+    degenerate_near,
+    fold_beside,
+    is_pitchfork,
+)
 from vibroimpact.analysis.orbits.sign_changes import turns_round
-from vibroimpact.analysis.orbits.symmetry import mirror_image
-from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.symmetry import differences, mirror_image
+from vibroimpact.fmus.bodies.impacting_body import Floats
 
-CHANGE = 1e-6
-"""Change of an unknown for derivatives by differences; their error costs a Newton step, but no digit."""
 SLOW = 1e-3
 """Speed of an impact, over the fastest, below which a locus of another kind ends at a graze."""
 BEFORE_GRAZE = 1e-9
 """Distance of a maximum beyond its stop, over the motion, above which it touched before an impact lost its speed."""
-FOUND = 1e-13
-"""Change of the unknowns below which they count as found."""
-ZERO = 1e-6
-"""Value of a function at the first point, over its value a step further, below which the locus begins at its zero."""
-OFF_CHORD = 0.05
-"""Distance from the line between two points of a locus, over their distance, below which an orbit is on the locus."""
 SAME_POINT = 1e-7
 """Distance from a locus, in ranges of the parameters and radians, below which an orbit is on it."""
 AT_BOUND = 1e-9
 """Distance from an end of a range, over the range, below which a located point is at this end."""
 END_OF_RANGE = "end of the range"
-
-BodyAt2 = Callable[[float, float], ImpactingBody]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,21 +67,8 @@ class _Event:
     beyond: Sequence[Bifurcation] = ()
 
 
-class LocusFollower:
-    """Follows a bifurcation of a body that depends on two parameters.
-
-    Parameters
-    ----------
-    body_at : callable
-        Body for values of both parameters.
-    first, second : FollowSettings
-        Settings for both parameters; steps are those of the first.
-    """
-
-    def __init__(self, body_at: BodyAt2, first: FollowSettings, second: FollowSettings) -> None:
-        self._body_at = body_at
-        self._ranges = first, second
-        self._spans = np.array([first.span, second.span])
+class LocusFollower(LocusSteps):
+    """Follows a bifurcation of a body that depends on two parameters; see `LocusSteps`."""
 
     def locus(self, point: SpecialPoint, values: tuple[float, float]) -> Locus:
         """Follow a bifurcation both ways.
@@ -102,8 +78,9 @@ class LocusFollower:
         OrbitError
             The bifurcation is of a kind that cannot be followed.
         """
-        ways = Locus(point.kind), Locus(point.kind)
-        for _ in self.both_ways(*ways, Bifurcation.of(point, values)):
+        start = Bifurcation.of(point, values)
+        ways = Locus(start.kind), Locus(start.kind)
+        for _ in self.both_ways(*ways, start):
             pass
         return joined_loci(*ways)
 
@@ -119,8 +96,8 @@ class LocusFollower:
         """Follow one way, at first towards higher (+1) or lower (-1) values of the second parameter."""
         if locus.kind not in FOLLOWED_KINDS:
             raise OrbitError(f"loci: expected a {', a '.join(FOLLOWED_KINDS)}, got a {locus.kind}.")
-        tangent = self._tangent(start, start.orbit, self._unknowns(start.orbit, start.values))
-        now = LocusPoint(start.values, start.orbit, -tangent if tangent[-1] * sign < 0.0 else tangent)
+        start = self._kept_symmetric(start)
+        now = self._first(start, sign)
         longest = self._ranges[0].longest
         step = 0.1 * longest
         locus.points.append(now)
@@ -153,6 +130,13 @@ class LocusFollower:
             yield taken
             now, step = taken, min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
         locus.ends.append(f"{self._ranges[0].most_orbits} orbits")
+
+    def _first(self, start: Bifurcation, sign: float) -> LocusPoint:
+        """Return the first point of a locus; the orbit at a pitchfork becomes as good as those that follow."""
+        tangent = self._tangent(start, start.orbit, self._unknowns(start.orbit, start.values))
+        now = LocusPoint(start.values, start.orbit, -tangent if tangent[-1] * sign < 0.0 else tangent)
+        found = self._step(start, now, 0.0) if start.kind == PITCHFORK else None
+        return now if found is None else found[0]
 
     def goes_through(self, locus: Locus, start: Bifurcation) -> bool:
         """Tell whether a locus goes through a bifurcation or its mirror image."""
@@ -195,78 +179,6 @@ class LocusFollower:
             ):
                 yield from near
 
-    # ---- equations ----
-
-    def _unknowns(self, orbit: PeriodicOrbit, values: tuple[float, float]) -> Floats:
-        return np.concatenate([orbit.unknowns, np.array(values) / self._spans])
-
-    def _made(self, orbit: PeriodicOrbit, unknowns: Floats) -> tuple[PeriodicOrbit, Floats]:
-        """Return the orbit of some unknowns, with its errors over the size of the motion."""
-        values = unknowns[-2:] * self._spans
-        body = self._body_at(float(values[0]), float(values[1]))
-        found = tried(body, orbit, unknowns[:-2])
-        return found.orbit, found.errors / body.scale
-
-    def _equations(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        made, errors = self._made(orbit, unknowns)
-        test = start.test(made)
-        if not np.isfinite(test):
-            raise OrbitError("loci: expected impacts with a speed, and a maximum between them; got none.")
-        return np.append(errors, test)
-
-    def _slopes(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        columns = []
-        for k in range(unknowns.size):
-            ends = []
-            for side in (1.0, -1.0):
-                moved = unknowns.copy()
-                moved[k] += side * CHANGE
-                ends.append(self._equations(start, orbit, moved))
-            columns.append((ends[0] - ends[1]) / (2.0 * CHANGE))
-        return np.column_stack(columns)
-
-    def _tangent(self, start: Bifurcation, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
-        return np.asarray(np.linalg.svd(self._slopes(start, orbit, unknowns))[2][-1], dtype=np.float64)
-
-    def _step(
-        self, start: Bifurcation, now: LocusPoint, step: float, most_turn: float = MOST_TURN
-    ) -> tuple[LocusPoint, int] | None:
-        begin = self._unknowns(now.orbit, now.values)
-        unknowns = begin + step * now.tangent
-        try:
-            slopes = self._slopes(start, now.orbit, unknowns)
-            for newton in range(MOST_NEWTON):  # noqa: B007  # the number is returned
-                residual = self._equations(start, now.orbit, unknowns)
-                matrix = np.vstack([slopes, now.tangent])
-                off = step - now.tangent @ (unknowns - begin)
-                change = np.linalg.solve(matrix, np.append(-residual, off))
-                if not np.abs(change).max() < 0.5:
-                    return None
-                unknowns = unknowns + change
-                if np.abs(change).max() < FOUND * (1.0 + np.abs(unknowns).max()):
-                    break
-            else:
-                return None
-            orbit = self._made(now.orbit, unknowns)[0]
-            tangent = self._tangent(start, orbit, unknowns)
-        except (OrbitError, np.linalg.LinAlgError):
-            return None
-        if tangent @ now.tangent < 0.0:
-            tangent = -tangent
-        if tangent @ now.tangent < np.cos(most_turn):
-            return None
-        values = unknowns[-2:] * self._spans
-        return LocusPoint((float(values[0]), float(values[1])), orbit, tangent), newton
-
-    def _closes(self, first: LocusPoint, now: LocusPoint, taken: LocusPoint) -> bool:
-        """Tell whether a step passes the first point of the locus, in the direction of the first step."""
-        here, ahead, goal = (self._unknowns(each.orbit, each.values) for each in (now, taken, first))
-        step, left = ahead - here, goal - here
-        length = float(np.linalg.norm(step))
-        part = float(left @ step) / length**2
-        off = float(np.linalg.norm(left - part * step))
-        return 0.0 < part <= 1.0 and off < OFF_CHORD * length and bool(first.tangent @ step > 0.0)
-
     # ---- events of a step ----
 
     def _events(
@@ -276,6 +188,8 @@ class LocusFollower:
         events = [
             *self._other_kinds(start, now, taken, step, is_first=is_first),
             *self._extremum(start, now, taken, step),
+            *self._degenerate(start, now, taken, step, is_first=is_first),
+            *self._symmetric_end(start, now, taken),
             *self._ends_of_range(start, now, taken, step),
             *self._grazes(start, now, taken, step, is_first=is_first),
         ]
@@ -286,14 +200,16 @@ class LocusFollower:
             events = [each for each in events if each is last or each.part < last.part - ZERO * step]
         if start.kind == "torus" and not ends and not turns_round(taken.orbit.multipliers):
             double = taken.orbit.multipliers[np.argmin(np.abs(np.abs(taken.orbit.multipliers) - 1.0))].real
-            return [_Event(0.0, now, "fold" if double > 0.0 else "period doubling")]
+            is_breaking = start.halves is not None and is_pitchfork(now.orbit)
+            one = PITCHFORK if is_breaking else "fold"
+            return [_Event(0.0, now, one if double > 0.0 else "period doubling")]
         return events
 
     def _other_kinds(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
     ) -> Iterator[_Event]:
         """Yield the bifurcations of other kinds that the locus passes; a torus may end there."""
-        for kind, test in SMOOTH.items():
+        for kind, test in start.smooth.items():
             if kind == start.kind or (
                 kind == "torus" and (now.orbit.body.frequencies.size < 2 or start.kind == GRAZE)
             ):
@@ -316,17 +232,58 @@ class LocusFollower:
             part, at = found
             unknowns = self._unknowns(at.orbit, at.values)
             kind = kind_of_extremum(
-                at.tangent, lambda each: self._matrix(at.orbit, each, unknowns[-1:]), unknowns[:-1]
+                at.tangent, lambda each: self._matrix(start, at.orbit, each, unknowns[-1:]), unknowns[:-1]
             )
             yield _Event(part, at, special=kind)
 
-    def _matrix(self, orbit: PeriodicOrbit, unknowns: Floats, second: Floats) -> Floats:
-        """Return the derivatives of the errors by the unknowns of an orbit and the first parameter."""
-        columns = []
-        for axis in np.eye(unknowns.size) * CHANGE:
-            ends = [self._made(orbit, np.append(unknowns + side * axis, second))[1] for side in (1.0, -1.0)]
-            columns.append((ends[0] - ends[1]) / (2.0 * CHANGE))
-        return np.column_stack(columns)
+    def _degenerate(
+        self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
+    ) -> Iterator[_Event]:
+        """Yield the point of a locus of pitchforks at which folds of broken orbits begin."""
+        halves = start.halves
+        if start.kind != PITCHFORK or halves is None:
+            return
+
+        def cubic(each: LocusPoint) -> float:
+            return cubic_of(halves, each.orbit, self._made, np.array(each.values) / self._spans)
+
+        found = self._zero(start, now, taken, step, cubic, is_first)
+        if found is not None:
+            part, at = found
+            beside = fold_beside(at.orbit, np.array(at.values) / self._spans, self._made, CHANGE)
+            fold = None
+            if beside is not None:
+                first, second = beside[1] * self._spans
+                fold = Bifurcation("fold", beside[0], (float(first), float(second)))
+            yield _Event(part, at, special=DEGENERATE, start=fold)
+
+    def _symmetric_end(self, start: Bifurcation, now: LocusPoint, taken: LocusPoint) -> Iterator[_Event]:
+        """Yield the end of a locus of folds of broken orbits that a step passes: mirror images follow."""
+        if start.kind != "fold" or start.halves is not None:
+            return
+        if not (nearly_symmetric(now.orbit) and nearly_symmetric(taken.orbit)):
+            return
+        apart = [self._broken(each.orbit) for each in (now, taken)]
+        if float(apart[0] @ apart[1]) < 0.0:
+            at = self._degenerate_near(now)
+            if at is not None:
+                yield _Event(0.0, at, DEGENERATE, DEGENERATE, Bifurcation(PITCHFORK, at.orbit, at.values))
+
+    def _broken(self, orbit: PeriodicOrbit) -> Floats:
+        """Return the unknowns of the mirror image less those of an orbit next to it."""
+        image = mirror_image(orbit)
+        apart = None if image is None else differences(orbit, image)
+        return np.zeros(orbit.unknowns.size) if apart is None else apart
+
+    def _degenerate_near(self, now: LocusPoint) -> LocusPoint | None:
+        """Return the degenerate pitchfork next to a fold of broken orbits; None if there is none."""
+        if not self._keep_symmetry(now.values):
+            return None
+        found = degenerate_near(now.orbit, np.array(now.values) / self._spans, self._made)
+        if found is None:
+            return None
+        first, second = found[1] * self._spans
+        return LocusPoint((float(first), float(second)), found[0], now.tangent)
 
     def _ends_of_range(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float
@@ -404,10 +361,17 @@ class LocusFollower:
 
     def _reason_for_end(self, locus: Locus, start: Bifurcation, now: LocusPoint, step: float) -> str:
         """Return the reason why a locus ends where no step is short enough; a special point may be added to it."""
+        is_nearly = start.halves is None and nearly_symmetric(now.orbit)
+        if locus.kind == "fold" and is_nearly:
+            degenerate = self._degenerate_near(now)
+            if degenerate is not None:
+                locus.points.append(degenerate)
+                locus.special.append((DEGENERATE, degenerate))
+                locus.starts.append(Bifurcation(PITCHFORK, degenerate.orbit, degenerate.values))
+                return DEGENERATE
+        no_further = f"cannot be followed further{': its orbits become symmetric' * is_nearly}"
         if locus.kind != BETWEEN:
-            return (
-                f"cannot be followed further{': its orbits become symmetric' * nearly_symmetric(now.orbit)}"
-            )
+            return no_further
         slowest = int(now.orbit.velocities.argmin())
         if len(locus.points) == 1 and grazes(now.orbit)[slowest]:
             return CORNER  # the locus begins there, and leaves in the other direction
@@ -428,7 +392,7 @@ class LocusFollower:
             locus.starts.append(Bifurcation(BETWEEN, found[0].orbit, found[0].values))
             locus.beyond += self._met(start, now, found[0].orbit, now)
             return CORNER
-        return "cannot be followed further"
+        return no_further
 
     def _without_speed(self, locus: Locus) -> LocusPoint:
         """Return the point where an impact has no speed, along the line through points next to it.
@@ -446,51 +410,3 @@ class LocusFollower:
         return LocusPoint(
             (float(values[0]), float(values[1])), self._made(now.orbit, unknowns)[0], now.tangent
         )
-
-    def _zero(
-        self,
-        start: Bifurcation,
-        now: LocusPoint,
-        taken: LocusPoint,
-        step: float,
-        test: Callable[[LocusPoint], float],
-        is_first: bool,
-    ) -> tuple[float, LocusPoint] | None:
-        """Return the part of a step at which a function changes its sign, and the point there; None without one."""
-        before, after = test(now), test(taken)
-        if not before * after < 0.0 or (is_first and abs(before) < ZERO * abs(after)):
-            return None
-        return self._located(start, now, step, test)
-
-    def _last(
-        self, start: Bifurcation, now: LocusPoint, step: float, holds: Callable[[LocusPoint], bool]
-    ) -> tuple[float, LocusPoint]:
-        """Return the last point of a step for which a condition holds, after its part of the step.
-
-        Beyond it there may be no points.
-        """
-        part, beyond, last = 0.0, step, now
-        while beyond - part > LOCATED * step:
-            middle = 0.5 * (part + beyond)
-            found = self._step(start, now, middle)
-            if found is None or not holds(found[0]):
-                beyond = middle
-            else:
-                part, last = middle, found[0]
-        return part, last
-
-    def _located(
-        self, start: Bifurcation, now: LocusPoint, step: float, test: Callable[[LocusPoint], float]
-    ) -> tuple[float, LocusPoint] | None:
-        from scipy.optimize import brentq
-
-        def at(part: float) -> float:
-            found = (now, 0) if part == 0.0 else self._step(start, now, part)
-            return float(np.nan) if found is None else test(found[0])
-
-        try:
-            part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
-        except (ValueError, RuntimeError):
-            return None
-        found = self._step(start, now, part)
-        return None if found is None else (part, found[0])

@@ -27,9 +27,9 @@ class Follow(Operation):
     which runs over the range end. Index sums then show whether orbits are missing.
 
     --impacts and --periods search other orbits. --seed gives one for the scene as it is, --from-dataset one at the
-    values of its run. With --second, folds, period doublings, tori and grazes are curves over both numbers, also those
-    that leave points where two curves meet. The curves are then written and drawn, and the branches are printed. Closed
-    branches that exist at some values of the second number only are found and named (isolas).
+    values of its run. With --second, folds, period doublings, tori, pitchforks and grazes are curves over both numbers,
+    also those that leave points where two curves meet. The curves are then written and drawn, and the branches are
+    printed. Closed branches that exist at some values of the second number only are found and named (isolas).
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """

@@ -19,6 +19,7 @@ from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
 from vibroimpact.analysis.orbits.fold_extrema import EXTREMA
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, FollowSettings
 from vibroimpact.analysis.orbits.periodic import grazes
+from vibroimpact.analysis.orbits.pitchforks import DEGENERATE
 from vibroimpact.analysis.orbits.search import STARTS
 from vibroimpact.analysis.study import Study
 from vibroimpact.fmus.errors import UsageError
@@ -276,10 +277,15 @@ class Following(Study[str]):
                 f"{self.second} from {low[1]:.8g} to {high[1]:.8g}; ends: {', '.join(locus.ends)}."
             )
             for kind, point in locus.special:
-                words = kind if kind in EXTREMA else f"codimension 2, {locus.kind} and {kind}"
+                words = kind if kind in EXTREMA else f"codimension 2, {_two_kinds(locus.kind, kind)}"
                 say(f"   {words}: {point.values[0]:.11g}, {point.values[1]:.11g}")
         for line in self.loci.isolas:
             say(line)
+
+
+def _two_kinds(kind: str, other: str) -> str:
+    """Return the kinds of a point of codimension 2 in words."""
+    return other if other == DEGENERATE else f"{kind} and {other}"
 
 
 def _stable_orbits(branch: Branch) -> str:

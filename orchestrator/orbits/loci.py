@@ -11,11 +11,14 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci
+from vibroimpact.analysis.orbits.bifurcations import FOLLOWED_KINDS, Bifurcation, Locus, joined_loci, kind_of
 from vibroimpact.analysis.orbits.branch import Branch
+from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
 from vibroimpact.analysis.orbits.loci import LocusFollower
+from vibroimpact.analysis.orbits.pitchforks import PITCHFORK
+from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.orchestrator.orbits.bodies import BodiesAlong, impacting_body, refuse_outside
@@ -114,13 +117,17 @@ class FollowedLoci:
             "and at each point of codimension 2 of a curve: curves that meet none of these were not looked for."
         )
         points = [point for each in self.followed.branches for point in each.points]
-        others = [point for point in points if point.kind not in FOLLOWED_KINDS]
+        others = [point for point in points if kind_of(point) not in FOLLOWED_KINDS]
         where = [f"{point.kind} at {point.at.value:.8g}" for point in others]
         where += [f"{each.kind} at {each.values[0]:.8g}, {each.values[1]:.8g}" for each in self.not_begun]
         if self.left_at_corners:
             where.append(f"{counted(self.left_at_corners, 'curve')} of other orbits at corners")
         if where:
             text += f" Not followed: {'; '.join(where)}."
+        if any(each.kind == PITCHFORK for each in self.not_begun):
+            text += " Pitchforks are followed over numbers that keep the mirror symmetry."
+        if any(point.kind == BRANCH_POINT for point in others):
+            text += " Branch points without mirror symmetry exist in general at single values of the second number."
         return text
 
 
@@ -234,7 +241,7 @@ def _starts(branches: list[Branch], value: float, second: str) -> list[_Start]:
         )
         for number, branch in enumerate(branches, start=1)
         for point in branch.points
-        if point.kind in FOLLOWED_KINDS
+        if kind_of(point) in FOLLOWED_KINDS
     ]
 
 
@@ -257,9 +264,7 @@ def _from_starts(
                 found = joined_loci(*ways)
                 result.loci.append(found)
                 number = len(result.loci)
-                waiting += [
-                    _Start(each, _met(number, found.kind, each), start.corners) for each in found.starts
-                ]
+                waiting += [_Start(each, _met(number, found, each), start.corners) for each in found.starts]
                 if start.corners < corners:
                     waiting += [
                         _Start(each, _at_corner(number, each), start.corners + 1) for each in found.beyond
@@ -268,10 +273,14 @@ def _from_starts(
                     result.left_at_corners += len(found.beyond)
 
 
-def _met(number: int, kind: str, at: Bifurcation) -> str:
+def _met(number: int, locus: Locus, at: Bifurcation) -> str:
     """Return where a locus meets a bifurcation, in words."""
-    other = "another" if at.kind == kind else f"a {at.kind}"
-    return f"curve {number}, where its {kind} is {other}, at {at.values[0]:.8g}, {at.values[1]:.8g}"
+    where = f"at {at.values[0]:.8g}, {at.values[1]:.8g}"
+    middle = locus.points[len(locus.points) // 2].orbit
+    if {locus.kind, at.kind} == {"fold", PITCHFORK} and not (is_symmetric(at.orbit) and is_symmetric(middle)):
+        return f"curve {number}, next to its degenerate pitchfork, {where}"
+    other = "another" if at.kind == locus.kind else f"a {at.kind}"
+    return f"curve {number}, where its {locus.kind} is {other}, {where}"
 
 
 def _at_corner(number: int, at: Bifurcation) -> str:

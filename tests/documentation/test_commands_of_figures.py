@@ -126,6 +126,13 @@ COMMANDS = {
         ),
         is_long=True,
     ),
+    f"follow {BIFURCATION} "
+    '--set "sweep={}" --set "stop=[{position=1.0,restitution=0.7},{side=\'lower\',position=-1.0,restitution=0.7}]" '
+    f"{FREQUENCY} --from 0.6 --to 1.1 --second forcing.amplitude --second-from 0.05 --second-to 1 --impacts 2 "
+    "--seed 0.1:1,3.24:2 --step 0.05 --doublings 0 --grazes 0 --figure pitchforks.png": Shown(
+        ("pitchfork and graze: 0.99874921777, 0.0999062060", "degenerate pitchfork: 0.878204605"),
+        is_long=True,
+    ),
     "plot loci.nc --over map -o loci_map.png": Shown((), (424, 424, 402), is_long=True),
     "classify campaign -o classes.nc --figure classes.png": Shown(("P(1,1)", "P(1,2)"), (6840, 5500)),
     "lyapunov campaign -o exponents.nc --figure exponents.png": Shown(

@@ -45,6 +45,7 @@ _LOCI: dict[SpecialOrbit, dict[str, Any]] = {
     SpecialOrbit.fold: {"color": "#0F4C81", "linestyle": "-"},
     SpecialOrbit.period_doubling: {"color": "#B5410B", "linestyle": (0, (4, 1.5))},
     SpecialOrbit.torus: {"color": "#A8327D", "linestyle": (0, (6, 1.2))},
+    SpecialOrbit.pitchfork: {"color": "#B8860B", "linestyle": (0, (8, 1.2, 1.2, 1.2))},
     SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
     SpecialOrbit.graze_between_impacts: {"color": "#6F4E9C", "linestyle": (0, (5, 1.2, 1.2, 1.2))},
 }
@@ -63,9 +64,11 @@ _MARKS = {
     SpecialOrbit.stability_change: "X",
     SpecialOrbit.branch_point: "P",
     SpecialOrbit.impact_at_the_yield_velocity: "<",
+    SpecialOrbit.pitchfork: "P",
 }
+_EXTREMA = (CurvePoint.isola_centre, CurvePoint.crossing_of_branches, CurvePoint.cusp)
 _POINTS_OF_CURVES: tuple[tuple[str, str, tuple[CurvePoint, ...]], ...] = (
-    ("codimension 2", "o", tuple(each for each in CurvePoint if each < CurvePoint.isola_centre)),
+    ("codimension 2", "o", tuple(each for each in CurvePoint if each not in _EXTREMA)),
     ("isola centre", "*", (CurvePoint.isola_centre,)),
     ("crossing of branches", "X", (CurvePoint.crossing_of_branches,)),
     ("cusp", "^", (CurvePoint.cusp,)),

@@ -14,6 +14,7 @@ from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError
 from vibroimpact.analysis.orbits.bifurcations import alternating, folding
 from vibroimpact.analysis.orbits.departures import departures
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
+from vibroimpact.analysis.orbits.mirrored_halves import halves_of, slopes_of
 from vibroimpact.analysis.orbits.own_orbits import find_own_orbit
 from vibroimpact.analysis.orbits.periodic import PeriodicOrbit, tried
 from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
@@ -219,3 +220,16 @@ def test_impacts_that_grow_without_bound_end_a_branch() -> None:
 def test_no_orbit_near_a_guess_is_an_error() -> None:
     with pytest.raises(OrbitError, match=r"expected an orbit P\(1,1\) near to the period 1, got none"):
         find_own_orbit(oscillator(0.05), 1.0, np.zeros(1), np.ones(1), np.zeros(1, np.int32))
+
+
+def test_slopes_of_a_symmetric_orbit_split_into_two_halves() -> None:
+    """Equations.md 4.20: changes that keep the symmetry and changes that break it have errors of their own."""
+    orbit = orbit_of_chain()
+    halves, slopes = halves_of(orbit), slopes_of(orbit)
+    assert halves is not None
+    size = np.abs(slopes).max()
+    np.testing.assert_allclose(halves.mean @ slopes @ halves.opposite, 0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(halves.difference @ slopes @ halves.equal, 0.0, atol=1e-11 * size)
+    assert halves.folding(orbit) * halves.breaking(orbit) == pytest.approx(np.linalg.det(slopes), rel=1e-10)
+    np.testing.assert_allclose(halves.apart @ orbit.unknowns, halves.offset, atol=1e-9)
+    assert np.linalg.matrix_rank(np.hstack([halves.equal, halves.opposite])) == slopes.shape[0]
