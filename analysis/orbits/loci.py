@@ -208,7 +208,12 @@ class LocusFollower(LocusSteps):
     def _other_kinds(
         self, start: Bifurcation, now: LocusPoint, taken: LocusPoint, step: float, *, is_first: bool
     ) -> Iterator[_Event]:
-        """Yield the bifurcations of other kinds that the locus passes; a torus may end there."""
+        """Yield the bifurcations of other kinds that the locus passes; a torus may end there.
+
+        A stop that yields has no slopes at a graze: they differ with a contact and without it.
+        """
+        if start.kind == GRAZE and now.orbit.body.yields:
+            return
         for kind, test in start.smooth.items():
             if kind == start.kind or (
                 kind == "torus" and (now.orbit.body.frequencies.size < 2 or start.kind == GRAZE)
