@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_bool, c_double, c_uint16, c_uint32
+from typing import ClassVar
 
 from vibroimpact.orchestrator.fmi.instance import DISCARD, NO_STATE_PRIOR_TO_POINT, Instance
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
@@ -25,6 +26,8 @@ class EventfulInstance(Instance):
         The first answer: the FMU needs another event iteration.
     """
 
+    update_word: ClassVar[str] = "UpdateDiscreteStates"
+    """FMI's name of an event iteration in the version of the instance."""
     may_return_early: bool
 
     def _bind_events(self) -> None:

@@ -383,7 +383,8 @@ class Exchange2(ExchangeInstance):
     prefix = "fmi2"
     state_word = "FMUstate"
     type_names = FMI2_NAMES
-    own_words: ClassVar[dict[str, str]] = {"derivatives": "Derivatives", "update": "NewDiscreteStates"}
+    update_word = "NewDiscreteStates"
+    own_words: ClassVar[dict[str, str]] = {"derivatives": "Derivatives", "update": update_word}
 
     def _instantiate(self) -> None:
         self._callbacks = Callbacks(*map(callback, FMI2_CALLBACKS), None, self.log.environment)

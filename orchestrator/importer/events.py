@@ -142,11 +142,12 @@ class EventMode:
         """Return the error of events that do not settle at `time`, s."""
         endless = [i for i in self.instances if i.needs_update.value]
         names = ", ".join(i.name for i in endless)
+        function = endless[0].prefix + endless[0].update_word
         return ComponentError(
-            f"{names}: fmi3UpdateDiscreteStates: expected event iteration to end, got another request after "
+            f"{names}: {function}: expected event iteration to end, got another request after "
             f"{EVENT_ITERATIONS} iterations at time {time:.17g}.",
             instance=names,
-            function="fmi3UpdateDiscreteStates",
+            function=function,
             time=time,
             log=[line for i in endless for line in i.log.take()],
         )
