@@ -53,6 +53,8 @@ def _refused(owner: str, how: str, versions: str, *names: str) -> tuple[Flag, ..
     return tuple(Flag(name, owner, versions, Treatment.refused, how) for name in names)
 
 
+#: Relative tolerance of an integration where neither the scene nor the FMU gives one.
+DEFAULT_TOLERANCE = 1e-8
 VARIABLE_STEPS = "canHandleVariableCommunicationStepSize"
 INTERNAL_STEP = "fixedInternalStepSize"
 ONLY_ONCE = "canBeInstantiatedOnlyOncePerProcess"
@@ -104,35 +106,43 @@ FLAGS: tuple[Flag, ...] = (
     _heeded("providesIntermediateUpdate", "3.0", "no callback is given, and no variable asked for"),
     _heeded("canReturnEarlyAfterIntermediateUpdate", "3.0", "no callback is given that could ask for it"),
     _heeded("recommendedIntermediateInputSmoothness", "3.0", "no input is given within a step"),
-    *_refused(
-        MODEL_EXCHANGE,
-        _BY_INTERFACE,
-        "2.0",
-        *_COMMON,
-        "completedIntegratorStepNotNeeded",
-        "canNotUseMemoryManagementFunctions",
-        "canGetAndSetFMUstate",
-        "canSerializeFMUstate",
-        "providesDirectionalDerivative",
-    ),
     *(
-        flag
-        for interface, more in (
-            (MODEL_EXCHANGE, ("needsCompletedIntegratorStep", "providesEvaluateDiscreteStates")),
-            (SCHEDULED, ()),
+        _heeded(name, versions, how, MODEL_EXCHANGE)
+        for name, versions, how in (
+            (NEEDS_TOOL, "2.0, 3.0", "as in co-simulation"),
+            (ONLY_ONCE, "2.0, 3.0", "as in co-simulation"),
+            ("canNotUseMemoryManagementFunctions", "2.0", "the functions are given to every FMU"),
+            ("completedIntegratorStepNotNeeded", "2.0", "true: the FMU is not told of completed steps"),
+            ("needsCompletedIntegratorStep", "3.0", "false: the FMU is not told of completed steps"),
+            (
+                "canGetAndSetFMUstate",
+                "2.0",
+                "false: a step that another component cuts is refused by this name",
+            ),
+            (
+                "canGetAndSetFMUState",
+                "3.0",
+                "false: a step that another component cuts is refused by this name",
+            ),
+            ("canSerializeFMUstate", "2.0", _NEVER),
+            ("canSerializeFMUState", "3.0", _NEVER),
+            ("providesDirectionalDerivative", "2.0", _NEVER),
+            ("providesDirectionalDerivatives", "3.0", _NEVER),
+            ("providesAdjointDerivatives", "3.0", _NEVER),
+            ("providesPerElementDependencies", "3.0", _NEVER),
+            ("providesEvaluateDiscreteStates", "3.0", _NEVER),
         )
-        for flag in _refused(
-            interface,
-            _BY_INTERFACE,
-            "3.0",
-            *_COMMON,
-            "canGetAndSetFMUState",
-            "canSerializeFMUState",
-            "providesDirectionalDerivatives",
-            "providesAdjointDerivatives",
-            "providesPerElementDependencies",
-            *more,
-        )
+    ),
+    *_refused(
+        SCHEDULED,
+        _BY_INTERFACE,
+        "3.0",
+        *_COMMON,
+        "canGetAndSetFMUState",
+        "canSerializeFMUState",
+        "providesDirectionalDerivatives",
+        "providesAdjointDerivatives",
+        "providesPerElementDependencies",
     ),
     *_refused(
         VARIABLE, "it speaks of model exchange alone", "2.0, 3.0", "canHandleMultipleSetPerTimeInstant"
@@ -173,6 +183,8 @@ class Capabilities:
         Its input clocks with known ticks.
     refusals : tuple of str
         Needs that no importer here meets, each as "an FMU with ...".
+    tolerance : float
+        Model exchange: relative tolerance of the integration where none is given, from the default experiment.
     """
 
     restorable: bool = False
@@ -184,6 +196,7 @@ class Capabilities:
     asynchronous: bool = False
     clocks: tuple[InputClock, ...] = ()
     refusals: tuple[str, ...] = ()
+    tolerance: float = DEFAULT_TOLERANCE
 
     @property
     def grid(self) -> str:
@@ -193,8 +206,10 @@ class Capabilities:
         return f"{INTERNAL_STEP} = {self.internal_step:g}" if self.internal_step > 0.0 else ""
 
 
-def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities:
-    """Return the declared capabilities of an FMU; the defaults without co-simulation.
+def capabilities_of(
+    description: ModelDescription, folder: Path, *, model_exchange: bool = False
+) -> Capabilities:
+    """Return the declared capabilities of an FMU for co-simulation; the defaults without this kind.
 
     Parameters
     ----------
@@ -202,7 +217,11 @@ def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities
         Its description, as FMPy reads it.
     folder : Path
         Folder of the unpacked FMU: FMPy reads no intervals of clocks.
+    model_exchange : bool
+        Those of model exchange instead. Its events are always resolved in event mode, and its steps have any size.
     """
+    if model_exchange:
+        return _of_model_exchange(description)
     interface = description.coSimulation
     if interface is None:
         return Capabilities()
@@ -211,14 +230,13 @@ def capabilities_of(description: ModelDescription, folder: Path) -> Capabilities
     if clocks and not events:
         names = ", ".join(clock.name for clock in clocks)
         refusals = (*refusals, f"the input clock {names} and {EVENT_MODE} = false")
-    tool = description.generationTool or description.modelName or "one that it does not name"
     return Capabilities(
         restorable=bool(interface.canGetAndSetFMUstate),
         event_mode=events,
         variable_steps=bool(interface.canHandleVariableCommunicationStepSize),
         internal_step=step if math.isfinite(step) and step > 0.0 else 0.0,
         only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
-        tool=str(tool) if interface.needsExecutionTool else "",
+        tool=_tool(description) if interface.needsExecutionTool else "",
         asynchronous=bool(interface.canRunAsynchronuously),
         clocks=clocks,
         refusals=refusals,
@@ -234,3 +252,29 @@ def gives_derivatives(folder: Path) -> bool:
     interface = root.find(CO_SIMULATION)
     flags = {} if interface is None else interface.attrib
     return any(flags.get(name, "").strip() in ("true", "1") for name in (DERIVATIVE, f"{DERIVATIVE}s"))
+
+
+def _tool(description: ModelDescription) -> str:
+    return str(description.generationTool or description.modelName or "one that it does not name")
+
+
+def _of_model_exchange(description: ModelDescription) -> Capabilities:
+    interface = description.modelExchange
+    if interface is None:
+        return Capabilities()
+    clocks = [variable.name for variable in description.modelVariables if variable.type == "Clock"]
+    return Capabilities(
+        restorable=bool(interface.canGetAndSetFMUstate),
+        event_mode=True,
+        only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
+        tool=_tool(description) if interface.needsExecutionTool else "",
+        refusals=tuple(f"the clock {name} in model exchange" for name in clocks),
+        tolerance=_usual_tolerance(description),
+    )
+
+
+def _usual_tolerance(description: ModelDescription) -> float:
+    experiment = description.defaultExperiment
+    text = None if experiment is None else experiment.tolerance
+    own = math.nan if text is None else float(text)
+    return own if 0.0 < own <= 1.0 else DEFAULT_TOLERANCE

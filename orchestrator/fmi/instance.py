@@ -135,6 +135,10 @@ class Instance(ABC):
         function: Any = self._library.function(self.prefix + name)
         return ctypes.cast(function, c_void_p)
 
+    def call_of(self, name: str) -> tuple[int | None, int | None]:
+        """Return the address of a function and of its first argument, for C code that calls it."""
+        return self.address_of(name).value, self._pointer.value
+
     def check(self, status: int, function: str) -> None:
         """Raise ComponentError when `status` is worse than a warning."""
         if status > WARNING or status < OK:

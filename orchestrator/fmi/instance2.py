@@ -26,7 +26,13 @@ CO_SIMULATION = 1
 LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
 
 
-class _Callbacks(ctypes.Structure):
+#: Callbacks of the core library, up to the first that is not given.
+FMI2_CALLBACKS = ("fmi2", "allocate", "free")
+
+
+class Callbacks(ctypes.Structure):
+    """The callback functions of FMI 2.0."""
+
     _fields_ = [
         ("logger", c_void_p),
         ("allocate", c_void_p),
@@ -37,7 +43,7 @@ class _Callbacks(ctypes.Structure):
 
 
 #: Freed instances for reuse, by the folder of their FMU and their name.
-_kept: dict[tuple[Path, str], list[tuple[int, _Callbacks]]] = {}
+_kept: dict[tuple[Path, str], list[tuple[int, Callbacks]]] = {}
 
 
 class Instance2(Instance):
@@ -67,9 +73,7 @@ class Instance2(Instance):
     ) -> None:
         super().__init__(fmu, name, log=log, wrap=wrap)
         self._reuse = reuse
-        self._callbacks = _Callbacks(
-            callback("fmi2"), callback("allocate"), callback("free"), None, self.log.environment
-        )
+        self._callbacks = Callbacks(*map(callback, FMI2_CALLBACKS), None, self.log.environment)
         if not self._take_kept():
             self._instantiate()
         self._keep_rounding()

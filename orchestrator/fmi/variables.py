@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
@@ -22,6 +23,14 @@ class Owner(Protocol):
         """Raise unless a call ended with at most a warning."""
 
 
+@dataclass(frozen=True, slots=True)
+class Setter:
+    """A C function that sets variables in the form of FMI's, and its first argument."""
+
+    function: ctypes.c_void_p
+    owner: ctypes.c_void_p
+
+
 class VariableGroup:
     """Variables of one type of one instance, with a buffer that is reused at every call.
 
@@ -37,9 +46,11 @@ class VariableGroup:
         The buffer: `get` fills it, `set` sends it. Its type is that of the variables in C.
     get_call, set_call : callable
         The bare calls, which return FMI's status, for code that checks it itself.
+    setter : Setter or None
+        The function that sets the variables in place of the FMU's own.
     """
 
-    __slots__ = ("_array", "get_call", "instance", "name", "references", "set_call", "values")
+    __slots__ = ("_array", "get_call", "instance", "name", "references", "set_call", "setter", "values")
 
     def __init__(
         self,
@@ -51,6 +62,7 @@ class VariableGroup:
         owner: Owner,
         *,
         with_value_count: bool,
+        setter: Setter | None = None,
     ) -> None:
         if not values.flags.c_contiguous:
             raise ValueError("values: expected a contiguous buffer")
@@ -60,15 +72,16 @@ class VariableGroup:
         self.references = tuple(references)
         self._array = (ctypes.c_uint32 * max(1, len(references)))(*references)
         tail = (ctypes.c_size_t(values.size),) if with_value_count else ()
+        self.setter = setter
         arguments = (
-            pointer,
             ctypes.byref(self._array),
             ctypes.c_size_t(len(references)),
             ctypes.c_void_p(values.ctypes.data),
             *tail,
         )
-        self.get_call: Call = partial(functions[0], *arguments)
-        self.set_call: Call = partial(functions[1], *arguments)
+        self.get_call: Call = partial(functions[0], pointer, *arguments)
+        owner_of_set = pointer if setter is None else setter.owner
+        self.set_call: Call = partial(functions[1], owner_of_set, *arguments)
 
     @property
     def references_address(self) -> int:

@@ -1,6 +1,7 @@
 """The importer couples FMUs and locates their events (FMI's word for a co-simulation master).
 
-It takes any co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of all components at one instant:
+It takes FMUs for co-simulation or model exchange, FMI 2.0 and 3.0 mixed. An event ends the step of all components at
+one instant:
 
 - FMI 3.0 with event mode: the FMU returns early at its event;
 - FMI 2.0 of this package: the FMU reports the time in `event_time`; the step is repeated to it from a saved state;

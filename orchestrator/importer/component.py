@@ -6,14 +6,21 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_void_p
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.orchestrator.fmi.capabilities import NEEDS_TOOL, ONLY_ONCE, capabilities_of
+from vibroimpact.orchestrator.fmi.exchange import (
+    Exchange2,
+    Exchange3,
+    ExchangeFacts,
+    ExchangeInstance,
+)
 from vibroimpact.orchestrator.fmi.instance import OK, Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
@@ -28,6 +35,7 @@ if TYPE_CHECKING:
 KINDS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Int64"}
 
 Value = float | int | bool | str
+Kind = Literal["co_simulation", "model_exchange"]
 
 
 @lru_cache(maxsize=64)
@@ -67,6 +75,8 @@ class Component:
 
     Attributes
     ----------
+    kind : str
+        The kind of FMU that runs: `co_simulation` or `model_exchange`.
     capabilities : Capabilities
         The capabilities that its description declares.
     has_states : bool
@@ -93,35 +103,38 @@ class Component:
         self.spec = spec
         self.name = spec.name
         description = description_of(spec.fmu)
-        interface = description.coSimulation
-        if interface is None:
-            other = "scheduled execution" if description.scheduledExecution is not None else "model exchange"
-            raise ComponentFileError(f"{spec.fmu}: expected an FMU with co-simulation, got {other} only.")
+        self.kind = kind_that_runs(spec, description)
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
         self.depends = _dependencies(description)
         fmu = unpack(spec.fmu)
-        self.capabilities = capabilities_of(description, fmu.folder)
+        exchanges = self.kind == "model_exchange"
+        self.capabilities = capabilities_of(description, fmu.folder, model_exchange=exchanges)
         self._refuse_what_it_needs()
         self.has_states = self.capabilities.restorable
         version = 3 if description.fmiVersion.startswith("3") else 2
-        self.event_mode = events and version == 3 and self.capabilities.event_mode
+        self.event_mode = events and (version == 3 or exchanges) and self.capabilities.event_mode
         self.refuses_events = False
         self.ticking: frozenset[int] | None = None
         self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
         self.sha256 = fmu.sha256
         self._take_only_instance()
-        self.instance: Instance2 | Instance3 = (
-            self._instance3(fmu, log, wrap)
-            if version == 3
-            else self._instance2(fmu, log, wrap, _loses_memory(description))
-        )
+        self.instance: Instance2 | Instance3 | ExchangeInstance
+        if exchanges:
+            self.instance = self._exchange(fmu, description, log, wrap)
+        elif version == 3:
+            self.instance = self._instance3(fmu, log, wrap)
+        else:
+            self.instance = self._instance2(fmu, log, wrap, _loses_memory(description))
         self.instance.internal_step = self.capabilities.internal_step
         if self.capabilities.clocks and not self.event_mode:
             raise self._clocks_error()
         self.at_start, self.at_end = c_void_p(), c_void_p()
         self._start_groups: dict[str, VariableGroup] = {}
         self._inputs: list[VariableGroup] = []
-        self.event_times = self._event_time_group() if version == 2 and self.has_states else None
+        self.event_times = self._event_time_group() if self._tells_events(version) else None
+
+    def _tells_events(self, version: int) -> bool:
+        return version == 2 and self.has_states and self.kind == "co_simulation"
 
     def _refuse_what_it_needs(self) -> None:
         """Raise ComponentFileError where an FMU needs a capability that no importer here has."""
@@ -151,6 +164,24 @@ class Component:
         reuse = reuse and not self.capabilities.only_once
         try:
             return Instance2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
+        except ComponentError as refusal:
+            raise self._named_tool(refusal) from None
+
+    def _exchange(
+        self, fmu: UnpackedFmu, description: ModelDescription, log: LogTail | None, wrap: Wrapper | None
+    ) -> ExchangeInstance:
+        """Make an instance for model exchange; a watched variable has no part in its integration."""
+        if not self.event_mode:
+            raise ComponentError(
+                f"{self.name}: expected a watched component ([[event]]) that runs as co-simulation, got model "
+                "exchange, which locates its own events.",
+                instance=self.name,
+            )
+        facts = exchange_facts(description, self.spec.tolerance or self.capabilities.tolerance)
+        fmu = replace(fmu, identifiers=(description.modelExchange.modelIdentifier,))
+        made = Exchange3 if fmu.fmi_version.startswith("3") else Exchange2
+        try:
+            return made(fmu, self.name, facts, log=log, wrap=wrap)
         except ComponentError as refusal:
             raise self._named_tool(refusal) from None
 
@@ -339,6 +370,34 @@ class Component:
         self.instance.free()
         if _only_instances.get(self.sha256) is self:
             del _only_instances[self.sha256]
+
+
+def kind_that_runs(spec: ComponentSpec, description: ModelDescription) -> Kind:
+    """Return the kind of an FMU that runs; ComponentFileError if the FMU lacks the requested kind."""
+    offered: dict[Kind, object] = {
+        "co_simulation": description.coSimulation,
+        "model_exchange": description.modelExchange,
+    }
+    kinds = [kind for kind, interface in offered.items() if interface is not None]
+    if spec.run_as in kinds or (spec.run_as == "auto" and kinds):
+        return kinds[0] if spec.run_as == "auto" else spec.run_as
+    wanted = "co-simulation or model exchange" if spec.run_as == "auto" else spec.run_as.replace("_", "-")
+    got = "scheduled execution" if not kinds else kinds[0].replace("_", "-")
+    raise ComponentFileError(f"{spec.fmu}: expected an FMU with {wanted}, got {got} only.")
+
+
+def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeFacts:
+    """Return the facts of an FMU for model exchange, with the relative tolerance of its solver."""
+    interface = description.modelExchange
+    inputs = [v for v in description.modelVariables if v.causality == "input"]
+    return ExchangeFacts(
+        states=int(description.numberOfContinuousStates or 0),
+        indicators=int(description.numberOfEventIndicators or 0),
+        tolerance=tolerance,
+        needs_completed=bool(interface.needsCompletedIntegratorStep),
+        restorable=bool(interface.canGetAndSetFMUstate),
+        discrete=frozenset((kind_of(v), v.valueReference) for v in inputs if v.variability != "continuous"),
+    )
 
 
 def _loses_memory(description: ModelDescription) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
@@ -10,7 +10,12 @@ from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.pairs.all_pairs import Pairs
 from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.pairs.rigid_stops import RigidStop
-from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.specification import (
+    BodyPoint,
+    ConnectionSpec,
+    PairSpec,
+    StopContactSpec,
+)
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import (
     DAMPING,
     FORCE,
@@ -41,6 +46,7 @@ class ContactBonds:
         if not steps > 0.0:
             raise ComponentError(f"contact_steps: expected a number > 0, got {steps!r}.")
         self._steps = steps
+        _refuse_model_exchange(components, connections, contacts, pairs)
         self.ports = [
             ContactBond(components, transfers, c)
             for c in connections
@@ -164,3 +170,26 @@ def _is_contact_force(body: Component, variable: str) -> bool:
     port, _, last = variable.rpartition(".")
     needed = (*PORT_OUTPUTS, "law", "side", "position", "mass", STIFFNESS, DAMPING)
     return last == FORCE and all(f"{port}.{name}" in body.variables for name in needed)
+
+
+def _refuse_model_exchange(
+    components: Mapping[str, Component],
+    connections: Sequence[ConnectionSpec],
+    contacts: Sequence[StopContactSpec],
+    pairs: Sequence[PairSpec],
+) -> None:
+    """Raise ComponentError for a part of a contact that runs as model exchange."""
+    forces = [c for c in connections if _is_contact_force(components[c.target[0]], c.target[1])]
+    points = [point for pair in pairs for point in (pair.lower, pair.upper)]
+    names = [
+        *(name for c in forces for name in (c.source[0], c.target[0])),
+        *(name for c in contacts for name in (c.body, c.stop)),
+        *(point.component if isinstance(point, BodyPoint) else point[0] for point in points),
+    ]
+    for name in names:
+        if components[name].kind == "model_exchange":
+            raise ComponentError(
+                f"{name}: expected a component that runs as co-simulation in a contact, got model exchange: impacts "
+                "and contact forces of other components are not available for its integration in this version.",
+                instance=name,
+            )

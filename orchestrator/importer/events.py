@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.eventful import EventfulInstance
 from vibroimpact.orchestrator.fmi.instance import Instance
-from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall, Transfer
@@ -68,7 +68,7 @@ NO_EVENTS = LateEvents(lambda: 0, lambda events: None)
 class EventMode:
     """Resolves events: carries values, updates discrete states until all are settled, returns to step mode.
 
-    It is given all components of an importer; FMI 3.0 components with event mode take part. `behind` are the transfers
+    It is given all components of an importer; components with event mode take part. `behind` are the transfers
     that no component makes just before its own step.
     """
 
@@ -76,7 +76,7 @@ class EventMode:
         self, components: Sequence[Component], transfers: Sequence[Transfer], behind: Sequence[Transfer]
     ) -> None:
         with_events = [c.instance for c in components if c.event_mode]
-        self.instances = [i for i in with_events if isinstance(i, Instance3)]
+        self.instances = [i for i in with_events if isinstance(i, EventfulInstance)]
         """The instances that take part."""
         enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self.instances]
         update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self.instances]
@@ -142,11 +142,12 @@ class EventMode:
         """Return the error of events that do not settle at `time`, s."""
         endless = [i for i in self.instances if i.needs_update.value]
         names = ", ".join(i.name for i in endless)
+        function = endless[0].prefix + endless[0].update_word
         return ComponentError(
-            f"{names}: fmi3UpdateDiscreteStates: expected event iteration to end, got another request after "
+            f"{names}: {function}: expected event iteration to end, got another request after "
             f"{EVENT_ITERATIONS} iterations at time {time:.17g}.",
             instance=names,
-            function="fmi3UpdateDiscreteStates",
+            function=function,
             time=time,
             log=[line for i in endless for line in i.log.take()],
         )

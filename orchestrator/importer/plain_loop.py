@@ -24,6 +24,7 @@ from vibroimpact.fmus.core.coupling import (
     CouplingRun,
     advance_coupled,
 )
+from vibroimpact.orchestrator.fmi.eventful import EventfulInstance
 from vibroimpact.orchestrator.fmi.instance import (
     NO_STATE_PRIOR_TO_POINT,
     STEP_ROUNDING,
@@ -31,8 +32,7 @@ from vibroimpact.orchestrator.fmi.instance import (
     CallNotes,
     Instance,
 )
-from vibroimpact.orchestrator.fmi.instance3 import Instance3
-from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.fmi.variables import Setter, VariableGroup
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
 from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS, EventMode, LateEvents
 from vibroimpact.orchestrator.importer.wiring import CallList, Scaling, StatusCall
@@ -127,7 +127,7 @@ class PlainLoop:
 
     def _component(self, component: Component, inputs: CallList | None) -> CouplingComponent:
         instance = component.instance
-        kind = CallKind.step3 if instance.fmi_version == "3.0" else CallKind.step2
+        kind = CallKind.step3 if isinstance(instance, EventfulInstance) else CallKind.step2
         times = component.event_times
         reads = [] if times is None else [StatusCall(times.get_call, instance, f"Get{times.name}", times)]
         return CouplingComponent(
@@ -175,26 +175,32 @@ class PlainLoop:
             return self._call(
                 instance,
                 call.function,
+                moved.setter if call.function == f"Set{moved.name}" else None,
                 kind=CallKind.move3 if instance.fmi_version == "3.0" else CallKind.move2,
                 references=moved.references_address,
                 count=len(moved.references),
                 values=moved.values.ctypes.data,
                 value_count=moved.values.size,
             )
-        if isinstance(instance, Instance3) and call.function == "UpdateDiscreteStates":
+        if isinstance(instance, EventfulInstance) and call.function == "UpdateDiscreteStates":
             return self._call(
                 instance, call.function, kind=CallKind.update, values=addressof(instance.decisions)
             )
         return self._call(instance, call.function, kind=CallKind.plain)
 
-    def _call(self, instance: Instance, function: str, **fields: int) -> CouplingCall:
+    def _call(
+        self, instance: Instance, function: str, setter: Setter | None = None, **fields: int
+    ) -> CouplingCall:
         self._known.append((instance, function))
         place = len(self._known) - 1
         name = instance.prefix + function
         note = instance.wrap.number_of(name) if isinstance(instance.wrap, CallNotes) else place + 1
+        address, owner = (
+            instance.call_of(function) if setter is None else (setter.function.value, setter.owner.value)
+        )
         return CouplingCall(
-            function=instance.address_of(function).value,
-            instance=instance.pointer.value,
+            function=address,
+            instance=owner,
             place=place,
             note=note,
             **fields,

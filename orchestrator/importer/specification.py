@@ -12,6 +12,7 @@ from vibroimpact.fmus.shipped import package_folder
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
+RunAs = Literal["auto", "model_exchange", "co_simulation"]
 PairLaw = Literal["restitution", "kelvin_voigt", "hertz", "hunt_crossley"]
 #: Numbers of each law of a pair, besides the clearance.
 PAIR_NUMBERS: Mapping[PairLaw, tuple[str, ...]] = {
@@ -35,24 +36,33 @@ class ComponentSpec:
     parameters : mapping of str to number, bool or str
         Start values by variable name; enumerations by number or by item name.
     tolerance : float or None
-        Relative tolerance of the solver inside the FMU; None: the FMU's own.
+        Relative tolerance of the solver: inside the FMU, or of CVODE in model exchange; None: the FMU's own.
+    run_as : str
+        The kind of FMU that runs: `model_exchange`, `co_simulation`, or `auto`: co-simulation where the FMU has it.
     """
 
     name: str
     fmu: Path
     parameters: Mapping[str, float | int | bool | str] = field(default_factory=dict)
     tolerance: float | None = None
+    run_as: RunAs = "auto"
 
     def __reduce__(self) -> tuple[Any, ...]:
         package = package_folder()
         if self.fmu.is_relative_to(package):
             # Another machine may have the package elsewhere.
-            return _shipped, (self.name, self.fmu.relative_to(package), self.parameters)
-        return ComponentSpec, (self.name, self.fmu, self.parameters, self.tolerance)
+            return _shipped, (
+                self.name,
+                self.fmu.relative_to(package),
+                self.parameters,
+                self.tolerance,
+                self.run_as,
+            )
+        return ComponentSpec, (self.name, self.fmu, self.parameters, self.tolerance, self.run_as)
 
 
-def _shipped(name: str, place: Path, parameters: Mapping[str, float | int | bool | str]) -> ComponentSpec:
-    return ComponentSpec(name, package_folder() / place, parameters)
+def _shipped(name: str, place: Path, *rest: Any) -> ComponentSpec:
+    return ComponentSpec(name, package_folder() / place, *rest)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.fmi.eventful import EventfulInstance
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS
 from vibroimpact.orchestrator.importer.feedthrough import order_of
@@ -67,7 +67,7 @@ class Tuning:
 def _give(transfer: Transfer, time: float) -> bool:
     """Write parameters, in event mode where their component has one."""
     instance = transfer.target.instance
-    if not (transfer.target.event_mode and isinstance(instance, Instance3)):
+    if not (transfer.target.event_mode and isinstance(instance, EventfulInstance)):
         transfer.write.set()
         return False
     instance.check(instance.enter_event_call(), "EnterEventMode")

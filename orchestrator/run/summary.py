@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.importer.specification import PairSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers, shipped_kind
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.parameters import body_points
@@ -36,7 +36,7 @@ def engine(scene: Scene, execution: str = "auto") -> str:
     'fused: Oscillator, one mass, closed form between impacts'
     """
     if not scene.is_one_body:
-        names = ", ".join(component.name for component in scene.components)
+        names = ", ".join(map(_named, scene.components))
         step = f"{scene.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
         return f"coupled: {names}; {scene.execution.exchange} exchange every {step}"
     if scene.replay is not None:
@@ -45,6 +45,12 @@ def engine(scene: Scene, execution: str = "auto") -> str:
         return f"coupled: {_body(scene)}{'; an ImpactStop for each stop' if scene.stops else ''}"
     by_lanes = goes_by_lanes(scene) if execution == "auto" else execution == "lanes"
     return f"{'lanes, many points at once' if by_lanes else 'fused'}: {_body(scene)}"
+
+
+def _named(component: ComponentSpec) -> str:
+    if component.run_as != "model_exchange":
+        return component.name
+    return f"{component.name} (model exchange, tolerance {component.tolerance:g})"
 
 
 def _body(scene: Scene) -> str:

@@ -11,19 +11,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from vibroimpact.fmus.packaging.archive import content_hash, unpack
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, reading_of
 from vibroimpact.fmus.packaging.model_description import Grade
 from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
 from vibroimpact.orchestrator.fmi.capabilities import Capabilities, capabilities_of
+from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.scene.problems import nearest
 
 StartValue = float | int | bool | str
 VariableKind = Literal["real", "integer", "enumeration", "boolean", "text", "binary", "clock"]
 #: Kinds that are numbers in a dataset.
 NUMERIC_KINDS: tuple[VariableKind, ...] = ("real", "integer", "enumeration", "boolean")
+
+#: The kinds of FMU that run in a scene.
+CO_SIMULATION: Final = "co_simulation"
+MODEL_EXCHANGE: Final = "model_exchange"
 
 _KINDS: dict[str, VariableKind] = {
     "Enumeration": "enumeration",
@@ -92,16 +97,20 @@ class VariableFacts:
 
 @dataclass(frozen=True, slots=True)
 class ComponentFacts:
-    """An FMU: its file, its variables by name, and its co-simulation as declared.
+    """An FMU: its file, its variables by name, and the kind that runs as declared.
 
     Attributes
     ----------
+    kinds : tuple of str
+        The kinds of FMU that can run, the usual kind first.
+    kind : str
+        The kind that runs; empty if the FMU does not have it.
     scheduled : bool
         Whether the FMU supports scheduled execution.
     step : float or None
         Proposed communication step, s.
     capabilities : Capabilities
-        Declared capabilities of its co-simulation.
+        Declared capabilities of the kind that runs.
     doubts : tuple of str
         Open points of the description, each with the assumption.
     remarks : int
@@ -110,7 +119,8 @@ class ComponentFacts:
 
     file: str
     variables: Mapping[str, VariableFacts]
-    co_simulation: bool
+    kinds: tuple[str, ...]
+    kind: str
     scheduled: bool
     step: float | None
     capabilities: Capabilities
@@ -124,34 +134,38 @@ class ComponentFacts:
 
     @property
     def event_mode(self) -> bool:
-        """Whether the FMU handles events in event mode during co-simulation."""
+        """Whether the FMU handles events in event mode."""
         return self.capabilities.event_mode
 
 
-def component_facts(path: Path) -> ComponentFacts:
-    """Return the facts of an FMU, from the cache if a file of the same content was read before.
+def component_facts(path: Path, run_as: RunAs = "auto") -> ComponentFacts:
+    """Return the facts of an FMU that runs as a kind, from the cache if a file of the same content was read before.
 
     Raises
     ------
     ComponentFileError
         The file is missing, unsafe, or its description breaks FMI's rules.
     """
-    return _facts(content_hash(path), path)
+    return _facts(content_hash(path), path, run_as)
 
 
 @lru_cache(maxsize=_MOST_CACHED)
-def _facts(sha256: str, path: Path) -> ComponentFacts:
+def _facts(sha256: str, path: Path, run_as: RunAs) -> ComponentFacts:
     reading = reading_of(path)
     description = reading.description
     units = {unit.name: _unit(unit) for unit in description.unitDefinitions}
     variables = {variable.name: _variable(variable, units) for variable in description.modelVariables}
+    interfaces = {CO_SIMULATION: description.coSimulation, MODEL_EXCHANGE: description.modelExchange}
+    kinds = tuple(kind for kind, interface in interfaces.items() if interface is not None)
+    kind = next((kind for kind in kinds if run_as in ("auto", kind)), "")
     return ComponentFacts(
         path.name,
         variables,
-        co_simulation=description.coSimulation is not None,
+        kinds=kinds,
+        kind=kind,
         scheduled=description.scheduledExecution is not None,
         step=_proposed_step(description),
-        capabilities=capabilities_of(description, unpack(path).folder),
+        capabilities=capabilities_of(description, unpack(path).folder, model_exchange=kind == MODEL_EXCHANGE),
         doubts=tuple(finding.text for finding in reading.findings if finding.grade is Grade.doubt),
         remarks=sum(finding.grade is Grade.remark for finding in reading.findings),
     )

@@ -60,11 +60,21 @@ class ComponentTable(SceneTable):
         Annotated[Finite, Field(gt=0, le=1)] | None,
         Rule(
             "0 < tolerance <= 1",
-            hint="It is the relative tolerance of the solver inside the FMU.",
-            doc="relative tolerance of the solver inside the FMU; only for an FMU from a file",
-            default="the FMU's own",
+            hint="It is the relative tolerance of the solver.",
+            doc="relative tolerance of the solver inside the FMU, or of the integration in model exchange; only for an "
+            "FMU from a file, or in model exchange",
+            default="the FMU's own; in model exchange that of its default experiment, else 1e-8",
         ),
     ] = None
+    run_as: Annotated[
+        Literal["auto", "model_exchange", "co_simulation"],
+        Rule(
+            '"auto", "model_exchange" or "co_simulation"',
+            doc='`"co_simulation"`: the FMU makes its own steps; `"model_exchange"`: the importer integrates it; '
+            '`"auto"`: co-simulation where the FMU has it',
+            default='`"auto"`',
+        ),
+    ] = "auto"
 
 
 class ConnectionTable(SceneTable):

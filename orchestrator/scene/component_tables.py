@@ -16,7 +16,12 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.scene.component_facts import Misfit, StartValue, swept_value
+from vibroimpact.orchestrator.scene.component_facts import (
+    MODEL_EXCHANGE,
+    Misfit,
+    StartValue,
+    swept_value,
+)
 from vibroimpact.orchestrator.scene.component_models import (
     BodyPair,
     ConnectionTable,
@@ -116,7 +121,11 @@ def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis,
     assert component.fmu is not None
     ports = plan.parameters.get(component.name, {})
     parameters = {**_first_swept(component, axes), **(component.parameters or {}), **ports}
-    return ComponentSpec(component.name, component.fmu, parameters, component.tolerance)
+    facts = component.facts
+    if facts is None or facts.kind != MODEL_EXCHANGE:
+        return ComponentSpec(component.name, component.fmu, parameters, component.tolerance)
+    tolerance = component.tolerance or facts.capabilities.tolerance
+    return ComponentSpec(component.name, component.fmu, parameters, tolerance, MODEL_EXCHANGE)
 
 
 def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict[str, StartValue]:

@@ -15,7 +15,9 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
+from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.scene.component_facts import (
+    MODEL_EXCHANGE,
     ComponentFacts,
     Misfit,
     StartValue,
@@ -57,6 +59,7 @@ class DraftComponent:
     facts: ComponentFacts | None = None
     parameters: Mapping[str, StartValue] | None = None
     tolerance: float | None = None
+    run_as: RunAs = "auto"
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
@@ -108,13 +111,12 @@ def _read_component(
     if table is None:
         return DraftComponent(name)
     shipped = not _is_file_name(table.fmu)
-    where = key_path((*path, "fmu"))
     fmu = (
         _shipped_fmu(table, path, package, problems) if shipped else _fmu_file(table, path, folder, problems)
     )
-    facts = _facts(fmu, where, problems) if fmu else None
+    facts = _facts(fmu, table.run_as, path, problems) if fmu else None
     parameters = _parameters(table.parameters, path, facts, problems) if facts else None
-    return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance)
+    return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance, table.run_as)
 
 
 def _is_file_name(text: str) -> bool:
@@ -131,7 +133,7 @@ def _shipped_fmu(
             Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, package.names))
         )
         return None
-    if table.tolerance is not None:
+    if table.tolerance is not None and table.run_as != MODEL_EXCHANGE:
         hint = "It is exact, or has a parameter contact_tolerance: remove tolerance."
         got = f"tolerance = {table.tolerance:g} beside {quoted(table.fmu)}"
         problems.append(
@@ -178,18 +180,23 @@ def _file_hint(file: Path) -> str:
     return f"Did you mean {near[0]}?" if near else "Paths count from the folder of the scene file."
 
 
-def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | None:
+def _facts(fmu: Path, run_as: RunAs, path: tuple[str, ...], problems: list[Problem]) -> ComponentFacts | None:
+    where = key_path((*path, "fmu"))
     try:
-        facts = component_facts(fmu)
+        facts = component_facts(fmu, run_as)
     except ComponentFileError as error:
         message = " ".join(str(error).split()).rstrip(".")
         problems.append(Problem(where, "an intact FMU", f"an error: {message}"))
         return None
-    if not facts.co_simulation:
-        other = "scheduled execution" if facts.scheduled else "model exchange"
-        hint = f"Export it for co-simulation: {other} is not available in this version."
-        problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
+    if not facts.kinds:
+        hint = "Export it for co-simulation or model exchange: scheduled execution is not available in this version."
+        got = f"{facts.file} for scheduled execution only"
+        problems.append(Problem(where, "an FMU for co-simulation or model exchange", got, hint))
         return None  # problems of its variables do not matter then
+    if not facts.kind:
+        got = f"{quoted(run_as)} for {facts.file}, which has {facts.kinds[0].replace('_', ' ')} only"
+        problems.append(Problem(key_path((*path, "run_as")), "a kind that the FMU has", got))
+        return None
     for needed in facts.capabilities.refusals:
         expected = (
             "an FMU whose clocks are input clocks of a constant or fixed interval, and that has an event mode"

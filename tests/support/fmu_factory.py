@@ -26,6 +26,7 @@ MODELS = {
     "BouncingBall": "ball.c",
     "Buffer": "buffer.c",
     "Clocked": "clocked.c",
+    "Exchanged": "exchanged.c",
     "Faulty": "faulty.c",
     "Feedthrough": "feedthrough.c",
     "Gain": "gain.c",
@@ -34,6 +35,8 @@ MODELS = {
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
 }
+#: First letters of the C files of a model's adapters, without the version.
+ADAPTERS = {"Exchanged": "exchange"}
 #: Token of an FMU that accepts every token.
 ANY_TOKEN = "*"
 MADE = tuple(
@@ -90,6 +93,15 @@ def clocked(folder: Path) -> Path:
 def single(folder: Path, fmi: str = "3.0") -> Path:
     """Write an integrator y' = u whose `y` is one variable of the process: a process may have one instance."""
     return _write("Single", fmi, folder)
+
+
+def exchanged(folder: Path, fmi: str = "3.0") -> Path:
+    """Write a model for model exchange alone, whose adapters refuse each call in a wrong mode.
+
+    Outputs `x`, `v`, `count` (events), `steps` (completed), `nominals` (readings); inputs `u` and `d` (discrete);
+    parameters `kind` and `at`: its events and faults, as in `exchanged.h`.
+    """
+    return _write("Exchanged", fmi, folder)
 
 
 def faulty(folder: Path, fmi: str = "3.0") -> Path:
@@ -156,7 +168,7 @@ def _token(name: str, fmi: str) -> str:
 
 @cache
 def _binary(name: str, fmi: str, token: str) -> bytes:
-    adapter, suffix = SOURCES / f"fmi{fmi[0]}.c", library_suffix()
+    adapter, suffix = SOURCES / f"{ADAPTERS.get(name, 'fmi')}{fmi[0]}.c", library_suffix()
     headers = [*SOURCES.glob("*.h"), *fmi_headers().glob("*.h")]
     key = digest(
         *(compiler_identity(find_compiler()), *LANGUAGE, *WARNINGS, token),

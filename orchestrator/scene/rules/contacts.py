@@ -7,7 +7,12 @@ from functools import partial
 
 from vibroimpact.fmus.core.contact_laws import contact_law, rigid_law_numbers
 from vibroimpact.fmus.units import Unit, agree, parse_unit
-from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, VariableFacts
+from vibroimpact.orchestrator.scene.component_facts import (
+    CO_SIMULATION,
+    MODEL_EXCHANGE,
+    ComponentFacts,
+    VariableFacts,
+)
 from vibroimpact.orchestrator.scene.component_models import StopContactTable
 from vibroimpact.orchestrator.scene.component_numbers import component_variable, contact_key
 from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
@@ -21,6 +26,9 @@ SIDES = {"upper": 1, "lower": 2}
 
 def contact_problems(draft: GeneralDraft) -> list[Problem]:
     """Return all problems of the contacts of a general scene."""
+    exchanged = [*_parts_are_co_simulation(draft)]
+    if exchanged:
+        return exchanged
     rules = (_variables_are_there, _stops_answer_with_a_force, _bodies_say_their_mass, _inputs_are_free)
     return [
         problem
@@ -29,6 +37,29 @@ def contact_problems(draft: GeneralDraft) -> list[Problem]:
         for rule in rules
         for problem in rule(draft, place, table)
     ]
+
+
+def _parts_are_co_simulation(draft: GeneralDraft) -> Iterator[Problem]:
+    """Yield a problem for each part of a contact that runs as model exchange."""
+    for place, table in enumerate(draft.contacts):
+        if table is None:
+            continue
+        if isinstance(table, StopContactTable):
+            named = [("body", table.body), ("stop", table.stop)]
+        else:
+            named = [("between", name) for name in table.between]
+        for key, name in named:
+            facts = _facts(draft, component_variable(name)[0])
+            if facts is not None and facts.kind == MODEL_EXCHANGE:
+                hint = (
+                    'Write run_as = "co_simulation".'
+                    if CO_SIMULATION in facts.kinds
+                    else "Its impacts and contact forces are not available in this version."
+                )
+                where = key_path(("contact", place, key))
+                yield Problem(
+                    where, "a component that runs as co-simulation", f"{name} in model exchange", hint
+                )
 
 
 def velocity_input(draft: GeneralDraft, table: StopContactTable) -> str | None:

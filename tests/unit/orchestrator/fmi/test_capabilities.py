@@ -16,7 +16,7 @@ from support.fmu_factory import redescribed
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.orchestrator.fmi import instance2, instance3
+from vibroimpact.orchestrator.fmi import eventful, instance2
 from vibroimpact.orchestrator.fmi.capabilities import FLAGS, Treatment
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
@@ -119,7 +119,7 @@ def test_no_step_is_said_to_be_taken_back(folder: Path, fmi: str, states: bool, 
 def test_an_fmu_that_is_told_otherwise_begins_its_last_step_again(
     folder: Path, fmi: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in (instance2, instance3, plain_loop):
+    for module in (instance2, eventful, plain_loop):
         monkeypatch.setattr(module, "NO_STATE_PRIOR_TO_POINT", False)
     importer = Importer([part("m", folder / f"Mass.fmi{fmi[0]}.fmu", v=1.0, k=4.0)], macro_step=0.01)
     importer.begin()
@@ -405,6 +405,30 @@ def test_other_clocks_are_refused_by_their_names(folder: Path, old: str, new: st
         parse_scene(text, str(folder / "scene.toml"))
     with pytest.raises(ComponentError, match=named):
         Component(ComponentSpec("c", folder / fmu))
+
+
+# ---- heeded: model exchange ----
+
+
+@punishes("needsCompletedIntegratorStep", "completedIntegratorStepNotNeeded")
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_completed_steps_are_told_only_where_the_fmu_wants_them(folder: Path, fmi: str) -> None:
+    wanted = ' needsCompletedIntegratorStep="true"'
+    change = (
+        (wanted, "")
+        if fmi == "3.0"
+        else ("<ModelExchange", '<ModelExchange completedIntegratorStepNotNeeded="true"')
+    )
+    silent = redescribed(fmu_factory.exchanged(folder, fmi), folder / f"silent{fmi[0]}.fmu", change)
+    told = []
+    for fmu in (silent, folder / f"Exchanged.fmi{fmi[0]}.fmu"):
+        importer = Importer([part("m", fmu)], macro_step=0.1)
+        importer.begin()
+        importer.advance(1.0)
+        told += values(importer, "m", "steps")
+        importer.free()
+    assert told[0] == 0.0
+    assert told[1] >= 10.0
 
 
 # ---- heeded: clocks ----

@@ -3,7 +3,6 @@
 import ctypes
 import itertools
 import math
-import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -330,18 +329,17 @@ def test_every_run_begins_from_the_same_start(made: list[Importer], gain: Path, 
     assert ends[0] == ends[1] == ends[2]
 
 
-def test_an_fmu_without_co_simulation_is_refused_by_name(folder: Path, gain: Path) -> None:
-    path = folder / "exchange_only.fmu"
-    with zipfile.ZipFile(gain) as old, zipfile.ZipFile(path, "w") as new:
-        for member in old.namelist():
-            text = old.read(member)
-            if member == "modelDescription.xml":
-                text = text.replace(b"<CoSimulation", b"<ModelExchange").replace(
-                    b' canHandleVariableCommunicationStepSize="true"', b""
-                )
-            new.writestr(member, text)
-    with pytest.raises(ComponentFileError, match=r"exchange_only\.fmu.*co-simulation"):
-        Importer([part("g", path)])
+def test_an_fmu_of_scheduled_execution_alone_is_refused_by_name(folder: Path) -> None:
+    path = folder / "scheduled_only.fmu"
+    fmu_factory.redescribed(
+        fmu_factory.stepped_ball(folder),
+        path,
+        ("<CoSimulation", "<ScheduledExecution"),
+        (' canHandleVariableCommunicationStepSize="true"', ""),
+        (' hasEventMode="true" mightReturnEarlyFromDoStep="true" fixedInternalStepSize="1e-3"', ""),
+    )
+    with pytest.raises(ComponentFileError, match=r"scheduled_only\.fmu.*co-simulation or model exchange"):
+        Importer([part("b", path)])
 
 
 def test_a_watched_component_must_be_able_to_save_its_state(gain: Path) -> None:

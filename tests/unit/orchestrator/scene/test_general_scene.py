@@ -320,9 +320,9 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     write_fmu(tmp_path / "ball.fmu")
     (tmp_path / "broken.fmu").write_bytes(b"no archive")
     (tmp_path / "folder.fmu").mkdir()
-    write_fmu(tmp_path / "exchange.fmu", interface="ModelExchange")
+    write_fmu(tmp_path / "scheduled.fmu", interface="ScheduledExecution")
     write_fmu(tmp_path / "twice.fmu", variables=BALL + BALL)
-    files = ["bal.fmu", "no/x.fmu", "broken.fmu", "folder.fmu", "exchange.fmu", "twice.fmu", "Oscilator"]
+    files = ["bal.fmu", "no/x.fmu", "broken.fmu", "folder.fmu", "scheduled.fmu", "twice.fmu", "Oscilator"]
     tables = [f'[component.c{number}]\nfmu = "{file}"' for number, file in enumerate(files)]
     tables.append('[component.c7]\nfmu = "ball.fmu"\nfmi = "3.0"')
     tables.append('[[connection]]\nfrom = "c0.x"\nto = "c1.y"')
@@ -333,7 +333,8 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         f"There is no folder {tmp_path}/no.",
         "component.c2.fmu: expected an intact FMU, got an error: ",
         f"component.c3.fmu: expected an FMU file, got the folder {tmp_path}/folder.fmu.",
-        "component.c4.fmu: expected an FMU for co-simulation, got exchange.fmu for model exchange only. ",
+        "component.c4.fmu: expected an FMU for co-simulation or model exchange, "
+        "got scheduled.fmu for scheduled execution only. ",
         "component.c5.fmu: expected an intact FMU, got an error: ",
         "component.c6.fmu: expected a path that ends in .fmu, or the name of a shipped component, "
         'got "Oscilator". Did you mean Oscillator?',
