@@ -130,6 +130,9 @@ class ComponentDescription:
     ----------
     token : str
         Identifier of exactly this list of variables; instantiationToken of FMI 3.0, guid of FMI 2.0.
+    partial_derivatives : bool
+        Whether it gives derivatives of its outputs and state derivatives; a component that can be integrated does, also
+        where an export of it describes no states.
     growing : bool
         Whether modes may have negative stiffness or damping.
     repeats : mapping of str to int
@@ -159,6 +162,7 @@ class ComponentDescription:
     start_of_export: Mapping[str, Number]
     core: tuple[str, ...] = ()
     degree: int = 1
+    partial_derivatives: bool = False
 
     @property
     def has_given_modes(self) -> bool:
