@@ -1,7 +1,7 @@
 #include "body_derivatives.h"
 
 #include <float.h>
-#include <string.h>
+#include <math.h>
 
 #include "body.h"
 #include "body/modal/forces.h"
@@ -156,24 +156,40 @@ bool vi_body_is_element(size_t offset, size_t place, size_t size, int *index)
 
 /* ---- knowns ---- */
 
-/* A state of the description: of a mass or of a mode. */
-static bool column_of_state(void *self, vi_body *c, uint32_t reference, vi_line *line)
+/* Place of a state among those of the description. The references of each half mostly have one distance. */
+static size_t place_of_state(uint32_t reference)
 {
-    vi_exchange_body body = {.parts = vi_body_parts(c), .scale = 1.0};
-    const size_t most = vi_this_description.state_count / 2;
+    const vi_description *all = &vi_this_description;
+    const size_t most = all->state_count / 2;
+    const uint32_t distance = most > 1 ? all->states[1] - all->states[0] : 1;
+    for (size_t half = 0; half < all->state_count; half += most) {
+        const uint32_t beyond = (reference - all->states[half]) / distance; /* large for references below the first */
+        if (beyond < most && all->states[half + beyond] == reference) {
+            return half + beyond;
+        }
+    }
     size_t i = 0;
-    while (i < vi_this_description.state_count && vi_this_description.states[i] != reference) {
+    while (i + 1 < all->state_count && all->states[i] != reference) {
         ++i;
     }
-    vi_this_body.show_states(self, &body);
+    return i;
+}
+
+/* A state: of a mass or of a mode. */
+static bool column_of_state(void *self, vi_body *c, uint32_t reference, vi_line *line)
+{
+    vi_exchange_body body = {.scale = 1.0};
+    const size_t i = place_of_state(reference), most = vi_this_description.state_count / 2;
     const int j = (int)(i % most);
-    if (body.shape != NULL && j < vi_structure_free_modes(&c->model)) {
-        vi_body_line_of_shape(c, line, body.shape[j]);
-    } else {
-        vi_body_line_of_mode(c, line, j, body.scale);
+    double *const factor = i < most ? &line->displacement : &line->velocity;
+    vi_this_body.show_states(self, &body);
+    *factor = 1.0;
+    if (body.shape == NULL) {
+        return vi_body_line_of_mode(c, line, j, body.scale);
     }
-    const double factor = body.shape != NULL && j < vi_structure_free_modes(&c->model) ? body.mass[j] : 1.0;
-    *(i < most ? &line->displacement : &line->velocity) = factor;
+    vi_body_line_of_shape(c, line, body.shape[j]);
+    *factor = body.mass[j];
+    line->count = j < line->count ? line->count : 0; /* masses beyond those in use stand still */
     return true;
 }
 
@@ -237,15 +253,16 @@ static bool is_at_rest(const vi_structure *s, int k)
 }
 
 /* Is the observed displacement that of a stop? */
-static bool is_observed_on_stop(const vi_structure *s)
+static bool is_observed_on_stop(vi_body *c)
 {
-    const double displacement = vi_structure_at(s->model, s->model->observed, s->state->q);
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (s->model->at_observed[k] && is_at_rest(s, k)) {
+    const vi_structure s = vi_body_parts(c);
+    const double displacement = vi_structure_at(&c->model, c->model.observed, c->state.q);
+    for (int k = 0; k < c->model.contacts; ++k) {
+        if (c->model.at_observed[k] && is_at_rest(&s, k)) {
             return true;
         }
     }
-    return vi_structure_within(s, displacement) != displacement;
+    return vi_structure_within(&s, displacement) != displacement;
 }
 
 static bool row_of_force(const vi_structure *s, int k, vi_line *line)
@@ -271,9 +288,15 @@ static bool row_of_contact(vi_body *c, int k, size_t member, vi_line *line)
         line->velocity = used && s.state->status[k] != VI_CONTACT_HELD ? 1.0 : 0.0;
         return true;
     case offsetof(vi_contact, force): return !used || row_of_force(&s, k, line);
-    case offsetof(vi_contact, indicator): return false; /* FMI has none of an event indicator */
+    case offsetof(vi_contact, indicator): return false; /* an event indicator is no unknown in FMI */
     default: return member >= offsetof(vi_contact, mass); /* results of events stay */
     }
+}
+
+/* The slope of a mode's elastic energy, which does not follow the amplitude. */
+static double elastic_force(const vi_body *c, int j)
+{
+    return c->natural[j] * fabs(c->natural[j]) * c->state.q[j];
 }
 
 static bool row_of_energies(vi_body *c, size_t member, vi_line *line)
@@ -284,13 +307,13 @@ static bool row_of_energies(vi_body *c, size_t member, vi_line *line)
         line->velocity = 1.0;
     } else if (member == offsetof(vi_body, energy_potential)) {
         for (j = 0; j < vi_structure_free_modes(&c->model); ++j) {
-            line->own[j] = c->model.mode[j].stiffness * c->state.q[j];
+            line->own[j] = elastic_force(c, j);
         }
         vi_body_line_of_shape(c, line, line->own);
         line->displacement = 1.0;
     } else if (vi_body_is_element(member, offsetof(vi_body, modal_energy), sizeof c->modal_energy, &j)) {
         vi_body_line_of_mode(c, line, j, c->record_energies ? 1.0 : 0.0);
-        line->displacement = c->model.mode[j].stiffness * c->state.q[j];
+        line->displacement = elastic_force(c, j);
         line->velocity = c->state.p[j];
     } else {
         return false;
@@ -308,12 +331,11 @@ static bool is_constant(size_t member)
 
 static bool row_of_body(vi_body *c, size_t member, vi_line *line)
 {
-    const vi_structure s = vi_body_parts(c);
     int j;
     switch (member) {
     case offsetof(vi_body, displacement):
         vi_body_line_of_shape(c, line, c->model.observed);
-        line->displacement = is_observed_on_stop(&s) ? 0.0 : 1.0;
+        line->displacement = is_observed_on_stop(c) ? 0.0 : 1.0;
         return true;
     case offsetof(vi_body, velocity):
         vi_body_line_of_shape(c, line, c->model.observed);
@@ -344,7 +366,7 @@ static bool row(void *self, uint32_t reference, vi_line *line)
         const size_t within = variable->offset - contacts;
         return row_of_contact(c, (int)(within / sizeof(vi_contact)), within % sizeof(vi_contact), line);
     }
-    return row_of_body(c, variable->offset - form->place, line) || form->row(self, variable->offset, line);
+    return form->row(self, variable->offset, line) || row_of_body(c, variable->offset - form->place, line);
 }
 
 const vi_partial_derivatives vi_body_derivatives = {

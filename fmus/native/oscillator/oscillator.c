@@ -163,9 +163,12 @@ static bool column(void *self, size_t offset, vi_line *line)
 static bool row(void *self, size_t offset, vi_line *line)
 {
     const oscillator *o = self;
+    if (offset != offsetof(oscillator, relative_acceleration)) {
+        return false;
+    }
     vi_body_line_of_shape(&o->body, line, o->body.model.observed);
     line->load = 1.0;
-    return offset == offsetof(oscillator, relative_acceleration);
+    return true;
 }
 
 const vi_body_form vi_this_body = {

@@ -493,9 +493,10 @@ static bool column_of_sine(modal_structure *s, size_t within, vi_line *line)
     }
 }
 
-static bool column_of_signal(const modal_structure *s, int k, vi_line *line)
+static bool column_of_signal(modal_structure *s, int k, vi_line *line)
 {
-    if (s->body.signals_key == 0 || k >= s->body.signals.count) {
+    const vi_structure parts = vi_body_parts(&s->body);
+    if (parts.loads == NULL || k >= parts.loads->count) {
         return true; /* there is no such signal */
     }
     return line_of_load(s, s->signals.force[k], s->body.state.signal_value[k], s->signals.signal[k].of_base, line);
