@@ -57,7 +57,10 @@ def names_of(it: Integrated) -> tuple[list[str], list[str]]:
 
 
 def directional(
-    it: Integrated, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    it: Integrated,
+    unknowns: Sequence[str],
+    knowns: Sequence[str],
+    seed: Sequence[float] | NDArray[np.float64],
 ) -> NDArray[np.float64]:
     ends = [[it.references[name] for name in names] for names in (unknowns, knowns)]
     return np.array(it.fmu.getDirectionalDerivative(*ends, list(seed)))
@@ -68,14 +71,21 @@ def jacobian(it: Integrated, unknowns: Sequence[str], knowns: Sequence[str]) -> 
 
 
 def adjoint(
-    it: Integrated, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    it: Integrated,
+    unknowns: Sequence[str],
+    knowns: Sequence[str],
+    seed: Sequence[float] | NDArray[np.float64],
 ) -> NDArray[np.float64]:
     ends = [[it.references[name] for name in names] for names in (unknowns, knowns)]
     return np.array(it.fmu.getAdjointDerivative(*ends, list(seed), len(knowns)))
 
 
 def by_differences(
-    it: Integrated, unknowns: Sequence[str], knowns: Sequence[str], step: float, states: Sequence[float] = ()
+    it: Integrated,
+    unknowns: Sequence[str],
+    knowns: Sequence[str],
+    step: float,
+    states: Sequence[float] | NDArray[np.float64] = (),
 ) -> NDArray[np.float64]:
     """Return the Jacobian by central differences of values that are set and read by name; the states come first."""
     columns = []
@@ -253,10 +263,10 @@ def test_adjoint_derivatives_are_the_transposed_directional_ones(
     assert (np.abs(back - forward) <= 1e-13 * size_of(forward)).all()
     generator = np.random.default_rng(1)
     seed, other = generator.normal(size=len(knowns)), generator.normal(size=len(unknowns))
-    along = other @ directional(it, unknowns, knowns, seed)
-    assert along == pytest.approx(adjoint(it, unknowns, knowns, other) @ seed, rel=1e-10)
+    along = float(np.dot(other, directional(it, unknowns, knowns, seed)))
+    assert along == pytest.approx(float(np.dot(adjoint(it, unknowns, knowns, other), seed)), rel=1e-10)
     assert (
-        np.abs(directional(it, unknowns, knowns, seed) - forward @ seed).max()
+        np.abs(directional(it, unknowns, knowns, seed) - np.dot(forward, seed)).max()
         <= 1e-12 * np.abs(forward).max()
     )
 
