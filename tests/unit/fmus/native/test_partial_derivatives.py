@@ -104,7 +104,8 @@ def by_differences(
 def size_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sizes of terms: where a stop holds its point, terms of the size of their column cancel."""
     rows, columns = (np.abs(matrix).max(axis=axis, keepdims=True) for axis in (1, 0))
-    return np.maximum(rows, columns)
+    sizes: NDArray[np.float64] = np.maximum(rows, columns)
+    return sizes
 
 
 # ---- a chain, against 40 digits ----
