@@ -62,6 +62,29 @@ def test_a_flight_and_its_gradient_are_ours(tmp_path: Path, version: str) -> Non
     assert np.abs(np.array(gradient) - exact_flow(FLIGHT)).max() < 1e-5
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_its_jacobian_is_exact_forward_and_in_reverse(tmp_path: Path, version: str) -> None:
+    ca = pytest.importorskip("casadi")
+    path = export_fmu(
+        "oscillator", tmp_path / "o.fmu", fmi=version, starts={"mass": MASS, "stiffness": STIFFNESS}
+    )
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    dae = ca.DaeBuilder("body", str(tmp_path / "unpacked"))
+    dae.set_y(["acceleration"])
+    body = dae.create("body", ["x", "u"], ["ode", "y"])
+    at = [DISPLACED, 0.5], dae.start(dae.u())
+    over = body.factory("over", ["x", "u"], ["jac:ode:x", "jac:y:u"])(*at)
+    force = [name == "force" for name in dae.u()]
+    # to the last digit: CasADi's differences would be off by 1e-8
+    assert np.array_equal(np.array(over[0]), [[0.0, 1.0], [-STIFFNESS / MASS, 0.0]])
+    assert np.array(over[1]).ravel()[force] == pytest.approx([1.0 / MASS], rel=1e-15)
+    reverse = body.factory("reverse", ["x", "u", "adj:ode", "adj:y"], ["adj:x", "adj:u"])
+    states, inputs = (np.array(one).ravel() for one in reverse(*at, [1.0, 2.0], [3.0]))
+    assert np.array_equal(states, [-5.0 * STIFFNESS / MASS, 1.0])
+    assert inputs[force] == pytest.approx(5.0 / MASS)
+
+
 STEPPED = [*(tool for tool in TOOLS if tool.name == "FMPy"), CASADI]
 
 

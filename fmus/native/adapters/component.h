@@ -14,6 +14,7 @@
 
 #include "body/complaint.h"
 #include "body/step.h"
+#include "variation.h"
 
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
 
@@ -64,6 +65,19 @@ typedef struct {
     void (*go_on)(void *self);
 } vi_model_exchange;
 
+/* Partial derivatives at the present instant, for unknowns over knowns. The derivative of unknown i over known j is the
+ * product of row i, the carried change, and column j. */
+typedef struct {
+    /* Take new inputs into account, before any other function; NULL: there is nothing to do. */
+    void (*begin)(void *self);
+    /* Describe a known, or an unknown, in `line` (zeroed up to `own`). False: this variable is none. */
+    bool (*column)(void *self, uint32_t value_reference, vi_line *line);
+    bool (*row)(void *self, uint32_t value_reference, vi_line *line);
+    /* Carry a change from knowns to unknowns, and by the transposed equations back; NULL: both are the same. */
+    void (*carry)(void *self, vi_variation *change);
+    void (*carry_back)(void *self, vi_variation *change);
+} vi_partial_derivatives;
+
 /* A component. All functions work on the flat struct `self` and allocate nothing; `message` is empty on entry. */
 typedef struct {
     /* Fill `self` (zeroed up to its caches) with the default values. */
@@ -105,6 +119,9 @@ typedef struct {
 
     /* NULL for a component of co-simulation only. */
     const vi_model_exchange *exchange;
+
+    /* NULL for a component that gives no derivatives. */
+    const vi_partial_derivatives *partial;
 } vi_component;
 
 /* The only component in this shared library. */

@@ -9,6 +9,7 @@
 #include <limits.h>
 #include <string.h>
 
+#include "derivatives.h"
 #include "instance.h"
 #include "model_exchange.h"
 #include "saved_states.h"
@@ -307,7 +308,15 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown,
                                         const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
-    return unavailable(c, "fmi2GetDirectionalDerivative");
+    const vi_derivative_call call = {.unknowns = vUnknown_ref,
+                                     .unknown_count = nUnknown,
+                                     .knowns = vKnown_ref,
+                                     .known_count = nKnown,
+                                     .seed = dvKnown,
+                                     .seed_count = nKnown,
+                                     .sensitivity = dvUnknown,
+                                     .sensitivity_count = nUnknown};
+    return (fmi2Status)vi_instance_derive(c, "fmi2GetDirectionalDerivative", &call);
 }
 
 /* ---- saved states ---- */

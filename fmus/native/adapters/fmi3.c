@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "derivatives.h"
 #include "instance.h"
 #include "model_exchange.h"
 #include "saved_states.h"
@@ -343,6 +344,22 @@ GETTER(Int64, fmi3Int64, VI_INT64, read_int64)
 SETTER(Int64, fmi3Int64, VI_INT64, write_int64)
 GETTER(Boolean, fmi3Boolean, VI_BOOLEAN, read_boolean)
 SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
+
+/* ---- partial derivatives ---- */
+
+#define DERIVATIVE(NAME, ADJOINT)                                                                                    \
+    fmi3Status fmi3Get##NAME##Derivative(fmi3Instance instance, const fmi3ValueReference unknowns[],                 \
+                                         size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns,        \
+                                         const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[],          \
+                                         size_t nSensitivity)                                                        \
+    {                                                                                                                \
+        const vi_derivative_call call = {unknowns, knowns, nUnknowns,    nKnowns, seed,                              \
+                                         nSeed,    sensitivity, nSensitivity, ADJOINT};                              \
+        return (fmi3Status)vi_instance_derive(instance, "fmi3Get" #NAME "Derivative", &call);                        \
+    }
+
+DERIVATIVE(Directional, false)
+DERIVATIVE(Adjoint, true)
 
 /* ---- saved states ---- */
 

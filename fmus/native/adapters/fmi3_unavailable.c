@@ -63,7 +63,7 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
 }
 
-/* ---- scheduled execution, clocks, directional derivatives ---- */
+/* ---- scheduled execution, clocks, output derivatives ---- */
 
 #define UNAVAILABLE(NAME, ...)               \
     fmi3Status NAME(__VA_ARGS__)             \
@@ -76,12 +76,6 @@ UNAVAILABLE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3Valu
 UNAVAILABLE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent,
             size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
             size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-UNAVAILABLE(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[],
-            size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
-            size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
-UNAVAILABLE(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-            fmi3Float64 sensitivity[], size_t nSensitivity)
 UNAVAILABLE(fmi3EnterConfigurationMode, fmi3Instance instance)
 UNAVAILABLE(fmi3ExitConfigurationMode, fmi3Instance instance)
 UNAVAILABLE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],

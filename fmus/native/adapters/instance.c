@@ -268,7 +268,7 @@ vi_step_result vi_instance_step(vi_instance *instance, const vi_step_request *re
 
 /* ---- variables ---- */
 
-static const vi_variable *find(vi_instance *instance, const char *function, int type, uint32_t reference)
+const vi_variable *vi_instance_find(vi_instance *instance, const char *function, int type, uint32_t reference)
 {
     size_t own = reference;
     if (instance->references != NULL) {
@@ -310,7 +310,7 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
     vi_instance_refresh(instance);
     size_t first = 0;
     for (size_t i = 0; i < n; ++i) {
-        const vi_variable *variable = find(instance, function, type, references[i]);
+        const vi_variable *variable = vi_instance_find(instance, function, type, references[i]);
         if (variable == NULL) {
             return false;
         }
@@ -364,7 +364,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
     bool changes_states = false;
     size_t first = 0;
     for (size_t i = 0; i < n; ++i) {
-        const vi_variable *variable = find(instance, function, type, references[i]);
+        const vi_variable *variable = vi_instance_find(instance, function, type, references[i]);
         if (variable == NULL || !may_set(instance, function, variable, references[i])) {
             return false;
         }

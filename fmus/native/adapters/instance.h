@@ -96,6 +96,9 @@ bool vi_instance_expect_steps(vi_instance *instance, const char *function);
 /* Recompute the outputs if a variable was set since; in initialization mode the motion starts anew. */
 void vi_instance_refresh(vi_instance *instance);
 
+/* Return the variable of a type with this value reference of the description; NULL, after logging: there is none. */
+const vi_variable *vi_instance_find(vi_instance *instance, const char *function, int type, uint32_t reference);
+
 /* Get and set `n` variables of one type. `convert` moves the `count` elements of one variable between the struct and
  * the importer's array, from element `first` on. Return false after logging. */
 typedef void (*vi_convert)(void *field, void *values, size_t first, size_t count);

@@ -145,13 +145,13 @@ static void find_residual(beam *b, char *message)
 }
 
 /* Force on mode j, N kg^(-1/2). equations.md 6.5 */
-static double amplitude_on_mode(const beam *b, int j)
+static double force_on_mode(const beam *b, int j, double amplitude)
 {
     switch (b->forcing_kind) {
-    case FORCED_AT_POINT: return b->forcing_amplitude * b->forced_shape[j];
-    case FORCED_EVENLY: return b->forcing_amplitude * b->length * b->participation[j] / (b->root_mass * b->root_mass);
-    case FORCED_AS_MODE: return j + 1 == b->forcing_mode ? b->forcing_amplitude / b->root_mass : 0.0;
-    default: return -b->forcing_amplitude * b->participation[j];
+    case FORCED_AT_POINT: return amplitude * b->forced_shape[j];
+    case FORCED_EVENLY: return amplitude * b->length * b->participation[j] / (b->root_mass * b->root_mass);
+    case FORCED_AS_MODE: return j + 1 == b->forcing_mode ? amplitude / b->root_mass : 0.0;
+    default: return -amplitude * b->participation[j];
     }
 }
 
@@ -159,7 +159,7 @@ static double amplitude_on_mode(const beam *b, int j)
 static double modal_amplitude(const beam *b, int j)
 {
     const double share = b->body.forcing_angular_frequency == 0.0 ? cos(b->body.forcing_phase) : 1.0;
-    return share * amplitude_on_mode(b, j);
+    return share * force_on_mode(b, j, b->forcing_amplitude);
 }
 
 static double mode_damping(const beam *b, int j, double natural)
@@ -364,6 +364,64 @@ static void show_states(void *self, vi_exchange_body *body)
     body->refused = b->depends_on_amplitude ? "amplitude" : NULL;
 }
 
+/* ---- partial derivatives ---- */
+
+static bool column(void *self, size_t offset, vi_line *line)
+{
+    const beam *b = self;
+    const double cosine = vi_body_cosine_of_forcing(&b->body);
+    switch (offset) {
+    case offsetof(beam, force):
+        vi_body_line_of_shape(&b->body, line, b->forced_shape);
+        line->load = 1.0;
+        return true;
+    case offsetof(beam, force_rate): return true;
+    case offsetof(beam, body.base_acceleration):
+        vi_body_line_of_shape(&b->body, line, b->participation);
+        line->load = -1.0;
+        return true;
+    case offsetof(beam, forcing_amplitude):
+        for (int j = 0; j < b->modes; ++j) {
+            line->own[j] = force_on_mode(b, j, 1.0);
+        }
+        vi_body_line_of_shape(&b->body, line, line->own);
+        line->load = cosine;
+        line->base = b->forcing_kind == FORCED_BY_BASE ? cosine : 0.0;
+        return true;
+    default: return false;
+    }
+}
+
+static bool row_of_sensor(const beam *b, size_t within, vi_line *line)
+{
+    vi_body_line_of_shape(&b->body, line, b->sensor[within / sizeof(beam_sensor)].shape);
+    switch (within % sizeof(beam_sensor)) {
+    case offsetof(beam_sensor, displacement): line->displacement = 1.0; return true;
+    case offsetof(beam_sensor, velocity): line->velocity = 1.0; return true;
+    case offsetof(beam_sensor, acceleration): line->load = line->base = 1.0; return true;
+    default: return false;
+    }
+}
+
+static bool row(void *self, size_t offset, vi_line *line)
+{
+    const beam *b = self;
+    int j;
+    if (offset - offsetof(beam, sensor) < sizeof b->sensor) {
+        return row_of_sensor(b, offset - offsetof(beam, sensor), line);
+    }
+    if (vi_body_is_element(offset, offsetof(beam, modal_displacement), sizeof b->modal_displacement, &j)) {
+        line->displacement = 1.0;
+    } else if (vi_body_is_element(offset, offsetof(beam, modal_velocity), sizeof b->modal_velocity, &j)) {
+        line->velocity = 1.0;
+    } else if (vi_body_is_element(offset, offsetof(beam, modal_acceleration), sizeof b->modal_acceleration, &j)) {
+        line->load = 1.0;
+    } else {
+        return false;
+    }
+    return vi_body_line_of_mode(&b->body, line, j, 1.0 / b->root_mass);
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(beam, body),
     .restitution = BEAM_CONTACT_APPLIED_RESTITUTION_1,
@@ -382,4 +440,6 @@ const vi_body_form vi_this_body = {
     .base_forcing = base_forcing,
     .update_outputs = update_outputs,
     .show_states = show_states,
+    .column = column,
+    .row = row,
 };

@@ -10,6 +10,7 @@
 #include "body/modal/structure/moved_stops.h"
 #include "body/modal/structure/unbounded.h"
 #include "body_check.h"
+#include "body_derivatives.h"
 #include "body_exchange.h"
 
 static const vi_body_form *const form = &vi_this_body;
@@ -192,8 +193,7 @@ static double present_time(const void *self)
     return vi_clock_time(&c->model.clock, c->state.now);
 }
 
-/* cos of the force's present phase, or of forcing_phase for a constant force. */
-static double cosine_of_forcing(const vi_body *c)
+double vi_body_cosine_of_forcing(const vi_body *c)
 {
     const double w = c->model.clock.angular_frequency;
     return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
@@ -204,7 +204,7 @@ static double base_acceleration(const vi_body *c, double amplitude)
 {
     const double since = vi_clock_elapsed(&c->model.clock, c->state.input_since, c->state.now);
     const double input = c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
-    return amplitude == 0.0 ? input : input + amplitude * cosine_of_forcing(c);
+    return amplitude == 0.0 ? input : input + amplitude * vi_body_cosine_of_forcing(c);
 }
 
 static void update_energies(vi_body *c)
@@ -444,4 +444,5 @@ const vi_component vi_this_component = {
     .attach = attach,
     .close = close_resources,
     .exchange = &vi_body_exchange,
+    .partial = &vi_body_derivatives,
 };

@@ -89,6 +89,10 @@ typedef struct {
     void (*update_outputs)(void *self, double base_acceleration);
     /* Describe its states in the model description. */
     void (*show_states)(void *self, vi_exchange_body *body);
+    /* Partial derivatives over a known, or of an unknown, of the component's own, at this offset in `self`; `line` is
+     * zeroed. False: it is none. The base's acceleration is a known of the component for its loads alone. */
+    bool (*column)(void *self, size_t offset, vi_line *line);
+    bool (*row)(void *self, size_t offset, vi_line *line);
 } vi_body_form;
 
 /* The body of the only component in this shared library. */
@@ -104,6 +108,16 @@ void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Number of ports in use: up to the last port with a law. */
 int vi_body_ports(const vi_body *c);
+
+/* cos of the force's present phase, or of forcing_phase for a constant force. */
+double vi_body_cosine_of_forcing(const vi_body *c);
+
+/* A line over the modes in use: the displacement of a point of this shape, or of mode j times `shape` (result: true). */
+void vi_body_line_of_shape(const vi_body *c, vi_line *line, const double shape[]);
+bool vi_body_line_of_mode(const vi_body *c, vi_line *line, int j, double shape);
+
+/* Is there an element of the array of doubles at `place` at this offset? Then *index is its index. */
+bool vi_body_is_element(size_t offset, size_t place, size_t size, int *index);
 
 /* Give the engine the inputs that were set, and a tuned forcing if the body can go on with it. */
 void vi_body_refresh_inputs(void *self);

@@ -230,6 +230,69 @@ static void show_states(void *self, vi_exchange_body *body)
     body->refused = modes_of(c) < c->masses ? "modes" : NULL;
 }
 
+/* ---- partial derivatives ---- */
+
+/* The line of a mass; of none beyond the masses in use. */
+static void line_of_mass(const chain *c, int i, vi_line *line)
+{
+    vi_body_line_of_shape(&c->body, line, c->shape[i]);
+    line->count = i < c->masses ? line->count : 0;
+}
+
+/* The line of an acceleration of the base: its forces on the modes. */
+static void line_of_base(const chain *c, double factor, vi_line *line)
+{
+    double load[VI_MODES];
+    for (int i = 0; i < c->masses; ++i) {
+        load[i] = -c->parameter.mass[i];
+    }
+    project(c, load, line->own);
+    vi_body_line_of_shape(&c->body, line, line->own);
+    line->load = factor;
+    line->base = factor;
+}
+
+static bool column(void *self, size_t offset, vi_line *line)
+{
+    const chain *c = self;
+    const double cosine = vi_body_cosine_of_forcing(&c->body);
+    int i;
+    if (vi_body_is_element(offset, offsetof(chain, force), sizeof c->force, &i)) {
+        line_of_mass(c, i, line);
+        line->load = 1.0;
+    } else if (vi_body_is_element(offset, offsetof(chain, forcing_amplitude), sizeof c->forcing_amplitude, &i)) {
+        line_of_mass(c, i, line);
+        line->load = cosine;
+    } else if (offset == offsetof(chain, body.base_acceleration)) {
+        line_of_base(c, 1.0, line);
+    } else if (offset == offsetof(chain, forcing_base_acceleration)) {
+        line_of_base(c, cosine, line);
+    } else {
+        return vi_body_is_element(offset, offsetof(chain, force_rate), sizeof c->force_rate, &i);
+    }
+    return true;
+}
+
+static bool row(void *self, size_t offset, vi_line *line)
+{
+    const chain *c = self;
+    int i;
+    if (vi_body_is_element(offset, offsetof(chain, displacement), sizeof c->displacement, &i)) {
+        line->displacement = 1.0;
+    } else if (vi_body_is_element(offset, offsetof(chain, velocity), sizeof c->velocity, &i)) {
+        line->velocity = 1.0;
+    } else if (vi_body_is_element(offset, offsetof(chain, acceleration), sizeof c->acceleration, &i)) {
+        line->load = 1.0;
+        line->base = i < c->masses ? 1.0 : 0.0;
+    } else if (vi_body_is_element(offset, offsetof(chain, relative_acceleration), sizeof c->relative_acceleration, &i)) {
+        line->load = 1.0;
+    } else {
+        return false;
+    }
+    line_of_mass(c, i, line);
+    return true;
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(chain, body),
     .restitution = CHAIN_CONTACT_APPLIED_RESTITUTION_1,
@@ -246,4 +309,6 @@ const vi_body_form vi_this_body = {
     .base_forcing = base_forcing,
     .update_outputs = update_outputs,
     .show_states = show_states,
+    .column = column,
+    .row = row,
 };

@@ -65,10 +65,76 @@ static bool set_time(void *self, double time)
 
 static const vi_model_exchange exchange = {.set_time = set_time};
 
+/* ---- partial derivatives: displacement and velocity of the body count as those of one mode ---- */
+
+static bool column(void *self, uint32_t reference, vi_line *line)
+{
+    const size_t offset = vi_this_description.variables[reference].offset;
+    (void)self;
+    line->own[0] = 1.0;
+    line->shape = line->own;
+    line->count = 1;
+    line->displacement = offset == offsetof(impact_stop, displacement) ? 1.0 : 0.0;
+    line->velocity = offset == offsetof(impact_stop, velocity) ? 1.0 : 0.0;
+    return offset == offsetof(impact_stop, displacement) || offset == offsetof(impact_stop, velocity);
+}
+
+/* Set the row of an answer: its slopes over penetration and rate. */
+static bool set_row(const impact_stop *stop, double over_penetration, double over_rate, vi_line *line)
+{
+    line->own[0] = vi_contact_direction(stop->side);
+    line->shape = line->own;
+    line->count = 1;
+    line->displacement = over_penetration;
+    line->velocity = over_rate;
+    return true;
+}
+
+/* The slopes of the slopes of a power law, K n (n - 1) d^(n - 2) (1 + damping d') and damping K n d^(n - 1). A linear law
+ * has none, and nor has a law without force. */
+static bool row_of_slope(const impact_stop *stop, bool of_stiffness, vi_line *line)
+{
+    const double rate = vi_contact_direction(stop->side) * stop->velocity, depth = penetration_of(stop, rate);
+    const vi_press press = vi_law_press(vi_law_of(stop->law.law), &stop->law);
+    if (press.kind != VI_PRESS_POWER || !(stop->applied.force > 0.0)) {
+        return true;
+    }
+    const double mixed = press.damping * press.exponent * press.stiffness * pow(depth, press.exponent - 1.0);
+    return of_stiffness ? set_row(stop, stop->applied.stiffness * (press.exponent - 1.0) / depth, mixed, line)
+                        : set_row(stop, mixed, 0.0, line);
+}
+
+/* Restitution falls as speed^(-1/4) above the yield velocity. */
+static bool row_of_restitution(const impact_stop *stop, vi_line *line)
+{
+    const double speed = fabs(stop->velocity);
+    const bool falls = stop->law.yield_velocity > 0.0 && speed > stop->law.yield_velocity
+                       && !vi_contact_law_yields(stop->law.law);
+    const double slope = falls ? -0.25 * stop->applied_restitution / speed : 0.0;
+    const double sign = stop->velocity < 0.0 ? -1.0 : 1.0;
+    return set_row(stop, 0.0, slope * sign * vi_contact_direction(stop->side), line);
+}
+
+static bool row(void *self, uint32_t reference, vi_line *line)
+{
+    const impact_stop *stop = self;
+    switch (vi_this_description.variables[reference].offset) {
+    case offsetof(impact_stop, applied_restitution): return row_of_restitution(stop, line);
+    case offsetof(impact_stop, applied.force):
+        return set_row(stop, stop->applied.stiffness, stop->applied.damping, line);
+    case offsetof(impact_stop, applied.stiffness): return row_of_slope(stop, true, line);
+    case offsetof(impact_stop, applied.damping): return row_of_slope(stop, false, line);
+    default: return false;
+    }
+}
+
+static const vi_partial_derivatives partial = {.begin = update_outputs, .column = column, .row = row};
+
 const vi_component vi_this_component = {
     .defaults = defaults,
     .initialize = initialize,
     .update_outputs = update_outputs,
     .step = vi_plain_step,
     .exchange = &exchange,
+    .partial = &partial,
 };

@@ -140,6 +140,37 @@ static void show_states(void *self, vi_exchange_body *body)
     body->refused = vi_amplitude_acts(&o->amplitude) ? "amplitude" : NULL;
 }
 
+/* ---- partial derivatives ---- */
+
+static bool column(void *self, size_t offset, vi_line *line)
+{
+    const oscillator *o = self;
+    const double root = sqrt(o->mass), cosine = vi_body_cosine_of_forcing(&o->body);
+    vi_body_line_of_mode(&o->body, line, 0, 1.0);
+    switch (offset) {
+    case offsetof(oscillator, force): line->load = 1.0 / root; return true;
+    case offsetof(oscillator, force_rate): return true;
+    case offsetof(oscillator, body.base_acceleration): line->load = -root; return true;
+    case offsetof(oscillator, forcing_amplitude): line->load = cosine / root; return true;
+    case offsetof(oscillator, forcing_base_acceleration):
+        line->load = -root * cosine;
+        line->base = cosine;
+        return true;
+    default: return false;
+    }
+}
+
+static bool row(void *self, size_t offset, vi_line *line)
+{
+    const oscillator *o = self;
+    if (offset != offsetof(oscillator, relative_acceleration)) {
+        return false;
+    }
+    vi_body_line_of_shape(&o->body, line, o->body.model.observed);
+    line->load = 1.0;
+    return true;
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(oscillator, body),
     .restitution = OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1,
@@ -156,4 +187,6 @@ const vi_body_form vi_this_body = {
     .base_forcing = base_forcing,
     .update_outputs = update_outputs,
     .show_states = show_states,
+    .column = column,
+    .row = row,
 };

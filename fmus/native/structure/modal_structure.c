@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "body/modal/stop_motion.h"
+#include "structure_derivatives.h"
 #include "structure_file.h"
 #include "structure_variables.h"
 
@@ -488,4 +489,6 @@ const vi_body_form vi_this_body = {
     .make_signals = make_signals,
     .update_outputs = update_outputs,
     .show_states = show_states,
+    .column = vi_structure_column,
+    .row = vi_structure_row,
 };

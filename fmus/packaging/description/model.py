@@ -130,6 +130,9 @@ class ComponentDescription:
     ----------
     token : str
         Identifier of exactly this list of variables; instantiationToken of FMI 3.0, guid of FMI 2.0.
+    partial_derivatives : bool
+        Whether it gives derivatives of its outputs and state derivatives. A component that can be integrated does, also
+        in an export that describes no states.
     growing : bool
         Whether modes may have negative stiffness or damping.
     repeats : mapping of str to int
@@ -159,6 +162,7 @@ class ComponentDescription:
     start_of_export: Mapping[str, Number]
     core: tuple[str, ...] = ()
     degree: int = 1
+    partial_derivatives: bool = False
 
     @property
     def has_given_modes(self) -> bool:
@@ -196,15 +200,21 @@ class ComponentDescription:
     def direct_knowns(self, variable: Variable, version: int) -> tuple[str, ...] | None:
         """Return the names of the inputs and states that an output or a derivative depends on directly.
 
-        None: maybe on all. A derivative with more than `MOST_KNOWNS` names has none.
+        In FMI 3.0 tunable parameters of a body are knowns, too: they act where inputs do. None: maybe on all. A
+        derivative with more than `MOST_KNOWNS` names has none.
         """
         inputs, shown = self.direct_inputs(variable, version), self._states_by_field()
         if variable.dependencies is None:
             return None
         if variable.variability != "continuous":
             return inputs
-        knowns = (shown[variable.field],) if variable.field in shown else (*inputs, *self.states())
+        tunable = self._tunable_parameters() if inputs and version == 3 and self.partial_derivatives else ()
+        knowns = (shown[variable.field],) if variable.field in shown else (*inputs, *tunable, *self.states())
         return None if variable.derivative and len(knowns) > MOST_KNOWNS else knowns
+
+    def _tunable_parameters(self) -> tuple[str, ...]:
+        tunable = (v for v in self.variables if (v.causality, v.variability) == ("parameter", "tunable"))
+        return tuple(v.name for v in tunable if v.type == "Float64" and not v.dimensions)
 
     def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the inputs in an FMI version that an output depends on directly."""

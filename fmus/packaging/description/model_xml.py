@@ -112,6 +112,7 @@ def _capabilities(component: ComponentDescription, version: int, kind: str) -> d
         "canBeInstantiatedOnlyOncePerProcess": "false",
         f"canGetAndSetFMU{state}": "true",
         f"canSerializeFMU{state}": "true",
+        **_derivative_capabilities(component, version),
     }
     if kind == "ModelExchange":
         without = "completedIntegratorStepNotNeeded" if version == 2 else "needsCompletedIntegratorStep"
@@ -126,6 +127,14 @@ def _capabilities(component: ComponentDescription, version: int, kind: str) -> d
         "canReturnEarlyAfterIntermediateUpdate": "false",
         "hasEventMode": events,
     }
+
+
+def _derivative_capabilities(component: ComponentDescription, version: int) -> dict[str, str]:
+    if not component.partial_derivatives:
+        return {}
+    if version == 2:
+        return {"providesDirectionalDerivative": "true"}
+    return {"providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true"}
 
 
 def unit_definitions(units: Iterable[UnitDefinition]) -> Element:

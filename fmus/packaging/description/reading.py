@@ -103,6 +103,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDes
         description=head["description"],
         event_mode=head.get("event_mode", False),
         model_exchange=head.get("model_exchange", False),
+        partial_derivatives=head.get("model_exchange", False),
         growing=head.get("growing", False),
         degree=head.get("degree", 1),
         token=f"{{{token}}}",

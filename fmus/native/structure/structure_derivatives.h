@@ -1,0 +1,13 @@
+/* Partial derivatives of a Structure: its own knowns and unknowns, as `column` and `row` of vi_body_form have them. */
+#ifndef VIBROIMPACT_STRUCTURE_DERIVATIVES_H
+#define VIBROIMPACT_STRUCTURE_DERIVATIVES_H
+
+#include "variation.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+bool vi_structure_column(void *self, size_t offset, vi_line *line);
+bool vi_structure_row(void *self, size_t offset, vi_line *line);
+
+#endif
