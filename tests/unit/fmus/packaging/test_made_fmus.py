@@ -27,6 +27,7 @@ WRITERS = {
     "BouncingBall": fmu_factory.bouncing_ball,
     "Buffer": fmu_factory.buffer,
     "Clocked": lambda folder, _: fmu_factory.clocked(folder),
+    "Exchanged": fmu_factory.exchanged,
     "Faulty": fmu_factory.faulty,
     "Feedthrough": fmu_factory.feedthrough,
     "Gain": lambda folder, _: fmu_factory.gain(folder),
