@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Self
-from urllib.parse import unquote, urlsplit
+from urllib.parse import SplitResult, parse_qs, unquote, urlsplit
 from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.packaging.zip_members import (
@@ -21,14 +21,23 @@ from vibroimpact.fmus.packaging.zip_members import (
     place_of,
     zip_in,
 )
-from vibroimpact.fmus.safe_xml import refuse_large, root_of
+from vibroimpact.fmus.safe_xml import refuse_large
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import SSD_FILE
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.xml_names import ssp_root
 
 _BLOCK = 1 << 20
 _INSIDE = "Pack the file into its resources folder."
 _DRIVE = re.compile(r"[A-Za-z]:")
+_PROXY = "proxyfmu"
+_THIS_MACHINE = ("localhost", "127.0.0.1")
+
+
+def undeclared_prefixes(file: str, prefixes: tuple[str, ...]) -> list[str]:
+    """Return the remark on prefixes that a file does not declare; empty without such prefixes."""
+    named = ", ".join(prefixes)
+    return [f"{file}: prefixes without a declaration have the namespaces of SSP: {named}"] if named else []
 
 
 class SspArchive:
@@ -39,6 +48,8 @@ class SspArchive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.remarks: list[str] = []
+        """Faults of its files that other tools accept, and what was taken."""
         with ExitStack() as stack:
             file = stack.enter_context(opened(path, "SSP"))
             self._zip = stack.enter_context(zip_in(path, file, "SSP"))
@@ -55,13 +66,15 @@ class SspArchive:
         self._stack.close()
 
     def xml(self, member: str) -> Element:
-        """Return the root of an XML member.
+        """Return the root of an XML member; undeclared prefixes of SSP are added to the remarks.
 
         ComponentFileError: the member is too large, damaged, not well-formed, or declares entities.
         """
         info = self._members[member]
         refuse_large(info.file_size, f"{self.path}: {member}")
-        return root_of(self._content(info), f"{self.path}: {member}", namespaces=True)
+        root, undeclared = ssp_root(self._content(info), f"{self.path}: {member}")
+        self.remarks += undeclared_prefixes(member, undeclared)
+        return root
 
     def member(self, uri: str, where: str) -> str:
         """Return the member that a `source` names; RefusalError if it is outside the archive, or missing."""
@@ -71,6 +84,8 @@ class SspArchive:
             raise RefusalError(where, "a file of the archive", quoted(uri), _INSIDE) from None
         name = unquote(parts.path)
         path = PurePosixPath(name)
+        if parts.scheme == _PROXY:
+            return self._proxied(uri, parts, where)
         leaves = parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts or "\\" in name
         if leaves or _DRIVE.match(name):
             raise RefusalError(where, "a file of the archive", quoted(uri), _INSIDE)
@@ -82,6 +97,16 @@ class SspArchive:
             hint = "Pack it, or correct the source in SystemStructure.ssd."
             raise RefusalError(where, "a file of the archive", f"{quoted(uri)}, which it does not have", hint)
         return member
+
+    def _proxied(self, uri: str, parts: SplitResult, where: str) -> str:
+        """Return the member behind libcosim's address of an FMU in another process of this machine."""
+        files = parse_qs(parts.query, max_num_fields=10).get("file", [])
+        host = parts.netloc.rpartition("@")[2].partition(":")[0]
+        if host not in _THIS_MACHINE or len(files) != 1 or urlsplit(files[0]).scheme == _PROXY:
+            hint = "FMUs on other machines are not available in this version: pack the file."
+            raise RefusalError(where, f"{_PROXY}://localhost?file=NAME", quoted(uri), hint)
+        self.remarks.append(f"{where}: {quoted(uri)} is taken from the archive, as any other FMU")
+        return self.member(files[0], where)
 
     def copy(self, member: str, target: Path) -> None:
         """Write a member to a file; a damaged member raises ComponentFileError, an unwritable file OSError."""

@@ -185,11 +185,11 @@ class _Reader:
         source = element.get("source")
         if source is not None:
             member = self.archive.member(source, f"{where}: parameter binding")
-            return read_parameter_set(self.archive.xml(member), member)
+            return read_parameter_set(self.archive.xml(member), member, None, self.archive.remarks)
         inline = element.find(f"{tag('ssd:ParameterValues')}/{tag('ssv:ParameterSet')}")
         if inline is None:
             raise RefusalError(f"{where}: parameter binding", "a source or values", "neither")
-        return read_parameter_set(inline, f"{where}: parameter set", self.units)
+        return read_parameter_set(inline, f"{where}: parameter set", self.units, self.archive.remarks)
 
     def _mapping(self, element: Element, where: str) -> tuple[Mapped, ...]:
         where = f"{where}: parameter mapping"

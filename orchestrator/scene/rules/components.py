@@ -35,6 +35,8 @@ MOST_STEPS_PER_RUN = 10**10
 #: Inputs of a body's contact port through which another component answers its contact.
 ANSWERS = ("applied_restitution", "applied_force")
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
+_NUMBERED = {"integer", "enumeration"}
+"""Kinds that feed one another: an item of an enumeration is passed on as its number."""
 
 
 def general_problems(draft: GeneralDraft) -> list[Problem]:
@@ -128,7 +130,7 @@ def _type_problems(
     connection: ConnectionTable, place: int, source: VariableFacts, target: VariableFacts
 ) -> Iterator[Problem]:
     where = key_path(("connection", place))
-    if source.kind != target.kind:
+    if source.kind != target.kind and not {source.kind, target.kind} <= _NUMBERED:
         got = f"{source.type} ({connection.source}) to {target.type} ({connection.target})"
         yield Problem(where, "two variables of one type", got)
     elif source.kind != "real" and connection.gain != 1.0:

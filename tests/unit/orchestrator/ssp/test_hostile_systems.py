@@ -259,11 +259,6 @@ def test_values_out_of_an_archive_that_are_no_values_are_refused(tmp_path: Path,
     path = archive(tmp_path / "s.ssp", ssd(part()), {"resources/body.fmu": body})
     for name, content, expected in (
         ("no.ssv", "x", "expected well-formed XML"),
-        (
-            "twice.ssv",
-            ssv({"body.mass": real(1.0)}).replace("<ssv:Parameters>", "<ssv:Parameters>" + TWICE),
-            "one value of each parameter",
-        ),
         ("../absent.ssv", None, "expected a file of the archive"),
     ):
         given = tmp_path / name
@@ -282,9 +277,6 @@ def test_values_out_of_an_archive_that_are_no_values_are_refused(tmp_path: Path,
         assert done.returncode == 2
         assert expected in done.stderr
     assert not (tmp_path / "s.toml").exists()
-
-
-TWICE = f'<ssv:Parameter name="body.mass">{real(2.0)}</ssv:Parameter>'
 
 
 def test_a_parameter_of_thousands_of_values_is_one_short_line() -> None:
