@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -29,13 +30,14 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A component's input, fed by gain times another component's output, through components that are gains."""
+    """A component's input: gain times another component's output plus offset, through components that are gains."""
 
     source: Node
     target: Node
     gain: float = 1.0
     gain_unit: str | None = None
     through: tuple[Path, ...] = ()
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,23 +223,23 @@ class FlatSystem:
         return self._gain(edges[::-1], gains)
 
     def _gain(self, edges: list[_Edge], gains: Mapping[Path, float]) -> Link:
-        """Return the edges from an output to an input as one gain."""
-        gain, noted, source = 1.0, None, self._unit(edges[0].source)
+        """Return the edges from an output to an input as one gain and offset."""
+        gain, offset, noted, source = 1.0, 0.0, None, self._unit(edges[0].source)
         unit, passed = source, []
         for edge in edges:
             connection, after = edge.connection, self._unit(edge.target)
-            where, noted = connection.where, connection.gain_unit or noted
-            if connection.offset:
-                hint = "Offsets are not available in this version: add it in a component."
-                raise RefusalError(where, "a transformation without offset", f"{connection.offset:g}", hint)
+            noted = connection.gain_unit or noted
             changes = connection.suppressed or connection.gain_unit is not None
-            gain *= 1.0 if changes else _conversion(unit, after, connection)
-            gain *= 1.0 if connection.factor is None else connection.factor
+            # the number is converted first, and then transformed
+            by = 1.0 if changes else _conversion(unit, after, connection)
+            by *= 1.0 if connection.factor is None else connection.factor
+            gain, offset = gain * by, offset * by + connection.offset
             unit = after or unit
             through = self._all.get(edge.target.element) if edge is not edges[-1] else None
             if through is not None:
                 own = float(self._values[edge.target.element].get("gain", 1.0))
-                gain *= gains.get(edge.target.element, own)
+                own = gains.get(edge.target.element, own)
+                gain, offset = gain * own, offset * own
                 passed.append(edge.target.element)
                 unit, noted = self._unit(Node(edge.target.element, "output")), through.gain_unit
         target = self._unit(edges[-1].target)
@@ -246,7 +248,10 @@ class FlatSystem:
             if noted is None:
                 got = f"{source.name} to {target.name}"
                 raise RefusalError(edges[-1].connection.where, "units whose ratio is one of SI symbols", got)
-        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed))
+        if not (math.isfinite(gain) and math.isfinite(offset)):
+            got = f"{gain:g} and {offset:g}"
+            raise RefusalError(edges[-1].connection.where, "a finite gain and offset", got)
+        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed), offset)
 
 
 def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:
@@ -285,7 +290,8 @@ def _conversion(before: Unit | None, after: Unit | None, connection: Connection)
         hint = "Give it a LinearTransformation, and suppressUnitConversion."
         raise RefusalError(connection.where, "units of one kind, or a gain", got, hint)
     if before.offset != after.offset:
-        raise RefusalError(connection.where, "units with one zero", got, "Offsets are not available.")
+        hint = "Units of two zeros are not connected in this version."
+        raise RefusalError(connection.where, "units with one zero", got, hint)
     return before.factor / after.factor
 
 

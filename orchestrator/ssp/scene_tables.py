@@ -93,6 +93,8 @@ def _connection(link: Link, names: Mapping[Path, str]) -> dict[str, Any]:
     table: dict[str, Any] = {"from": _reference(link.source, names), "to": _reference(link.target, names)}
     if link.gain != 1.0 or link.gain_unit is not None:
         table["gain"] = link.gain
+    if link.offset:
+        table["offset"] = link.offset
     return table if link.gain_unit is None else {**table, "gain_unit": link.gain_unit}
 
 

@@ -105,10 +105,6 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
         ssd(TWO, connection("a.displacement", "b.force")),
         "Give it a LinearTransformation",
     ),
-    "an offset": (
-        ssd(TWO, connection("a.displacement", "b.force", factor(1.0, 2.0))),
-        "add it in a component",
-    ),
     "a number that is none": (
         ssd(TWO, connection("a.displacement", "b.force", factor(float("nan")))),
         "finite",
