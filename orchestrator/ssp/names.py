@@ -25,6 +25,9 @@ OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
+PACKAGE_TYPE = "application/x-ssp-package"
+DEFINITION_TYPE = "application/x-ssp-definition"
+"""Types of a component that is an archive, and of one that is another description in the same archive."""
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 

@@ -66,7 +66,7 @@ def fmu_row(path: Path, folder: Path) -> Row:
     mine = tried("ours", path)
     row = Row(str(path.relative_to(folder)), maker_of(mine.get("tool", "")), ", ".join(mine.get("kinds", [])))
     row.passes = not mine.get("refused", True)
-    row.refusal = mine.get("refusal", "")
+    row.refusal = mine.get("refusal", "").replace(str(path.resolve()), path.name)
     if row.refusal:
         return row
     peer = tried("fmpy", path)
@@ -88,7 +88,7 @@ def write(page: Path, table: str, lines: Sequence[str]) -> None:
 
 def _system(named: tuple[str, Path]) -> tuple[str, str]:
     name, path = named
-    return name, str(tried("system", path).get("refusal", ""))
+    return name, str(tried("system", path).get("refusal", "")).replace(str(path.resolve()), path.name)
 
 
 def _shown(rows: Iterator[Row]) -> Iterator[Row]:

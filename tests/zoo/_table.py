@@ -25,7 +25,10 @@ UNNAMED = "no tool named"
 CAUSES = {
     "FMI 1.0": r"got FMI 1\.0",
     "no library for this machine": r"a binary for this machine",
-    "model exchange alone": r"model exchange",
+    "no components": r"a system with components",
+    "a file that the system lacks": r"which it does not have|expected a file of the archive",
+    "a start time other than 0": r"startTime",
+    "model exchange alone": r"model exchange|ModelExchange",
     "needs a library or module that is not here": r"cannot open shared object|No module|No such file|JVM",
     "description beyond repair": r"modelDescription\.xml|its description",
     "no FMU inside": r"expected a safe FMU|not a zip|expected an FMU",
@@ -105,8 +108,8 @@ def difference(
             off = np.where(np.isnan(mine) & np.isnan(theirs[place]), 0.0, np.abs(theirs[place] - mine))
             nearest = np.where(same & ~(off >= nearest), off, nearest)
         compared = nearest[~np.isposinf(nearest)]
-        largest = np.nanmax(np.abs(theirs), initial=0.0)
-        relative = float(np.max(compared, initial=0.0)) / max(float(largest), 1e-300)
+        largest = float(np.nanmax(np.abs(np.concatenate([theirs, mine])), initial=0.0))
+        relative = float(np.max(compared, initial=0.0)) / max(largest, 1e-300)
         if not len(compared) or math.isnan(relative):
             relative = np.inf
         if relative > worst:

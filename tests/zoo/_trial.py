@@ -53,11 +53,14 @@ def ours(path: Path) -> Facts:
     """Return time and outputs of our run of a scene of one component."""
     plan = _plan(path)
     variables = [f"x.{name}" for name in plan["outputs"]]
+    component: Facts = {"fmu": str(path)}
+    if plan["tolerance"]:
+        component["tolerance"] = plan["tolerance"]
     record: Facts = {"recorded_time": plan["end"]}
     if variables:
         record |= {"variables": variables, "rate": 1.0 / plan["step"]}
     tables = {
-        "component": {"x": {"fmu": str(path)}},
+        "component": {"x": component},
         "record": record,
         "execution": {"macro_step": plan["step"], "guard": False},
     }
@@ -67,7 +70,7 @@ def ours(path: Path) -> Facts:
     if not variables:
         return {"time": np.array([]), "values": {}}
     samples = data.vibroimpact.samples()
-    values = {name: samples[dataset_name(f"x.{name}")].values for name in plan["outputs"]}
+    values = {name: samples[f"x_{dataset_name(name)}"].values for name in plan["outputs"]}
     return {"time": samples.time.values, "values": values}
 
 
@@ -119,11 +122,13 @@ def _root(path: Path) -> ElementTree.Element:
 
 def _plan(path: Path) -> Facts:
     """Return end, step, tolerance and recorded outputs of an experiment that begins at 0; locals without outputs."""
-    experiment = _root(path).find("DefaultExperiment")
+    root = _root(path)
+    experiment = root.find("DefaultExperiment")
     given = {} if experiment is None else {name: float(text) for name, text in experiment.attrib.items()}
     length = given.get("stopTime", 1.0) - given.get("startTime", 0.0)
     length = length if 0.0 < length < math.inf else 1.0
-    step = given.get("stepSize") or length / STEPS
+    fixed = next((float(e.get("fixedInternalStepSize", 0)) for e in root if e.tag == "CoSimulation"), 0.0)
+    step = fixed or given.get("stepSize") or length / STEPS
     count = max(1, min(MOST_STEPS, round(length / step)))
     variables = component_facts(path).variables.items()
     numbers = [(name, one.causality) for name, one in variables if one.scalar and one.kind in NUMERIC_KINDS]

@@ -90,6 +90,7 @@ def test_a_difference_is_relative_and_an_event_has_two_right_values() -> None:
     mine = {"x": np.array([0.0, 7.0, -10.0])}
     assert difference(time, mine, twice, {"x": np.array([0.0, 3.0, 7.0, -10.0])}) == (0.0, "")
     assert difference(time, mine, twice, {"x": np.array([0.0, 3.0, 8.0, -10.0])}) == (0.1, "x")
+    assert difference(time, mine, time, {"x": np.zeros(3)}) == (1.0, "x")
     assert difference(time, mine, time, {"x": np.array([0.0, np.nan, -10.0])})[0] == np.inf
 
 

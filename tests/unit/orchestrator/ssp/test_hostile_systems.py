@@ -79,7 +79,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
     "values of another kind": (ssd(part(bindings=bound("resources/body.fmu"))), "expected well-formed XML"),
     "a system in a file": (
         ssd(part(more='type="application/x-ssp-package"')),
-        "put its elements into the system",
+        "resources/body.fmu: expected a safe SSP, got: no SystemStructure.ssd",
     ),
     "model exchange": (ssd(part(more='implementation="ModelExchange"')), "Export the FMU for co-simulation"),
     "signal dictionaries": (
