@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, Start
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import GIVING, TAKING
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
-from vibroimpact.orchestrator.ssp.structure import Component, Connection, System
+from vibroimpact.orchestrator.ssp.structure import Component, Connection, DictionaryReference, System
 from vibroimpact.orchestrator.ssp.values import Parameter, converted, start_value
 
 _DOT = re.compile(r"\.")
@@ -65,6 +65,7 @@ class FlatSystem:
         """Parameters with one value from a connection and another from a set: the connection's is taken."""
         self._facts = facts
         self._systems = dict(_systems(system, ()))
+        self._references = dict(_references(self._systems))
         self._edges: dict[Node, _Edge] = {}
         self._leaving: dict[Node, list[_Edge]] = {}
         for path, inner in self._systems.items():
@@ -163,7 +164,7 @@ class FlatSystem:
                 yield from self._meant(edge.target.element, edge.target.name, given, seen | {node}, True)
         # a dot may be part of an element's name
         for dot in (match.start() for match in _DOT.finditer(name)):
-            if name[:dot] in system.elements:
+            if isinstance(system.elements.get(name[:dot]), Component | System):
                 yield from self._meant((*path, name[:dot]), name[dot + 1 :], parameter, seen, through)
 
     def _inner_first(self) -> list[tuple[Path, System]]:
@@ -192,12 +193,32 @@ class FlatSystem:
 
     def _end(self, path: Path, place: tuple[str | None, str], connection: Connection) -> tuple[Node, str]:
         element = path if place[0] is None else (*path, place[0])
+        if element in self._references:
+            return self._signal(path, self._references[element], place[1], connection)
         owner = self._all.get(element) or self._systems.get(element)
         if owner is None:
             raise RefusalError(connection.where, "an element of its system", quoted(place[0]))
         if place[1] not in owner.connectors:
             raise RefusalError(connection.where, f"a connector of {owner.name[:60]}", quoted(place[1]))
         return Node(element, place[1]), owner.connectors[place[1]].kind
+
+    def _signal(
+        self, path: Path, reference: DictionaryReference, name: str, connection: Connection
+    ) -> tuple[Node, str]:
+        """Return a signal of the nearest dictionary of this name, in the system itself or around it."""
+        if name not in reference.connectors:
+            raise RefusalError(connection.where, f"a connector of {reference.name[:60]}", quoted(name))
+        for depth in range(len(path), -1, -1):
+            signals = self._systems[path[:depth]].dictionaries.get(reference.dictionary)
+            if signals is None:
+                continue
+            if name not in signals:
+                expected = f"an entry of the signal dictionary {quoted(reference.dictionary)}"
+                raise RefusalError(connection.where, expected, quoted(name))
+            return Node(_dictionary(path[:depth], reference.dictionary), name), reference.connectors[
+                name
+            ].kind
+        raise RefusalError(connection.where, "a signal dictionary", quoted(reference.dictionary))
 
     def _unit(self, node: Node) -> Unit | None:
         """Return the unit of a connector; an FMU's own unit comes first."""
@@ -259,15 +280,30 @@ def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Compo
     for name, element in system.elements.items():
         if isinstance(element, Component):
             yield (*path, name), element
-        else:
+        elif isinstance(element, System):
             yield from components_of(element, (*path, name))
 
 
 def _systems(system: System, path: Path) -> Iterator[tuple[Path, System]]:
     yield path, system
+    for name, signals in system.dictionaries.items():
+        # a system of signals alone passes them on
+        yield _dictionary(path, name), System(name, signals)
     for name, element in system.elements.items():
         if isinstance(element, System):
             yield from _systems(element, (*path, name))
+
+
+def _references(systems: Mapping[Path, System]) -> Iterator[tuple[Path, DictionaryReference]]:
+    for path, system in systems.items():
+        for name, element in system.elements.items():
+            if isinstance(element, DictionaryReference):
+                yield (*path, name), element
+
+
+def _dictionary(path: Path, name: str) -> Path:
+    """Return the path of a signal dictionary; no element has an empty name."""
+    return (*path, "", name)
 
 
 def _giving(node: Node, path: Path) -> frozenset[str]:

@@ -12,7 +12,9 @@ from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.names import (
     ANNOTATION,
+    BOTH,
     DEFINITION_TYPE,
+    DICTIONARY_TYPE,
     FMU_TYPE,
     MAPPING_TYPE,
     OSP_ANNOTATION,
@@ -22,7 +24,14 @@ from vibroimpact.orchestrator.ssp.names import (
     tag,
 )
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
-from vibroimpact.orchestrator.ssp.structure import Component, Connection, Connector, Structure, System
+from vibroimpact.orchestrator.ssp.structure import (
+    Component,
+    Connection,
+    Connector,
+    DictionaryReference,
+    Structure,
+    System,
+)
 from vibroimpact.orchestrator.ssp.values import (
     Binding,
     Mapped,
@@ -81,8 +90,6 @@ class _Reader:
         where = f"{SSD_FILE}: {element.get('name', '')[:60]}"
         if depth > DEEPEST:
             raise RefusalError(where, f"at most {DEEPEST} systems in each other", "more")
-        if element.find(tag("ssd:SignalDictionaries")) is not None:
-            raise RefusalError(where, "a system without signal dictionaries", "one with them", _DICTIONARY)
         inner = element.find(tag("ssd:Elements"))
         return System(
             element.get("name", ""),
@@ -93,12 +100,44 @@ class _Reader:
                 self._connection(connection, depth)
                 for connection in element.iterfind(f"{tag('ssd:Connections')}/{tag('ssd:Connection')}")
             ),
+            self._dictionaries(element, where),
         )
+
+    def _dictionaries(self, element: Element, where: str) -> dict[str, dict[str, Connector]]:
+        found: dict[str, dict[str, Connector]] = {}
+        for one in element.iterfind(f"{tag('ssd:SignalDictionaries')}/{tag('ssd:SignalDictionary')}"):
+            name = one.get("name", "")
+            if not name or name in found:
+                raise RefusalError(where, "a name of its own for each signal dictionary", quoted(name))
+            found[name] = self._signals(one, f"{where}: signal dictionary {name[:60]}")
+        return found
+
+    def _signals(self, element: Element, where: str) -> dict[str, Connector]:
+        """Return the entries of a signal dictionary, from its file or inline."""
+        kind, source = element.get("type", DICTIONARY_TYPE), element.get("source")
+        if kind != DICTIONARY_TYPE:
+            raise RefusalError(f"{where}: type", DICTIONARY_TYPE, quoted(kind))
+        root = element.find(tag("ssb:SignalDictionary"))
+        if source:
+            where = self._member(source, where)
+            root = self.archive.xml(where)
+        if root is None:
+            raise RefusalError(where, "a source or entries", "neither")
+        expect(root, "ssb:SignalDictionary", where)
+        refuse_version(root, where)
+        known = replace(self, units={**self.units, **read_units(root, where)})
+        signals: dict[str, Connector] = {}
+        for entry in root.iterfind(tag("ssb:DictionaryEntry")):
+            name = entry.get("name", "")
+            if not name or name in signals:
+                raise RefusalError(where, "a name of its own for each entry", quoted(name))
+            signals[name] = Connector(name, BOTH, known._unit(entry))
+        return signals
 
     def _elements(
         self, elements: tuple[Element, ...], where: str, depth: int
-    ) -> Mapping[str, Component | System]:
-        found: dict[str, Component | System] = {}
+    ) -> Mapping[str, Component | System | DictionaryReference]:
+        found: dict[str, Component | System | DictionaryReference] = {}
         for element in elements:
             name = element.get("name", "")
             if not name or name in found:
@@ -108,10 +147,12 @@ class _Reader:
                 found[name] = (self._inner if inner else self._component)(element, name, depth)
             elif element.tag == tag("ssd:System"):
                 found[name] = self.system(element, depth + 1)
+            elif element.tag == tag("ssd:SignalDictionaryReference"):
+                signals = self._connectors(element, f"{SSD_FILE}: {name[:60]}")
+                found[name] = DictionaryReference(name, element.get("dictionary", ""), signals)
             else:
                 kind = element.tag.rpartition("}")[2][:60]
-                hint = _DICTIONARY if kind == "SignalDictionaryReference" else ""
-                raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind, hint)
+                raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind)
         return found
 
     def _inner(self, element: Element, name: str, depth: int) -> System:
@@ -250,9 +291,6 @@ class _Reader:
         if element.get("sourceBase", "SSD") != "SSD":
             hint = "Copy the file out of the FMU into the archive."
             raise RefusalError(f"{where}: sourceBase", "SSD", quoted(element.get("sourceBase")), hint)
-
-
-_DICTIONARY = "Signal dictionaries are not available in this version: connect its signals one by one."
 
 
 def _described(archive: SspArchive, file: str) -> tuple[Element, Element]:

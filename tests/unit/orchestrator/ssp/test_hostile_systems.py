@@ -58,6 +58,10 @@ def noted(text: str, more: str = "") -> str:
 
 
 TWO = part("a") + part("b")
+BUS = (
+    '<ssd:SignalDictionaryReference name="bus" dictionary="d"><ssd:Connectors>'
+    '<ssd:Connector name="x" kind="inout"/></ssd:Connectors></ssd:SignalDictionaryReference>'
+)
 MAP_ENTRY = '<ssc:MapEntry source="1" target="2"/>'
 DESCRIPTIONS: dict[str, tuple[str, str]] = {
     "no component": (ssd(""), "expected a system with components"),
@@ -82,9 +86,9 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
         "resources/body.fmu: expected a safe SSP, got: no SystemStructure.ssd",
     ),
     "model exchange": (ssd(part(more='implementation="ModelExchange"')), "Export the FMU for co-simulation"),
-    "signal dictionaries": (
-        ssd(part() + '<ssd:SignalDictionaryReference name="bus" dictionary="d"/>'),
-        "connect its signals one by one",
+    "a dictionary that is not there": (
+        ssd(part() + BUS, connection("bus.x", "body.force")),
+        'expected a signal dictionary, got "d"',
     ),
     "too deep": (ssd(nested(60)), "at most 50 systems in each other"),
     "a crowd": (ssd("".join(part(f"n{k}") for k in range(1001))), "at most 1000 components"),
