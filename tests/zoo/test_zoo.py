@@ -18,7 +18,7 @@ from zoo._guarded import HANGS, tried
 from zoo._table import OTHER, Row, beside_reference, cause_of, difference, table_of_systems, table_of_tools
 
 AT_LOADING = {"crash": "abort();", "hang": "for (;;) {}"}
-"""What the library of an FMU does when it is loaded, in C."""
+"""Statements in C that the library of an FMU executes when it is loaded."""
 OLD = '<fmiModelDescription fmiVersion="1.0" modelName="old" modelIdentifier="old" generationTool="Dymola 6.0"/>'
 
 
