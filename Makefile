@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage exchange conformance wheel oldest audit sanitize bench peers lint docs clean
+.PHONY: help demo fast test soak coverage exchange conformance wheel oldest audit sanitize bench peers zoo lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -59,6 +59,9 @@ coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 480 records whether the i
 exchange: $(VENV)/exchange.stamp $(VENV)/fmus.stamp ## try the exports in every tool that is here, compile them for other machines
 	PYTHONPATH=tests $(BIN)/python -m exchange
 	$(BIN)/python -m pytest -q tests/unit/fmus/packaging/test_cross.py -rs
+
+zoo: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run every FMU and system of a folder beside FMPy, into docs/exchange.md; ZOO= the folder
+	PYTHONPATH=tests $(BIN)/python -m zoo $(ZOO)
 
 conformance: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run NI's tests of its client on the virtual rig; NI_TESTS= a checkout of ni/nidaqmx-python
 	PYTHONPATH=tests $(BIN)/python -m conformance $(NI_TESTS)

@@ -70,7 +70,7 @@ class _Connection:
     def __init__(self, importer: Importer, connection: ConnectionSpec, displacement: str) -> None:
         source = importer.components[connection.source[0]]
         target = importer.components[connection.target[0]]
-        self._gain = connection.gain
+        self._gain, self._offset = connection.gain, connection.offset
         self._source = source.group("Float64", [connection.source[1]])
         self._applied = target.group("Float64", [connection.target[1]])
         self._displacement = target.group("Float64", [displacement])
@@ -83,16 +83,19 @@ class _Connection:
         self.residual = 0.0
 
     def before(self, time: float) -> None:
-        self._force_start = self._gain * float(self._source.get()[0])
+        self._force_start = self._force()
         self._displacement_start = float(self._displacement.get()[0])
 
     def after(self, time: float, end: float) -> None:
         applied = float(self._applied.get()[0])
         if self._slope is not None:
             applied += 0.5 * (end - time) * float(self._slope.get()[0])
-        connected = 0.5 * (self._force_start + self._gain * float(self._source.get()[0]))
+        connected = 0.5 * (self._force_start + self._force())
         moved = float(self._displacement.get()[0]) - self._displacement_start
         self.residual += (applied - connected) * moved
+
+    def _force(self) -> float:
+        return self._gain * float(self._source.get()[0]) + self._offset
 
 
 class _Contact:

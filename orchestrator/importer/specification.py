@@ -67,22 +67,25 @@ def _shipped(name: str, place: Path, *rest: Any) -> ComponentSpec:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionSpec:
-    """An output that feeds an input, times a gain.
+    """An output that feeds an input, times a gain, plus an offset.
 
     Attributes
     ----------
     source, target : tuple of str
         Component and variable.
     gain : float
-        The input is gain * output.
+        The input is gain * output + offset.
     gain_unit : str or None
         Unit of the gain; None: dimensionless.
+    offset : float
+        Added after the gain, in the unit of the input.
     """
 
     source: tuple[str, str]
     target: tuple[str, str]
     gain: float = 1.0
     gain_unit: str | None = None
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

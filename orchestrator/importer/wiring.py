@@ -47,6 +47,21 @@ class Scaling:
         return 0
 
 
+@dataclass(frozen=True, slots=True)
+class Shifting:
+    """Real numbers times their gains, plus their offsets, into another buffer; as a call it returns status 0."""
+
+    read: NDArray[Any]
+    gains: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    write: NDArray[Any]
+
+    def __call__(self) -> int:
+        """Write the shifted values; returns status 0."""
+        np.copyto(self.write, self.read * self.gains + self.offsets, casting="unsafe")
+        return 0
+
+
 class Transfer:
     """Connections from one component to another that are moved by one read and one write.
 
@@ -61,8 +76,9 @@ class Transfer:
         inputs = [target.variables[c.target[1]].valueReference for c in connections]
         self.read: VariableGroup = source.group(self.kind, [c.source[1] for c in connections])
         self._gains = np.array([c.gain for c in connections])
+        self._offsets = np.array([c.offset for c in connections])
         same_type = DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
-        shared = same_type and bool(np.all(self._gains == 1.0))
+        shared = same_type and bool(np.all((self._gains == 1.0) & (self._offsets == 0.0)))
         written = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
         self.write = target.clocked(written, [c.target[1] for c in connections])
         self.convert: Callable[[], int] | None = None if shared else self._converter()
@@ -70,7 +86,9 @@ class Transfer:
         self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
-        read, write, gains = self.read.values, self.write.values, self._gains
+        read, write, gains, offsets = self.read.values, self.write.values, self._gains, self._offsets
+        if np.any(offsets):
+            return Shifting(read, gains, offsets, write)
         if self.kind == "Float64" and write.dtype == np.float64:
             return Scaling(read, gains, write)
 

@@ -78,7 +78,7 @@ class ComponentTable(SceneTable):
 
 
 class ConnectionTable(SceneTable):
-    """`[[connection]]`: an input that is gain times an output, at every exchange."""
+    """`[[connection]]`: an input that is gain times an output, plus an offset, at every exchange."""
 
     source: Annotated[_Text, replace(_VARIABLE_RULE, doc="an output, a local variable or a parameter")] = (
         Field(alias="from")
@@ -99,6 +99,9 @@ class ConnectionTable(SceneTable):
             doc='the unit of the gain, a product of SI units: `"N/m"`, `"N.s/m"`, `"kg.m2/s2"`, `"1"`',
         ),
     ] = None
+    offset: Annotated[
+        Finite, Rule(doc="added after the gain, in the unit of the input; only between real numbers")
+    ] = 0.0
 
 
 class EventTable(SceneTable):

@@ -143,7 +143,11 @@ def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict
 
 def _connection(table: ConnectionTable) -> ConnectionSpec:
     return ConnectionSpec(
-        component_variable(table.source), component_variable(table.target), table.gain, table.gain_unit
+        component_variable(table.source),
+        component_variable(table.target),
+        table.gain,
+        table.gain_unit,
+        table.offset,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, Start
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import GIVING, TAKING
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
-from vibroimpact.orchestrator.ssp.structure import Component, Connection, System
+from vibroimpact.orchestrator.ssp.structure import Component, Connection, DictionaryReference, System
 from vibroimpact.orchestrator.ssp.values import Parameter, converted, start_value
 
 _DOT = re.compile(r"\.")
@@ -29,13 +30,14 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A component's input, fed by gain times another component's output, through components that are gains."""
+    """A component's input: gain times another component's output plus offset, through components that are gains."""
 
     source: Node
     target: Node
     gain: float = 1.0
     gain_unit: str | None = None
     through: tuple[Path, ...] = ()
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class FlatSystem:
         """Parameters with one value from a connection and another from a set: the connection's is taken."""
         self._facts = facts
         self._systems = dict(_systems(system, ()))
+        self._references = dict(_references(self._systems))
         self._edges: dict[Node, _Edge] = {}
         self._leaving: dict[Node, list[_Edge]] = {}
         for path, inner in self._systems.items():
@@ -161,7 +164,7 @@ class FlatSystem:
                 yield from self._meant(edge.target.element, edge.target.name, given, seen | {node}, True)
         # a dot may be part of an element's name
         for dot in (match.start() for match in _DOT.finditer(name)):
-            if name[:dot] in system.elements:
+            if isinstance(system.elements.get(name[:dot]), Component | System):
                 yield from self._meant((*path, name[:dot]), name[dot + 1 :], parameter, seen, through)
 
     def _inner_first(self) -> list[tuple[Path, System]]:
@@ -190,12 +193,32 @@ class FlatSystem:
 
     def _end(self, path: Path, place: tuple[str | None, str], connection: Connection) -> tuple[Node, str]:
         element = path if place[0] is None else (*path, place[0])
+        if element in self._references:
+            return self._signal(path, self._references[element], place[1], connection)
         owner = self._all.get(element) or self._systems.get(element)
         if owner is None:
             raise RefusalError(connection.where, "an element of its system", quoted(place[0]))
         if place[1] not in owner.connectors:
             raise RefusalError(connection.where, f"a connector of {owner.name[:60]}", quoted(place[1]))
         return Node(element, place[1]), owner.connectors[place[1]].kind
+
+    def _signal(
+        self, path: Path, reference: DictionaryReference, name: str, connection: Connection
+    ) -> tuple[Node, str]:
+        """Return a signal of the nearest dictionary of this name, in the system itself or around it."""
+        if name not in reference.connectors:
+            raise RefusalError(connection.where, f"a connector of {reference.name[:60]}", quoted(name))
+        for depth in range(len(path), -1, -1):
+            signals = self._systems[path[:depth]].dictionaries.get(reference.dictionary)
+            if signals is None:
+                continue
+            if name not in signals:
+                expected = f"an entry of the signal dictionary {quoted(reference.dictionary)}"
+                raise RefusalError(connection.where, expected, quoted(name))
+            return Node(_dictionary(path[:depth], reference.dictionary), name), reference.connectors[
+                name
+            ].kind
+        raise RefusalError(connection.where, "a signal dictionary", quoted(reference.dictionary))
 
     def _unit(self, node: Node) -> Unit | None:
         """Return the unit of a connector; an FMU's own unit comes first."""
@@ -221,23 +244,23 @@ class FlatSystem:
         return self._gain(edges[::-1], gains)
 
     def _gain(self, edges: list[_Edge], gains: Mapping[Path, float]) -> Link:
-        """Return the edges from an output to an input as one gain."""
-        gain, noted, source = 1.0, None, self._unit(edges[0].source)
+        """Return the edges from an output to an input as one gain and offset."""
+        gain, offset, noted, source = 1.0, 0.0, None, self._unit(edges[0].source)
         unit, passed = source, []
         for edge in edges:
             connection, after = edge.connection, self._unit(edge.target)
-            where, noted = connection.where, connection.gain_unit or noted
-            if connection.offset:
-                hint = "Offsets are not available in this version: add it in a component."
-                raise RefusalError(where, "a transformation without offset", f"{connection.offset:g}", hint)
+            noted = connection.gain_unit or noted
             changes = connection.suppressed or connection.gain_unit is not None
-            gain *= 1.0 if changes else _conversion(unit, after, connection)
-            gain *= 1.0 if connection.factor is None else connection.factor
+            # the number is converted first, and then transformed
+            by = 1.0 if changes else _conversion(unit, after, connection)
+            by *= 1.0 if connection.factor is None else connection.factor
+            gain, offset = gain * by, offset * by + connection.offset
             unit = after or unit
             through = self._all.get(edge.target.element) if edge is not edges[-1] else None
             if through is not None:
                 own = float(self._values[edge.target.element].get("gain", 1.0))
-                gain *= gains.get(edge.target.element, own)
+                own = gains.get(edge.target.element, own)
+                gain, offset = gain * own, offset * own
                 passed.append(edge.target.element)
                 unit, noted = self._unit(Node(edge.target.element, "output")), through.gain_unit
         target = self._unit(edges[-1].target)
@@ -246,7 +269,10 @@ class FlatSystem:
             if noted is None:
                 got = f"{source.name} to {target.name}"
                 raise RefusalError(edges[-1].connection.where, "units whose ratio is one of SI symbols", got)
-        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed))
+        if not (math.isfinite(gain) and math.isfinite(offset)):
+            got = f"{gain:g} and {offset:g}"
+            raise RefusalError(edges[-1].connection.where, "a finite gain and offset", got)
+        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed), offset)
 
 
 def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:
@@ -254,15 +280,30 @@ def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Compo
     for name, element in system.elements.items():
         if isinstance(element, Component):
             yield (*path, name), element
-        else:
+        elif isinstance(element, System):
             yield from components_of(element, (*path, name))
 
 
 def _systems(system: System, path: Path) -> Iterator[tuple[Path, System]]:
     yield path, system
+    for name, signals in system.dictionaries.items():
+        # a system of signals alone passes them on
+        yield _dictionary(path, name), System(name, signals)
     for name, element in system.elements.items():
         if isinstance(element, System):
             yield from _systems(element, (*path, name))
+
+
+def _references(systems: Mapping[Path, System]) -> Iterator[tuple[Path, DictionaryReference]]:
+    for path, system in systems.items():
+        for name, element in system.elements.items():
+            if isinstance(element, DictionaryReference):
+                yield (*path, name), element
+
+
+def _dictionary(path: Path, name: str) -> Path:
+    """Return the path of a signal dictionary; no element has an empty name."""
+    return (*path, "", name)
 
 
 def _giving(node: Node, path: Path) -> frozenset[str]:
@@ -285,7 +326,8 @@ def _conversion(before: Unit | None, after: Unit | None, connection: Connection)
         hint = "Give it a LinearTransformation, and suppressUnitConversion."
         raise RefusalError(connection.where, "units of one kind, or a gain", got, hint)
     if before.offset != after.offset:
-        raise RefusalError(connection.where, "units with one zero", got, "Offsets are not available.")
+        hint = "Units of two zeros are not connected in this version."
+        raise RefusalError(connection.where, "units with one zero", got, hint)
     return before.factor / after.factor
 
 

@@ -36,9 +36,10 @@ from vibroimpact.orchestrator.ssp.reading import read_structure
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
+from vibroimpact.orchestrator.ssp.values import named_few
 
 MOST_COMPONENTS = 1000
-#: Most parameters without a variable that one note names, and most parameters with two values that notes name.
+#: Most parameters with two values that notes name.
 MOST_NAMED = 5
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
@@ -215,16 +216,20 @@ def _read(
     if parameters:
         with_sets(tables, flat, facts, read_sets(archive, parameters))
     overruled = dict.fromkeys(flat.overruled)
-    return tables, [*notes, *_left_out(flat.ignored), *list(overruled)[:MOST_NAMED], *more]
+    return tables, [
+        *dict.fromkeys(archive.remarks),
+        *notes,
+        *_left_out(flat.ignored),
+        *list(overruled)[:MOST_NAMED],
+        *more,
+    ]
 
 
 def _left_out(ignored: Sequence[str]) -> Iterator[str]:
     """Yield the note on parameters without a variable, of the system and of outside sets."""
-    names = list(dict.fromkeys(ignored))
+    names = dict.fromkeys(ignored)
     if names:
-        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-        named = ", ".join(name[:100] for name in names[:MOST_NAMED])
-        yield f"parameters of no variable, which were left out: {named}{more}"
+        yield f"parameters of no variable, which were left out: {named_few(names)}"
 
 
 def _fmus(

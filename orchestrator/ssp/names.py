@@ -25,13 +25,19 @@ OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
+PACKAGE_TYPE = "application/x-ssp-package"
+DEFINITION_TYPE = "application/x-ssp-definition"
+"""Types of a component that is an archive, and of one that is another description in the same archive."""
+DICTIONARY_TYPE = "application/x-ssp-signal-dictionary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
 #: Kinds of connectors of an element that give a value, and kinds that take a value. For a system, seen from inside,
 #: the roles are exchanged.
-GIVING = frozenset({"output", "calculatedParameter", "local", "constant"})
-TAKING = frozenset({"input", "parameter", "structuralParameter"})
+GIVING = frozenset({"output", "calculatedParameter", "local", "constant", "inout"})
+TAKING = frozenset({"input", "parameter", "structuralParameter", "inout"})
+#: Kind of an entry of a signal dictionary, which takes a value and gives it.
+BOTH = "inout"
 
 #: The component of this package that stands for the gain of a connection.
 GAIN = "Gain"

@@ -10,13 +10,14 @@ from typing import Any
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.messages import Argument, message
 from vibroimpact.fmus.packaging.zip_members import opened
-from vibroimpact.fmus.safe_xml import LARGEST_XML, root_of
+from vibroimpact.fmus.safe_xml import LARGEST_XML
 from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.component_numbers import gain_place
-from vibroimpact.orchestrator.ssp.archive import SspArchive
+from vibroimpact.orchestrator.ssp.archive import SspArchive, undeclared_prefixes
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path
 from vibroimpact.orchestrator.ssp.scene_tables import names_of
 from vibroimpact.orchestrator.ssp.values import Parameter, read_parameter_set
+from vibroimpact.orchestrator.ssp.xml_names import ssp_root
 
 Sets = Mapping[str, tuple[Parameter, ...]]
 _PARAMETERS = Argument("parameters")
@@ -32,10 +33,11 @@ def read_sets(archive: SspArchive, files: Sequence[FilePath]) -> dict[str, tuple
                 content = stream.read(LARGEST_XML + 1)
             if len(content) > LARGEST_XML:
                 raise ComponentFileError(f"{file}: expected XML of at most {LARGEST_XML} bytes, got more.")
-            root = root_of(content, name, namespaces=True)
+            root, undeclared = ssp_root(content, name)
+            archive.remarks += undeclared_prefixes(name, undeclared)
         else:
             root = archive.xml(archive.member(file.as_posix(), message(_PARAMETERS)))
-        sets[name] = read_parameter_set(root, name)
+        sets[name] = read_parameter_set(root, name, None, archive.remarks)
     return sets
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.units import Unit
@@ -11,15 +12,26 @@ from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.names import (
     ANNOTATION,
+    BOTH,
+    DEFINITION_TYPE,
+    DICTIONARY_TYPE,
     FMU_TYPE,
     MAPPING_TYPE,
     OSP_ANNOTATION,
+    PACKAGE_TYPE,
     PARAMETER_SET_TYPE,
     SSD_FILE,
     tag,
 )
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
-from vibroimpact.orchestrator.ssp.structure import Component, Connection, Connector, Structure, System
+from vibroimpact.orchestrator.ssp.structure import (
+    Component,
+    Connection,
+    Connector,
+    DictionaryReference,
+    Structure,
+    System,
+)
 from vibroimpact.orchestrator.ssp.values import (
     Binding,
     Mapped,
@@ -39,6 +51,8 @@ from vibroimpact.orchestrator.ssp.values import (
 _TABLES = tag("vibroimpact:Tables")
 DEEPEST = 50
 """Most levels of nested systems."""
+MOST_INNER = 200
+"""Most components that are systems: an archive may name one of its descriptions many times."""
 
 
 def read_structure(archive: SspArchive) -> Structure:
@@ -47,13 +61,8 @@ def read_structure(archive: SspArchive) -> Structure:
     RefusalError: it is no SSD, or has parts that this package cannot run. ComponentFileError: an XML file is damaged
     or unsafe.
     """
-    root = archive.xml(SSD_FILE)
-    expect(root, "ssd:SystemStructureDescription", SSD_FILE)
-    refuse_version(root, SSD_FILE)
-    top = root.find(tag("ssd:System"))
-    if top is None:
-        raise RefusalError(SSD_FILE, "one <System>", "none")
-    reader = _Reader(archive, read_units(root, SSD_FILE), _notes(root))
+    root, top = _described(archive, SSD_FILE)
+    reader = _Reader(archive, read_units(root, SSD_FILE), _notes(root), iter(range(MOST_INNER)))
     experiment = root.find(tag("ssd:DefaultExperiment"))
     return Structure(
         name=root.get("name", ""),
@@ -70,13 +79,17 @@ class _Reader:
     archive: SspArchive
     units: Units
     notes: Mapping[tuple[str, str], Element]
+    left: Iterator[int]
+    """One item for each further component that may be a system."""
+    prefix: str = ""
+    """Archive in the outermost archive, with a slash."""
+    folder: str = ""
+    """Folder of the description in its archive."""
 
     def system(self, element: Element, depth: int) -> System:
         where = f"{SSD_FILE}: {element.get('name', '')[:60]}"
         if depth > DEEPEST:
             raise RefusalError(where, f"at most {DEEPEST} systems in each other", "more")
-        if element.find(tag("ssd:SignalDictionaries")) is not None:
-            raise RefusalError(where, "a system without signal dictionaries", "one with them", _DICTIONARY)
         inner = element.find(tag("ssd:Elements"))
         return System(
             element.get("name", ""),
@@ -87,37 +100,105 @@ class _Reader:
                 self._connection(connection, depth)
                 for connection in element.iterfind(f"{tag('ssd:Connections')}/{tag('ssd:Connection')}")
             ),
+            self._dictionaries(element, where),
         )
+
+    def _dictionaries(self, element: Element, where: str) -> dict[str, dict[str, Connector]]:
+        found: dict[str, dict[str, Connector]] = {}
+        for one in element.iterfind(f"{tag('ssd:SignalDictionaries')}/{tag('ssd:SignalDictionary')}"):
+            name = one.get("name", "")
+            if not name or name in found:
+                raise RefusalError(where, "a name of its own for each signal dictionary", quoted(name))
+            found[name] = self._signals(one, f"{where}: signal dictionary {name[:60]}")
+        return found
+
+    def _signals(self, element: Element, where: str) -> dict[str, Connector]:
+        """Return the entries of a signal dictionary, from its file or inline."""
+        kind, source = element.get("type", DICTIONARY_TYPE), element.get("source")
+        if kind != DICTIONARY_TYPE:
+            raise RefusalError(f"{where}: type", DICTIONARY_TYPE, quoted(kind))
+        root = element.find(tag("ssb:SignalDictionary"))
+        if source:
+            where = self._member(source, where)
+            root = self.archive.xml(where)
+        if root is None:
+            raise RefusalError(where, "a source or entries", "neither")
+        expect(root, "ssb:SignalDictionary", where)
+        refuse_version(root, where)
+        known = replace(self, units={**self.units, **read_units(root, where)})
+        signals: dict[str, Connector] = {}
+        for entry in root.iterfind(tag("ssb:DictionaryEntry")):
+            name = entry.get("name", "")
+            if not name or name in signals:
+                raise RefusalError(where, "a name of its own for each entry", quoted(name))
+            signals[name] = Connector(name, BOTH, known._unit(entry))
+        return signals
 
     def _elements(
         self, elements: tuple[Element, ...], where: str, depth: int
-    ) -> Mapping[str, Component | System]:
-        found: dict[str, Component | System] = {}
+    ) -> Mapping[str, Component | System | DictionaryReference]:
+        found: dict[str, Component | System | DictionaryReference] = {}
         for element in elements:
             name = element.get("name", "")
             if not name or name in found:
                 raise RefusalError(where, "a name of its own for each element", quoted(name))
             if element.tag == tag("ssd:Component"):
-                found[name] = self._component(element, name, depth)
+                inner = element.get("type") in (PACKAGE_TYPE, DEFINITION_TYPE)
+                found[name] = (self._inner if inner else self._component)(element, name, depth)
             elif element.tag == tag("ssd:System"):
                 found[name] = self.system(element, depth + 1)
+            elif element.tag == tag("ssd:SignalDictionaryReference"):
+                signals = self._connectors(element, f"{SSD_FILE}: {name[:60]}")
+                found[name] = DictionaryReference(name, element.get("dictionary", ""), signals)
             else:
                 kind = element.tag.rpartition("}")[2][:60]
-                hint = _DICTIONARY if kind == "SignalDictionaryReference" else ""
-                raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind, hint)
+                raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind)
         return found
+
+    def _inner(self, element: Element, name: str, depth: int) -> System:
+        """Read a component that is a system: its own connectors and parameters go before those of its description."""
+        where = f"{SSD_FILE}: {name[:60]}"
+        if depth >= DEEPEST or next(self.left, None) is None:
+            expected = (
+                f"at most {DEEPEST} systems in each other, and {MOST_INNER} components that are systems"
+            )
+            raise RefusalError(where, expected, "more")
+        member = self._member(element.get("source", ""), f"{where}: source")
+        packed = element.get("type") == PACKAGE_TYPE
+        archive = self.archive.inner(member) if packed else self.archive
+        file = SSD_FILE if packed else member
+        try:
+            root, top = _described(archive, file)
+            prefix = f"{self.prefix}{member}/" if packed else self.prefix
+            folder = "" if packed else str(PurePosixPath(member).parent)
+            reader = _Reader(archive, read_units(root, file), {}, self.left, prefix, folder)
+            inner = reader.system(top, depth + 1)
+        except RefusalError as refusal:
+            problem = refusal.problem
+            place = problem.key if packed else problem.key.removeprefix(f"{SSD_FILE}: ")
+            got = (f"{member}: {place}", problem.expected, problem.got, problem.hint)
+            raise RefusalError(*got) from None
+        if packed:
+            self.archive.remarks += [f"{member}: {remark}" for remark in archive.remarks]
+            archive.remarks.clear()
+        connectors = {**inner.connectors, **self._connectors(element, where)}
+        bindings = (*inner.bindings, *self._bindings(element, where))
+        return replace(inner, name=name, connectors=connectors, bindings=bindings)
+
+    def _member(self, uri: str, where: str) -> str:
+        return self.archive.member(uri, where, self.folder)
 
     def _component(self, element: Element, name: str, depth: int) -> Component:
         where = f"{SSD_FILE}: {name[:60]}"
         kind = element.get("type", FMU_TYPE)
         if kind != FMU_TYPE:
-            hint = "Other kinds of components are not available in this version: put its elements into the system."
+            hint = "Other kinds of components are not available in this version."
             raise RefusalError(f"{where}: type", FMU_TYPE, quoted(kind), hint)
         implementation = element.get("implementation", "any")
         if implementation not in ("any", "CoSimulation"):
             hint = "Export the FMU for co-simulation."
             raise RefusalError(f"{where}: implementation", "CoSimulation", quoted(implementation), hint)
-        source = self.archive.member(element.get("source", ""), f"{where}: source")
+        source = self.prefix + self._member(element.get("source", ""), f"{where}: source")
         own = self._note("Component", name, depth)
         gain = self._note("Gain", name, depth)
         return Component(
@@ -184,19 +265,19 @@ class _Reader:
     def _parameters(self, element: Element, where: str) -> tuple[Parameter, ...]:
         source = element.get("source")
         if source is not None:
-            member = self.archive.member(source, f"{where}: parameter binding")
-            return read_parameter_set(self.archive.xml(member), member)
+            member = self._member(source, f"{where}: parameter binding")
+            return read_parameter_set(self.archive.xml(member), member, None, self.archive.remarks)
         inline = element.find(f"{tag('ssd:ParameterValues')}/{tag('ssv:ParameterSet')}")
         if inline is None:
             raise RefusalError(f"{where}: parameter binding", "a source or values", "neither")
-        return read_parameter_set(inline, f"{where}: parameter set", self.units)
+        return read_parameter_set(inline, f"{where}: parameter set", self.units, self.archive.remarks)
 
     def _mapping(self, element: Element, where: str) -> tuple[Mapped, ...]:
         where = f"{where}: parameter mapping"
         self._refuse_other(element, MAPPING_TYPE, where)
         source = element.get("source")
         if source is not None:
-            member = self.archive.member(source, where)
+            member = self._member(source, where)
             return read_mapping(self.archive.xml(member), member)
         inline = element.find(tag("ssm:ParameterMapping"))
         if inline is None:
@@ -212,7 +293,15 @@ class _Reader:
             raise RefusalError(f"{where}: sourceBase", "SSD", quoted(element.get("sourceBase")), hint)
 
 
-_DICTIONARY = "Signal dictionaries are not available in this version: connect its signals one by one."
+def _described(archive: SspArchive, file: str) -> tuple[Element, Element]:
+    """Return the root of an SSD and its system."""
+    root = archive.xml(file)
+    expect(root, "ssd:SystemStructureDescription", file)
+    refuse_version(root, file)
+    top = root.find(tag("ssd:System"))
+    if top is None:
+        raise RefusalError(file, "one <System>", "none")
+    return root, top
 
 
 def _annotations(element: Element | None, kind: str) -> Iterator[Element]:
@@ -248,6 +337,7 @@ def _step(experiment: Element | None, root: Element) -> float | None:
         for fixed in algorithm.iterfind(tag("osp:FixedStepAlgorithm")):
             return number(fixed.get("baseStepSize", ""), f"{SSD_FILE}: FixedStepAlgorithm: baseStepSize")
     for master in root.iter():
-        if master.tag.endswith("}FixedStepMaster"):  # its namespace differs between versions
+        # its namespace differs between versions, and another tool names its step otherwise
+        if master.tag.endswith("}FixedStepMaster") and "stepSize" in master.attrib:
             return number(master.get("stepSize", ""), f"{SSD_FILE}: FixedStepMaster: stepSize")
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -15,10 +16,12 @@ from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.structure import Structure
 
 SAMPLES = 1000
-"""Default number of samples of each output."""
+"""Default number of samples of each output, and most of them where steps are longer."""
 MOST_RECORDED = 100
 OWN_TABLES = ("component", "connection")
 """Tables of a scene that SSP expresses itself."""
+_ROUNDED = 1e-9
+"""Part of a number of steps that is rounding."""
 _NOT_OF_A_NAME = re.compile(r"[^A-Za-z0-9_]")
 
 
@@ -90,6 +93,8 @@ def _connection(link: Link, names: Mapping[Path, str]) -> dict[str, Any]:
     table: dict[str, Any] = {"from": _reference(link.source, names), "to": _reference(link.target, names)}
     if link.gain != 1.0 or link.gain_unit is not None:
         table["gain"] = link.gain
+    if link.offset:
+        table["offset"] = link.offset
     return table if link.gain_unit is None else {**table, "gain_unit": link.gain_unit}
 
 
@@ -135,9 +140,20 @@ def _record(
         if connector.kind == "output" and _is_number(facts[path], name)
     ]
     if outputs:
-        record |= {"variables": outputs[:MOST_RECORDED], "rate": SAMPLES / duration}
+        rate, often = _sampling(tables, duration)
+        record |= {"variables": outputs[:MOST_RECORDED], "rate": rate}
         count = len(outputs[:MOST_RECORDED])
-        yield f"record.variables are the {count} outputs that the system names, {SAMPLES} samples of each"
+        yield f"record.variables are the {count} outputs that the system names, {often}"
+
+
+def _sampling(tables: Mapping[str, Any], duration: float) -> tuple[float, str]:
+    """Return the default rate of samples, and its description: at ends of steps, since a sample cuts a step."""
+    step = tables["execution"].get("macro_step")
+    if not isinstance(step, int | float) or not 0.0 < step <= duration:
+        return SAMPLES / duration, f"{SAMPLES} samples of each"
+    steps = max(1, math.ceil(duration / step / SAMPLES * (1.0 - _ROUNDED)))
+    each = "each step" if steps == 1 else f"each {steps} steps"
+    return 1.0 / (steps * step), f"at the end of {each}"
 
 
 def _is_number(facts: ComponentFacts, name: str) -> bool:

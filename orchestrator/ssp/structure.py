@@ -61,14 +61,25 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True)
+class DictionaryReference:
+    """The signals of a dictionary in a system: all references to a dictionary have the same signals."""
+
+    name: str
+    dictionary: str
+    connectors: Mapping[str, Connector]
+
+
+@dataclass(frozen=True, slots=True)
 class System:
     """A system of components and systems."""
 
     name: str
     connectors: Mapping[str, Connector]
     bindings: tuple[Binding, ...] = ()
-    elements: Mapping[str, Component | System] = field(default_factory=dict)
+    elements: Mapping[str, Component | System | DictionaryReference] = field(default_factory=dict)
     connections: tuple[Connection, ...] = ()
+    dictionaries: Mapping[str, Mapping[str, Connector]] = field(default_factory=dict)
+    """Signals of each signal dictionary of this system."""
 
 
 @dataclass(frozen=True, slots=True)

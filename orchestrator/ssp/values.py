@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
@@ -113,17 +113,34 @@ def _unit(element: Element, where: str) -> tuple[str, Unit]:
     return name, declared_unit(name, exponents, factor, offset)
 
 
-def read_parameter_set(root: Element, where: str, units: Units | None = None) -> tuple[Parameter, ...]:
-    """Return the parameters of `ssv:ParameterSet`, with units of the enclosing file; messages begin with `where`."""
+def read_parameter_set(
+    root: Element, where: str, units: Units | None = None, remarks: list[str] | None = None
+) -> tuple[Parameter, ...]:
+    """Return the parameters of `ssv:ParameterSet`, with units of the enclosing file; messages begin with `where`.
+
+    A parameter with several values has the last one, as in other tools, if there is a list for the remark.
+    """
     expect(root, "ssv:ParameterSet", where)
     refuse_version(root, where)
     known = {**(units or {}), **read_units(root, where)}
     found: dict[str, Parameter] = {}
+    again: dict[str, None] = {}
     for element in root.iterfind(f"{tag('ssv:Parameters')}/{tag('ssv:Parameter')}"):
         parameter = _parameter(element, where, known)
         if found.setdefault(parameter.name, parameter) != parameter:
-            raise RefusalError(where, "one value of each parameter", f"two of {quoted(parameter.name)}")
+            if remarks is None:
+                raise RefusalError(where, "one value of each parameter", f"two of {quoted(parameter.name)}")
+            again[parameter.name] = None
+            found[parameter.name] = parameter
+    if again and remarks is not None:
+        remarks.append(f"{where}: the last of several values was taken: {named_few(again)}")
     return tuple(found.values())
+
+
+def named_few(names: Collection[str]) -> str:
+    """Return the first names of a list, shortened, and the number of the others."""
+    named = ", ".join(name[:100] or '""' for name in list(names)[:_MOST_NAMED])
+    return f"{named} and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else named
 
 
 def _parameter(element: Element, where: str, units: Units) -> Parameter:

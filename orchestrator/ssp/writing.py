@@ -240,15 +240,15 @@ def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]
     )
     if differ or spec.gain_unit is not None:
         connection.set("suppressUnitConversion", "true")  # the gain is the only change of the number
-    if spec.gain != 1.0 or differ:
+    if spec.gain != 1.0 or spec.offset or differ:
         # some tools take 0 for a missing attribute
-        SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset="0.0")
+        SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset=repr(spec.offset))
 
 
 def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
-    """Write a connection whose gain is a component."""
+    """Write a connection whose gain is a component; its offset follows the gain."""
     for start, end in ((spec.source, (gain, "input")), ((gain, "output"), spec.target)):
-        SubElement(
+        connection = SubElement(
             joined,
             "ssd:Connection",
             startElement=start[0],
@@ -256,6 +256,8 @@ def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
             endElement=end[0],
             endConnector=end[1],
         )
+    if spec.offset:
+        SubElement(connection, "ssc:LinearTransformation", factor="1.0", offset=repr(spec.offset))
 
 
 def _master(system: Element, scene: Scene) -> None:

@@ -34,7 +34,8 @@ def plain_contact(
     if output != FORCE or ANSWER not in variables[stop] or f"{port}.law" in variables[body]:
         return None
     by_variable = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
-    if DISPLACEMENT not in by_variable or any(connection.gain != 1.0 for connection in by_variable.values()):
+    changed = any(c.gain != 1.0 or c.offset for c in by_variable.values()) or force.offset
+    if DISPLACEMENT not in by_variable or changed:
         return None
     velocity = by_variable.get(VELOCITY)
     return StopContactSpec(

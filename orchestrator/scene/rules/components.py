@@ -34,7 +34,11 @@ from vibroimpact.orchestrator.scene.rules.scene import sample_problems
 MOST_STEPS_PER_RUN = 10**10
 #: Inputs of a body's contact port through which another component answers its contact.
 ANSWERS = ("applied_restitution", "applied_force")
+PORT = "contact["
+"""Beginning of the variables of a contact: its energy is computed without offsets."""
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
+_NUMBERED = {"integer", "enumeration"}
+"""Kinds that feed one another: an item of an enumeration is passed on as its number."""
 
 
 def general_problems(draft: GeneralDraft) -> list[Problem]:
@@ -128,12 +132,22 @@ def _type_problems(
     connection: ConnectionTable, place: int, source: VariableFacts, target: VariableFacts
 ) -> Iterator[Problem]:
     where = key_path(("connection", place))
-    if source.kind != target.kind:
+    if source.kind != target.kind and not {source.kind, target.kind} <= _NUMBERED:
         got = f"{source.type} ({connection.source}) to {target.type} ({connection.target})"
         yield Problem(where, "two variables of one type", got)
     elif source.kind != "real" and connection.gain != 1.0:
         got = f"{quoted(connection.gain)} between {source.type} variables"
         yield Problem(f"{where}.gain", "a gain between real numbers only", got, "Remove gain.")
+    if connection.offset == 0.0:
+        return
+    if source.kind != "real" or target.kind != "real":
+        got = f"{quoted(connection.offset)} between {source.type} variables"
+        yield Problem(f"{where}.offset", "an offset between real numbers only", got, "Remove offset.")
+    ends = (connection.source, connection.target)
+    ports = [end for end in ends if component_variable(end)[1].startswith(PORT)]
+    if ports:
+        hint = "Give the position of the contact instead."
+        yield Problem(f"{where}.offset", "none at a contact", f"one at {ports[0]}", hint)
 
 
 def _unit_problems(

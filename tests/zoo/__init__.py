@@ -1,0 +1,1 @@
+"""FMUs and systems of other tools in our importer: `make zoo ZOO=folder`."""
