@@ -34,7 +34,7 @@ from vibroimpact.orchestrator.ssp.names import GAIN, SSD_FILE
 from vibroimpact.orchestrator.ssp.parameter_sets import read_sets, with_sets
 from vibroimpact.orchestrator.ssp.reading import read_structure
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
-from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
+from vibroimpact.orchestrator.ssp.scene_tables import Chosen, scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 from vibroimpact.orchestrator.ssp.values import named_few
 
@@ -234,11 +234,11 @@ def _left_out(ignored: Sequence[str]) -> Iterator[str]:
 
 def _fmus(
     archive: SspArchive, each: Mapping[Path, Component], folder: FilePath
-) -> tuple[dict[Path, tuple[str, str | None]], dict[Path, ComponentFacts], list[str]]:
-    """Copy the FMUs into a folder; return the scene's `fmu` and `fmi` of each but gains, and their facts."""
+) -> tuple[dict[Path, Chosen], dict[Path, ComponentFacts], list[str]]:
+    """Copy the FMUs into a folder; return the scene's choice of each but gains, and their facts."""
     folder.mkdir()
     files: dict[str, FilePath] = {}
-    fmus: dict[Path, tuple[str, str | None]] = {}
+    fmus: dict[Path, Chosen] = {}
     facts: dict[Path, ComponentFacts] = {}
     notes: list[str] = []
     for path, component in each.items():
@@ -251,12 +251,13 @@ def _fmus(
             continue
         own = _own(component, file, path, notes)
         if own is None:
-            fmus[path] = f"{folder.name}/{file.name}", None
-            facts[path] = component_facts(file)
+            fmus[path] = Chosen(f"{folder.name}/{file.name}", None, component.run_as)
+            facts[path] = component_facts(file, component.run_as)
         else:
-            fmus[path] = component.fmu, None if component.fmi == "3.0" else component.fmi
-            facts[path] = component_facts(own)
-    used = {FilePath(file).name for file, _ in fmus.values()}
+            version = None if component.fmi == "3.0" else component.fmi
+            fmus[path] = Chosen(component.fmu, version, component.run_as)
+            facts[path] = component_facts(own, component.run_as)
+    used = {FilePath(chosen.fmu).name for chosen in fmus.values()}
     for file in files.values():
         if file.name not in used:
             file.unlink()

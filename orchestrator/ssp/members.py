@@ -83,7 +83,7 @@ def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
             spec.name,
             _member(file.name, content, taken),
             content,
-            component_facts(file),
+            component_facts(file, spec.run_as),
             dict(spec.parameters),
             *(own or ("", "")),
         )

@@ -8,6 +8,8 @@ from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
 from vibroimpact.fmus.units import Unit
+from vibroimpact.orchestrator.importer.specification import RunAs
+from vibroimpact.orchestrator.scene.fields import listed
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.names import (
@@ -53,6 +55,10 @@ DEEPEST = 50
 """Most levels of nested systems."""
 MOST_INNER = 200
 """Most components that are systems: an archive may name one of its descriptions many times."""
+
+
+KINDS_OF: dict[str, RunAs] = {"any": "auto", "CoSimulation": "auto", "ModelExchange": "model_exchange"}
+"""The kind that runs, by the implementation of a component; co-simulation is taken where the FMU has it."""
 
 
 def read_structure(archive: SspArchive) -> Structure:
@@ -195,9 +201,9 @@ class _Reader:
             hint = "Other kinds of components are not available in this version."
             raise RefusalError(f"{where}: type", FMU_TYPE, quoted(kind), hint)
         implementation = element.get("implementation", "any")
-        if implementation not in ("any", "CoSimulation"):
-            hint = "Export the FMU for co-simulation."
-            raise RefusalError(f"{where}: implementation", "CoSimulation", quoted(implementation), hint)
+        if implementation not in KINDS_OF:
+            expected = listed(list(KINDS_OF), "or")
+            raise RefusalError(f"{where}: implementation", expected, quoted(implementation))
         source = self.prefix + self._member(element.get("source", ""), f"{where}: source")
         own = self._note("Component", name, depth)
         gain = self._note("Gain", name, depth)
@@ -210,6 +216,7 @@ class _Reader:
             "" if own is None else own.get("fmi", ""),
             gain is not None,
             None if gain is None else gain.get("gain_unit"),
+            KINDS_OF[implementation],
         )
 
     def _connectors(self, element: Element, where: str) -> dict[str, Connector]:

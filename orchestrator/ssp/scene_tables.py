@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, ComponentFacts
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Link, Node, Path
@@ -56,13 +57,22 @@ def noted_tables(structure: Structure) -> dict[str, Any]:
     return tables
 
 
+class Chosen(NamedTuple):
+    """The FMU of a component, as a scene has it."""
+
+    fmu: str
+    """A file, or a component of this package."""
+    fmi: str | None
+    run_as: RunAs
+
+
 def scene_tables(
     structure: Structure,
     flat: FlatSystem,
-    fmus: Mapping[Path, tuple[str, str | None]],
+    fmus: Mapping[Path, Chosen],
     facts: Mapping[Path, ComponentFacts],
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the tables of a scene, and notes for a person; `fmus` has `fmu` and `fmi` of each component."""
+    """Return the tables of a scene, and notes for a person; `fmus` has the FMU of each component."""
     names, values = names_of(list(flat.components)), flat.start_values()
     noted = noted_tables(structure)
     notes: list[str] = []
@@ -81,11 +91,12 @@ def scene_tables(
     return tables, notes
 
 
-def _component(fmu: tuple[str, str | None], values: Mapping[str, Any]) -> dict[str, Any]:
-    file, fmi = fmu
-    table: dict[str, Any] = {"fmu": file}
-    if fmi:
-        table["fmi"] = fmi
+def _component(chosen: Chosen, values: Mapping[str, Any]) -> dict[str, Any]:
+    table: dict[str, Any] = {"fmu": chosen.fmu}
+    if chosen.fmi:
+        table["fmi"] = chosen.fmi
+    if chosen.run_as != "auto":
+        table["run_as"] = chosen.run_as
     return {**table, "parameters": dict(values)} if values else table
 
 

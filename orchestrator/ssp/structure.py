@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from vibroimpact.fmus.units import Unit
+from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.ssp.values import Binding
 
 
@@ -58,6 +59,7 @@ class Component:
     """Whether it is the gain of a connection."""
     gain_unit: str | None = None
     """The unit of that gain, if the scene has one."""
+    run_as: RunAs = "auto"
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,12 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.units import BASE_UNITS, Unit, agree
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
+from vibroimpact.orchestrator.scene.component_facts import (
+    MODEL_EXCHANGE,
+    NUMERIC_KINDS,
+    StartValue,
+    VariableFacts,
+)
 from vibroimpact.orchestrator.scene.component_numbers import component_variable, gain_place
 from vibroimpact.orchestrator.ssp.members import Part
 from vibroimpact.orchestrator.ssp.names import (
@@ -213,7 +218,7 @@ def _component(elements: Element, part: Part, variables: list[VariableFacts]) ->
         name=part.name,
         type=FMU_TYPE,
         source=part.member,
-        implementation="CoSimulation",
+        implementation="ModelExchange" if part.facts.kind == MODEL_EXCHANGE else "CoSimulation",
     )
     if variables:
         connectors = SubElement(component, "ssd:Connectors")

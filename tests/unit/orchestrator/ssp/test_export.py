@@ -258,3 +258,18 @@ def test_a_system_in_python_is_a_scene_with_its_own_fmus(tmp_path: Path) -> None
         assert np.array_equal(vi.run(scene, progress=False).body_displacement.values, expected)
     with pytest.raises(UsageError, match="scheduler"):
         vi.campaign(path, tmp_path / "campaign", scheduler="tcp://127.0.0.1:9")
+
+
+def test_model_exchange_comes_back_as_it_left(tmp_path: Path) -> None:
+    tables = {
+        "component": {"m": {"fmu": "Oscillator", "run_as": "model_exchange", "parameters": {"mass": 2.0}}},
+        "record": {"recorded_time": 1.0, "variables": ["m.displacement"], "rate": 8},
+        "execution": {"macro_step": 0.125},
+    }
+    scene = vi.Scene.from_dict(tables)
+    written = export_system(scene, tmp_path / "one.ssp")
+    with zipfile.ZipFile(written) as archive:
+        assert b'implementation="ModelExchange"' in archive.read("SystemStructure.ssd")
+    read = load_system(written).scene
+    assert read.components[0].run_as == "model_exchange"
+    np.testing.assert_array_equal(*(vi.run(each)["m_displacement"].values for each in (scene, read)))

@@ -85,7 +85,10 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
         ssd(part(more='type="application/x-ssp-package"')),
         "resources/body.fmu: expected a safe SSP, got: no SystemStructure.ssd",
     ),
-    "model exchange": (ssd(part(more='implementation="ModelExchange"')), "Export the FMU for co-simulation"),
+    "a model that another kind of tool schedules": (
+        ssd(part(more='implementation="ScheduledExecution"')),
+        "expected any, CoSimulation or ModelExchange",
+    ),
     "a dictionary that is not there": (
         ssd(part() + BUS, connection("bus.x", "body.force")),
         'expected a signal dictionary, got "d"',
