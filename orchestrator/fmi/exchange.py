@@ -36,6 +36,10 @@ MOST_STEPS = 2_000_000
 #: Event iterations at one instant, above which a discrete input counts as never settling.
 EVENT_ITERATIONS = 100
 MODEL_EXCHANGE = 0
+#: Error of one step over the tolerance: the errors of many steps then stay near the tolerance.
+STEP_SHARE = 0.1
+#: Finest relative tolerance of one step; below it errors are rounding.
+FINEST = 1e-14
 #: Functions of the C code, by the names of the calls that they replace.
 DRIVEN = {
     "DoStep": "step",
@@ -153,7 +157,7 @@ class ExchangeInstance(EventfulInstance):
         exchange.version = int(self.fmi_version[0])
         exchange.most_steps, exchange.most_iterations = MOST_STEPS, EVENT_ITERATIONS
         exchange.needs_completed, exchange.restorable = self.facts.needs_completed, self.facts.restorable
-        exchange.tolerance = self.facts.tolerance
+        exchange.tolerance = max(STEP_SHARE * self.facts.tolerance, FINEST)
         self._words = [name.format(**self.own_words, state=self.state_word) for name in self.names]
         for place, word in enumerate(self._words):
             if ExchangeCall.save <= place <= ExchangeCall.free and not self.facts.restorable:
