@@ -66,11 +66,12 @@ def test_an_fmu_for_model_exchange_alone_is_one_problem(tmp_path: Path) -> None:
     changes = (('<CoSimulation modelIdentifier="Gain" canHandleVariableCommunicationStepSize="true"/>',
                 '<ModelExchange modelIdentifier="Gain"/>'),)  # fmt: skip
     scene = scene_with(tmp_path, *changes)
-    scene.write_text(GAIN_SCENE.replace("g.y", "g.no_such"))
+    only = GAIN_SCENE.replace('"g.fmu"', '"g.fmu"\nrun_as = "co_simulation"')
+    scene.write_text(only.replace("g.y", "g.no_such"))
     refused = in_this_process("check", scene)
     assert refused.returncode == 2
     (line,) = refused.stderr.strip().splitlines()
-    assert "expected an FMU for co-simulation, got g.fmu for model exchange only" in line
+    assert 'got "co_simulation" for g.fmu, which has model exchange only' in line
 
 
 def test_a_library_of_another_name_is_named(tmp_path: Path) -> None:
