@@ -96,8 +96,11 @@ def _bindings(
         xml = values({name: real(value) for name, value in given.items()})
         if draw.random() < 0.1:
             first = next(iter(given))
-            again = f'<ssv:Parameter name="{first}">{real(given[first] + draw.choice((0.0, 1.0)))}</ssv:Parameter>'
-            is_doubled = is_doubled or real(given[first]) not in again
+            last = given[first] + draw.choice((0.0, 1.0))
+            again = f'<ssv:Parameter name="{first}">{real(last)}</ssv:Parameter>'
+            is_doubled = is_doubled or last != given[first]
+            if f"{prefix}{first}" in settable:
+                taken[f"{prefix}{first}"] = last
             xml = xml.replace("</ssv:Parameters>", f"{again}</ssv:Parameters>", 1)
         text += xml
     return text, is_doubled
@@ -107,9 +110,8 @@ def _problem(path: Path, taken: Mapping[str, float], lost: Sequence[str], *, is_
     try:
         imported = load_system(path)
     except VibroimpactError as refusal:
-        is_named = is_doubled and "expected one value of each parameter" in str(refusal)
-        return None if is_named else f"refused: {refusal}"
-    if is_doubled:
+        return f"refused: {refusal}"
+    if is_doubled and not any("the last of several values was taken" in note for note in imported.notes):
         return "two values of one parameter, and no word on it"
     found: dict[str, float] = {}
     for each in imported.scene.components:
