@@ -22,14 +22,15 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, component_facts
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.ssp import load_system
+from vibroimpact.orchestrator.ssp.importing import Imported
 
 STEPS = 500
 """Steps of an experiment whose FMU proposes none."""
 MOST_STEPS = 1000
 """Most steps: a longer experiment ends early."""
 MOST_OUTPUTS = 100
-SYSTEM_TIME = 1.0
-"""End of a system that gives none, s."""
+NOT_GIVEN = {"record.recorded_time": 1.0, "execution.macro_step": 1e-3}
+"""End and step of a system that gives none, s."""
 KINDS = {"CoSimulation", "ModelExchange", "ScheduledExecution"}
 
 Facts = dict[str, Any]
@@ -97,12 +98,7 @@ def fmpy(path: Path) -> Facts:
 
 def system(path: Path) -> Facts:
     """Return the remarks on a system and the number of its components, after it has run."""
-    try:
-        imported = load_system(path)
-    except VibroimpactError as error:
-        if "recorded_time" not in str(error):
-            raise
-        imported = load_system(path, [f"record.recorded_time={SYSTEM_TIME}"])
+    imported = _opened(path)
     folder = Path(path.parent, f"{path.name}.run")
     folder.mkdir(exist_ok=True)
     run_scene(imported.scene, folder / "run.nc")
@@ -110,6 +106,20 @@ def system(path: Path) -> Facts:
     if data.outcome.values.any():
         return {"refusal": str(data.message.values.flat[0])}
     return {"components": len(imported.scene.components), "notes": list(imported.notes)}
+
+
+def _opened(path: Path) -> Imported:
+    """Return a system as a scene; what it does not give is taken from `NOT_GIVEN`."""
+    changes: list[str] = []
+    while True:
+        try:
+            return load_system(path, changes)
+        except VibroimpactError as error:
+            left = [key for key in NOT_GIVEN if f"{key}={NOT_GIVEN[key]}" not in changes]
+            missing = next((key for key in left if key.partition(".")[2] in str(error)), None)
+            if missing is None:
+                raise
+            changes.append(f"{missing}={NOT_GIVEN[missing]}")
 
 
 ROLES: dict[str, Callable[[Path], Facts]] = {"ours": ours, "fmpy": fmpy, "system": system}
