@@ -71,7 +71,7 @@ def test_the_fast_tests_say_what_they_leave_out() -> None:
     assert "tests/architecture/test_c_rooms.py::test_folders_of_the_core_look_down_only" in collected
     assert not collected & expensive_tests().keys()
     assert re.search(
-        r"^\d+ dear or long tests, and tests/conformance, tests/documentation, tests/end_to_end, .*tests/soak, tests/zoo$",
+        r"^\d+ dear or long tests, and tests/conformance, tests/documentation, tests/end_to_end, .*tests/zoo$",
         result.stdout,
         re.M,
     )
