@@ -8,6 +8,7 @@ device, and comes down from the last sample that should have been out.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -80,7 +81,8 @@ class Watch:
         """End the program, which may be suspended, and wait for its end."""
         if os.getppid() != self._order.program:
             return
-        os.kill(self._order.program, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):  # it may have ended by itself just now
+            os.kill(self._order.program, signal.SIGKILL)
         end = time.monotonic() + FREE_SECONDS
         while os.getppid() == self._order.program and time.monotonic() < end:
             time.sleep(0.005)
