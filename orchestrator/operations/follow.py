@@ -23,8 +23,8 @@ class Follow(Operation):
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
     Folds, branch points, period doublings, tori and grazes are located and printed, and branches that begin there are
-    followed. The stops must be rigid, the force harmonic or absent. First orbits are those of one impact and those on
-    which runs over the range end. Index sums then show whether orbits are missing.
+    followed. Stops may be rigid or yield; the force must be periodic or absent. First orbits are those of one impact
+    and those on which runs over the range end. Index sums then show whether orbits are missing.
 
     --impacts and --periods search other orbits. --seed gives one for the scene as it is, --from-dataset one at the
     values of its run. With --second, folds, period doublings, tori, pitchforks and grazes are curves over both numbers,

@@ -187,8 +187,8 @@ def find_orbits(
 def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
     if body.has_own_period:
         raise UsageError(
-            "seed: expected none of a body without a force, whose phases have no force to count from, got one. "
-            "Give the number of impacts, or a start that leads to the orbit."
+            "seed: expected none, by --seed or --from-dataset, of a body without a force, got one: its phases count "
+            "from a force. Give the number of impacts, or a start that leads to the orbit."
         )
     if impacts not in (None, len(seed)):
         raise UsageError(f"seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}.")
