@@ -31,8 +31,8 @@ from vibroimpact.orchestrator.orbits.bodies import (
 )
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd, ends_in_words, ends_of_runs, where_runs_end
 from vibroimpact.orchestrator.orbits.first_orbits import MOST_BEGUN_IMPACTS, SEEDS, first_orbits, seed_values
-from vibroimpact.orchestrator.orbits.index_check import IndexCheck
 from vibroimpact.orchestrator.orbits.seeds import Seed
+from vibroimpact.orchestrator.orbits.self_check.index_check import IndexCheck
 from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.run.provenance import scene_attributes
 from vibroimpact.orchestrator.scene import Scene

@@ -16,8 +16,8 @@ import xarray as xr
 from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
 from vibroimpact.analysis.orbits.branches import mirror_images, multiplier_text
 from vibroimpact.analysis.orbits.corners import AT_YIELD_VELOCITY
-from vibroimpact.analysis.orbits.fold_extrema import EXTREMA
 from vibroimpact.analysis.orbits.following import STABILITY_CHANGE, FollowSettings
+from vibroimpact.analysis.orbits.loci.fold_extrema import EXTREMA
 from vibroimpact.analysis.orbits.periodic import grazes
 from vibroimpact.analysis.orbits.pitchforks import DEGENERATE
 from vibroimpact.analysis.orbits.search import STARTS

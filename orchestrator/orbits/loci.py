@@ -16,7 +16,7 @@ from vibroimpact.analysis.orbits.branch import Branch
 from vibroimpact.analysis.orbits.branch_points import BRANCH_POINT
 from vibroimpact.analysis.orbits.branches import dataset_of_loci
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
-from vibroimpact.analysis.orbits.loci import LocusFollower
+from vibroimpact.analysis.orbits.loci.follower import LocusFollower
 from vibroimpact.analysis.orbits.pitchforks import PITCHFORK
 from vibroimpact.analysis.orbits.symmetry import is_symmetric
 from vibroimpact.fmus.errors import SceneError, UsageError

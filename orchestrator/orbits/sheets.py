@@ -14,10 +14,10 @@ import numpy as np
 from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit
 from vibroimpact.analysis.orbits.bifurcations import Bifurcation, Locus, LocusPoint
 from vibroimpact.analysis.orbits.branch import Branch
-from vibroimpact.analysis.orbits.fold_extrema import CROSSING, ISOLA_CENTRE
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
-from vibroimpact.analysis.orbits.loci import LocusFollower
-from vibroimpact.analysis.orbits.locus_steps import BodyAt2
+from vibroimpact.analysis.orbits.loci.fold_extrema import CROSSING, ISOLA_CENTRE
+from vibroimpact.analysis.orbits.loci.follower import LocusFollower
+from vibroimpact.analysis.orbits.loci.steps import BodyAt2
 from vibroimpact.fmus.bodies.impacting_body import Floats, ImpactingBody
 from vibroimpact.orchestrator.orbits.branches import (
     Followed,

@@ -6,7 +6,7 @@ import random
 from typing import Any
 
 from vibroimpact.analysis.orbits.index_sum import index_sum, why_without_sum
-from vibroimpact.orchestrator.orbits.strobe_map import StrobeMap
+from vibroimpact.orchestrator.orbits.self_check.strobe_map import StrobeMap
 from vibroimpact.orchestrator.scene import Scene
 
 CASES, SAMPLE = 500, 2

@@ -11,7 +11,7 @@ from vibroimpact.analysis.orbits import Contact, ImpactingBody, PeriodicOrbit, c
 from vibroimpact.analysis.orbits.bifurcations import Bifurcation, Locus, joined_loci
 from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
-from vibroimpact.analysis.orbits.loci import LocusFollower
+from vibroimpact.analysis.orbits.loci.follower import LocusFollower
 
 RATIO = 0.04
 DAMPED = np.sqrt(1.0 - RATIO**2)

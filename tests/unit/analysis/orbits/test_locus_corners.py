@@ -8,8 +8,8 @@ import pytest
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, PeriodicOrbit
 from vibroimpact.analysis.orbits.bifurcations import BETWEEN, GRAZE, Bifurcation, Locus, joined_loci
 from vibroimpact.analysis.orbits.following import FollowSettings
-from vibroimpact.analysis.orbits.loci import LocusFollower
-from vibroimpact.analysis.orbits.locus_corners import CORNER
+from vibroimpact.analysis.orbits.loci.corners import CORNER
+from vibroimpact.analysis.orbits.loci.follower import LocusFollower
 
 RATIO, FREQUENCY, FORCE = 0.05, 0.8, 0.5
 SIZE = FORCE / np.hypot(1.0 - FREQUENCY**2, 2.0 * RATIO * FREQUENCY)

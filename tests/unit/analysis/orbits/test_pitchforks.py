@@ -12,7 +12,7 @@ from vibroimpact.analysis.orbits.bifurcations import Bifurcation, Locus, joined_
 from vibroimpact.analysis.orbits.branch import Branch, SpecialPoint
 from vibroimpact.analysis.orbits.departures import departures
 from vibroimpact.analysis.orbits.following import Follower, FollowSettings
-from vibroimpact.analysis.orbits.loci import LocusFollower
+from vibroimpact.analysis.orbits.loci.follower import LocusFollower
 from vibroimpact.analysis.orbits.mirrored_halves import halves_of, slopes_of
 from vibroimpact.analysis.orbits.symmetry import is_symmetric
 

@@ -16,9 +16,9 @@ from vibroimpact.analysis.orbits.search import same_orbit
 from vibroimpact.analysis.orbits.trigonometric import TURN
 from vibroimpact.fmus.bodies import Contact
 from vibroimpact.fmus.bodies.impacting_body import Floats
-from vibroimpact.orchestrator.orbits.plane_chart import PlaneChart, Wall
-from vibroimpact.orchestrator.orbits.strobe_map import StrobeMap
-from vibroimpact.orchestrator.orbits.winding import Marks, Search
+from vibroimpact.orchestrator.orbits.self_check.plane_chart import PlaneChart, Wall
+from vibroimpact.orchestrator.orbits.self_check.strobe_map import StrobeMap
+from vibroimpact.orchestrator.orbits.self_check.winding import Marks, Search
 from vibroimpact.orchestrator.scene import Scene
 
 PARAMETER = "forcing.angular_frequency"

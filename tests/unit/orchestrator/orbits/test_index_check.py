@@ -17,8 +17,8 @@ from vibroimpact.analysis.study import whole
 from vibroimpact.orchestrator.orbits.branches import Followed
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd
 from vibroimpact.orchestrator.orbits.follow import Following
-from vibroimpact.orchestrator.orbits.index_check import IndexCheck, between_special_points
-from vibroimpact.orchestrator.orbits.strobe_map import Located, StrobeMap
+from vibroimpact.orchestrator.orbits.self_check.index_check import IndexCheck, between_special_points
+from vibroimpact.orchestrator.orbits.self_check.strobe_map import Located, StrobeMap
 from vibroimpact.orchestrator.scene import Scene
 
 PARAMETER = "forcing.angular_frequency"

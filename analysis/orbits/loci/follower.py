@@ -26,10 +26,10 @@ from vibroimpact.analysis.orbits.bifurcations import (
     within,
 )
 from vibroimpact.analysis.orbits.branch import CLOSED, SpecialPoint
-from vibroimpact.analysis.orbits.fold_extrema import kind_of_extremum
 from vibroimpact.analysis.orbits.following import EASY_NEWTON, SHORTEST
-from vibroimpact.analysis.orbits.locus_corners import CORNER, TwoTouches, corner_of
-from vibroimpact.analysis.orbits.locus_steps import CHANGE, OFF_CHORD, ZERO, LocusSteps
+from vibroimpact.analysis.orbits.loci.corners import CORNER, TwoTouches, corner_of
+from vibroimpact.analysis.orbits.loci.fold_extrema import kind_of_extremum
+from vibroimpact.analysis.orbits.loci.steps import CHANGE, OFF_CHORD, ZERO, LocusSteps
 from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, grazes
 from vibroimpact.analysis.orbits.pitchforks import (
     DEGENERATE,

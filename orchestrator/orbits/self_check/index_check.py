@@ -25,7 +25,7 @@ from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.messages import counted
 from vibroimpact.orchestrator.orbits.ends_of_runs import RunEnd
-from vibroimpact.orchestrator.orbits.strobe_map import GRID_STARTS, IMPACT_LIMIT, StrobeMap
+from vibroimpact.orchestrator.orbits.self_check.strobe_map import GRID_STARTS, IMPACT_LIMIT, StrobeMap
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene
 

@@ -25,8 +25,8 @@ from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.orbits.find import class_of_record, long_runs
-from vibroimpact.orchestrator.orbits.state_plane import StatePlane, displacement_at, press_on
-from vibroimpact.orchestrator.orbits.winding import Cell, Marks, Search
+from vibroimpact.orchestrator.orbits.self_check.state_plane import StatePlane, displacement_at, press_on
+from vibroimpact.orchestrator.orbits.self_check.winding import Cell, Marks, Search
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.run.points import State
 from vibroimpact.orchestrator.scene import Scene

@@ -15,8 +15,8 @@ from vibroimpact.fmus.bodies import Contact
 from vibroimpact.fmus.bodies.impacting_body import Floats
 from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
 from vibroimpact.orchestrator.orbits.body_flow import BodyFlow
-from vibroimpact.orchestrator.orbits.plane_chart import PlaneChart, Wall
-from vibroimpact.orchestrator.orbits.winding import Marks
+from vibroimpact.orchestrator.orbits.self_check.plane_chart import PlaneChart, Wall
+from vibroimpact.orchestrator.orbits.self_check.winding import Marks
 from vibroimpact.orchestrator.scene import Scene
 
 RINGS, RING_POINTS, RING_RATIO = 40, 64, 1.25
