@@ -1,6 +1,7 @@
 """Effects of an FMU on innocent points, and its remains: nothing is lost, and nothing stays alive."""
 
 import os
+import re
 import signal
 import sys
 import time
@@ -255,7 +256,8 @@ LOADING = [
     ("LOAD", "segfault", "loading", "ended by SIGSEGV"),
     ("LOAD", "abort", "loading", "ended by SIGABRT"),
     ("LOAD", "hang", "loading", "no answer within 12 s"),
-    ("INSTANTIATE", "segfault", "loading", "ended by SIGSEGV"),
+    # a look at the running thread may just have noted the call itself
+    ("INSTANTIATE", "segfault", "(loading|fmi3Instantiate)", "ended by SIGSEGV"),
 ]
 NUMBERS = {"hang": 4, "segfault": 7, "abort": 8}
 
@@ -276,7 +278,7 @@ def test_a_component_that_crashes_or_hangs_while_it_is_loaded_is_named_with_its_
     with pytest.raises(ComponentError) as failure:
         runner_of("none")
     message = str(failure.value)
-    assert message.startswith(f"culprit: {call}")
+    assert re.match(f"culprit: {call}", message)
     assert str(folder / "Faulty.fmi3.fmu") in message
     assert what in message
     assert not marked(mark)
