@@ -14,7 +14,12 @@ from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
-from vibroimpact.orchestrator.fmi.capabilities import NEEDS_TOOL, ONLY_ONCE, capabilities_of
+from vibroimpact.orchestrator.fmi.capabilities import (
+    NEEDED_OF_CLOCKS,
+    NEEDS_TOOL,
+    ONLY_ONCE,
+    capabilities_of,
+)
 from vibroimpact.orchestrator.fmi.exchange import (
     Exchange2,
     Exchange3,
@@ -82,7 +87,7 @@ class Component:
     has_states : bool
         It can go back to a saved state.
     ticking : frozenset of int or None
-        Value references of the input clocks that tick now: their variables may be read and written. None before the
+        Value references of the clocks that tick now: their variables may be read and written. None before the
         run begins, when all variables may be.
     event_mode : bool
         It handles events in event mode and may return early.
@@ -140,9 +145,7 @@ class Component:
         """Raise ComponentFileError where an FMU needs a capability that no importer here has."""
         if self.capabilities.refusals:
             got = " and ".join(self.capabilities.refusals)
-            raise ComponentFileError(
-                f"{self.spec.fmu}: expected input clocks of a constant or fixed interval alone, got {got}."
-            )
+            raise ComponentFileError(f"{self.spec.fmu}: expected {NEEDED_OF_CLOCKS}, got {got}.")
 
     def _take_only_instance(self) -> None:
         """Register this component as the only instance of an FMU that allows one per process."""
@@ -201,7 +204,7 @@ class Component:
         names = ", ".join(clock.name for clock in self.capabilities.clocks)
         why = "made no instance with it" if self.refuses_events else "is watched, and so runs without it"
         return ComponentError(
-            f"{self.name}: expected event mode, in which its input clock {names} ticks, got a component that {why}.",
+            f"{self.name}: expected event mode, in which its clock {names} ticks, got a component that {why}.",
             instance=self.name,
         )
 

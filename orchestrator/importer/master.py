@@ -441,8 +441,10 @@ class Importer:
                 self.on_event(Event(self.time, index, name))
 
     def _tune(self, time: float) -> None:
-        if self.tuning and self.tuning.resolve(time):
+        if self.tuning and self.tuning.resolve(time, self.ticks):
             self.wants_to_end = True
+        if self.ticks.are_due(time) and self._plan.event_mode.resolve(time, self.ticks):
+            self.wants_to_end = True  # a tuned clock ticks at once
 
     # ---- repeated steps ----
 

@@ -20,7 +20,7 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.importer.ticks import Ticks
+from vibroimpact.orchestrator.importer.ticks import Ticks, joins_clocks
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import Transfer, transfers_of
 
@@ -64,8 +64,9 @@ def parts_of(
     }
     watches = [Watch(named[event.component], event) for event in events]
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
+    clocks = [c for c in connections if joins_clocks(c, named)]
     tuned = [c for c in connections if is_tunable(c, named)]
-    connections = [c for c in connections if c not in tuned]
+    connections = [c for c in connections if c not in tuned and c not in clocks]
     transfers = transfers_of(order_of(connections, named), named)
     parts = Parts(
         named=named,
@@ -74,7 +75,7 @@ def parts_of(
         watches=watches,
         tuning=Tuning(named, tuned, transfers),
         loops=LoopSolver(connections, named, transfers),
-        ticks=Ticks(named.values()),
+        ticks=Ticks(named.values(), clocks),
         contacts=ContactBonds(named, transfers, connections, contacts, pairs, contact_steps),
     )
     fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]

@@ -182,7 +182,7 @@ class GeneralRunner(Runner):
                 f"{len(self.scene.contacts)} contacts: of more than {MOST_CONTACTS} no impacts are kept"
             )
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
-        remarks += self._importer.loops.remarks()
+        remarks += [*self._importer.loops.remarks(), *self._importer.ticks.remarks()]
         remarks += [
             f"{name} made no instance with the event mode that it declares, and ran without"
             for name, component in self._importer.components.items()
