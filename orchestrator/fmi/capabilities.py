@@ -76,12 +76,12 @@ FLAGS: tuple[Flag, ...] = (
     _heeded(
         VARIABLE_STEPS,
         "2.0, 3.0",
-        "false: all steps have the size macro_step; a rate, a contact or an event that cuts one is refused by name",
+        "false: one step size, macro_step; on its own grid where steps are cut; in a contact it is refused by name",
     ),
     _heeded(
         INTERNAL_STEP,
         "3.0",
-        "a step may end so much short; a rate or a macro_step beside this grid, or a contact, is refused by name",
+        "a step may end so much short, which a remark says; a part in a contact is refused by name",
     ),
     _heeded("canGetAndSetFMUstate", "2.0", "false: no state is asked for, and no step is repeated"),
     _heeded("canGetAndSetFMUState", "3.0", "false: no state is asked for, and no step is repeated"),

@@ -91,6 +91,8 @@ class Component:
         run begins, when all variables may be.
     event_mode : bool
         It handles events in event mode and may return early.
+    on_own_grid : bool
+        Its steps are made apart from those of the others, at multiples of its one step size.
     refuses_events : bool
         It declares an event mode, but an instance could be made only without it.
     event_times : VariableGroup or None
@@ -118,7 +120,7 @@ class Component:
         self.has_states = self.capabilities.restorable
         version = 3 if description.fmiVersion.startswith("3") else 2
         self.event_mode = events and (version == 3 or exchanges) and self.capabilities.event_mode
-        self.refuses_events = False
+        self.refuses_events = self.on_own_grid = False
         self.ticking: frozenset[int] | None = None
         self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
         self.sha256 = fmu.sha256
@@ -324,11 +326,23 @@ class Component:
         for group in self._inputs:
             group.get()
 
+    def write_inputs(self) -> None:
+        """Write the inputs that `note_inputs` found."""
+        for group in self._inputs:
+            group.set()
+
     def revisit_start(self) -> None:
         """Go back to the start of the step, with the inputs that `note_inputs` found."""
         self.instance.restore(self.at_start)
-        for group in self._inputs:
-            group.set()
+        self.write_inputs()
+
+    def is_within_own_step(self, time: float) -> bool:
+        """Are the others at `time`, s, within a step of this component, which it makes later?"""
+        return self.on_own_grid and self.instance.time < time - SAME_INSTANT * (1.0 + abs(time))
+
+    def keep_own_grid(self) -> None:
+        """Leave the steps of the others: this component is never taken back, nor read within its steps."""
+        self.on_own_grid, self.has_states, self.event_times = True, False, None
 
     @contextmanager
     def taken_back(self) -> Iterator[None]:

@@ -167,22 +167,6 @@ def test_a_step_of_another_size_is_wrong_without_a_word_of_the_fmu(folder: Path,
     assert np.max(np.abs(samples[:, 1:] - exact(samples))) > 1e-3
 
 
-@pytest.mark.parametrize("steps_in_c", [True, False])
-@pytest.mark.parametrize("fmi", VERSIONS)
-def test_an_event_that_cuts_a_step_of_one_size_is_an_error_with_the_attribute(
-    folder: Path, fmi: str, steps_in_c: bool
-) -> None:
-    fmu = folder / described(folder, f"Mass.fmi{fmi[0]}.fmu", ONE_SIZE)
-    ball = part("ball", folder / "SteppedBall.fmi3.fmu")
-    importer = Importer([part("m", fmu, scheme=5.0), ball], macro_step=0.01)
-    importer.steps_in_c = steps_in_c
-    importer.begin()
-    expected = r"m: fmi\dDoStep: expected steps of 0.01 s, since canHandleVariable.* = false, got one of"
-    with pytest.raises(ComponentError, match=expected):
-        importer.advance(2.0)
-    importer.free()
-
-
 @punishes("fixedInternalStepSize")
 def test_a_solver_of_fixed_steps_may_end_a_step_short_of_its_end(folder: Path) -> None:
     declared = part("ball", folder / "SteppedBall.fmi3.fmu")
