@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from vibroimpact.fmus.safe_xml import root_of
-from vibroimpact.orchestrator.fmi.clocks import InputClock, clocks_of
+from vibroimpact.orchestrator.fmi.clocks import Clock, clocks_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,6 +61,8 @@ ONLY_ONCE = "canBeInstantiatedOnlyOncePerProcess"
 NEEDS_TOOL = "needsExecutionTool"
 ASYNCHRONOUS = "canRunAsynchronuously"
 EVENT_MODE = "hasEventMode"
+#: Clocks of an FMU that runs, in words.
+NEEDED_OF_CLOCKS = "clocks as FMI defines them, in an FMU that has an event mode"
 _COMMON = (NEEDS_TOOL, ONLY_ONCE)
 DERIVATIVE = "providesDirectionalDerivative"
 _NEVER = "no such call is made"
@@ -74,12 +76,12 @@ FLAGS: tuple[Flag, ...] = (
     _heeded(
         VARIABLE_STEPS,
         "2.0, 3.0",
-        "false: all steps have the size macro_step; a rate, a contact or an event that cuts one is refused by name",
+        "false: one step size, macro_step; on its own grid where steps are cut; in a contact it is refused by name",
     ),
     _heeded(
         INTERNAL_STEP,
         "3.0",
-        "a step may end so much short; a rate or a macro_step beside this grid, or a contact, is refused by name",
+        "a step may end so much short, which a remark says; a part in a contact is refused by name",
     ),
     _heeded("canGetAndSetFMUstate", "2.0", "false: no state is asked for, and no step is repeated"),
     _heeded("canGetAndSetFMUState", "3.0", "false: no state is asked for, and no step is repeated"),
@@ -150,7 +152,7 @@ FLAGS: tuple[Flag, ...] = (
     _heeded(
         "intervalVariability",
         "3.0",
-        "input clocks of a constant or fixed interval tick as time events; others are refused by their names",
+        "timed clocks tick as time events, triggered ones at the events that trigger them",
         CLOCK,
     ),
     _heeded("canBeDeactivated", "3.0", "every clock ticks", CLOCK),
@@ -179,8 +181,8 @@ class Capabilities:
         The required tool; empty without one.
     asynchronous : bool
         Its step calls may return before the step is done.
-    clocks : tuple of InputClock
-        Its input clocks with known ticks.
+    clocks : tuple of Clock
+        Its clocks that can tick.
     refusals : tuple of str
         Needs that no importer here meets, each as "an FMU with ...".
     tolerance : float
@@ -194,7 +196,7 @@ class Capabilities:
     only_once: bool = False
     tool: str = ""
     asynchronous: bool = False
-    clocks: tuple[InputClock, ...] = ()
+    clocks: tuple[Clock, ...] = ()
     refusals: tuple[str, ...] = ()
     tolerance: float = DEFAULT_TOLERANCE
 
@@ -221,7 +223,7 @@ def capabilities_of(
         Those of model exchange instead. Its events are always resolved in event mode, and its steps have any size.
     """
     if model_exchange:
-        return _of_model_exchange(description)
+        return _of_model_exchange(description, folder)
     interface = description.coSimulation
     if interface is None:
         return Capabilities()
@@ -229,7 +231,7 @@ def capabilities_of(
     events, step = bool(interface.hasEventMode), float(interface.fixedInternalStepSize or 0.0)
     if clocks and not events:
         names = ", ".join(clock.name for clock in clocks)
-        refusals = (*refusals, f"the input clock {names} and {EVENT_MODE} = false")
+        refusals = (*refusals, f"the clock {names} and {EVENT_MODE} = false")
     return Capabilities(
         restorable=bool(interface.canGetAndSetFMUstate),
         event_mode=events,
@@ -258,17 +260,18 @@ def _tool(description: ModelDescription) -> str:
     return str(description.generationTool or description.modelName or "one that it does not name")
 
 
-def _of_model_exchange(description: ModelDescription) -> Capabilities:
+def _of_model_exchange(description: ModelDescription, folder: Path) -> Capabilities:
     interface = description.modelExchange
     if interface is None:
         return Capabilities()
-    clocks = [variable.name for variable in description.modelVariables if variable.type == "Clock"]
+    clocks, refusals = clocks_of(description, folder)
     return Capabilities(
         restorable=bool(interface.canGetAndSetFMUstate),
         event_mode=True,
         only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
         tool=_tool(description) if interface.needsExecutionTool else "",
-        refusals=tuple(f"the clock {name} in model exchange" for name in clocks),
+        clocks=clocks,
+        refusals=refusals,
         tolerance=_usual_tolerance(description),
     )
 

@@ -23,6 +23,7 @@ from vibroimpact.fmus.core.model_exchange import (
 )
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
+from vibroimpact.orchestrator.fmi.clock_calls import ClockedInstance
 from vibroimpact.orchestrator.fmi.cvode import cvode
 from vibroimpact.orchestrator.fmi.eventful import EventfulInstance
 from vibroimpact.orchestrator.fmi.instance import OK, WARNING, CallNotes, Wrapper
@@ -342,7 +343,7 @@ class ExchangeInstance(EventfulInstance):
         self.check(self._free(self._own, ctypes.byref(slot)), "FreeFMUState")
 
 
-class Exchange3(ExchangeInstance):
+class Exchange3(ExchangeInstance, ClockedInstance):
     """An instance of FMI 3.0 for model exchange."""
 
     fmi_version = "3.0"

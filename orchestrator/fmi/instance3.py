@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
-import math
-from collections.abc import Sequence
-from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
+from ctypes import c_bool, c_char_p, c_double, c_size_t, c_void_p
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
-from vibroimpact.orchestrator.fmi.eventful import EventfulInstance
+from vibroimpact.orchestrator.fmi.clock_calls import ClockedInstance
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 
-#: Qualifier of fmi3GetIntervalDecimal for an interval that the FMU does not know yet.
-INTERVAL_NOT_YET_KNOWN = 0
 
-
-class Instance3(EventfulInstance):
+class Instance3(ClockedInstance):
     """An instance of an FMI 3.0 FMU.
 
     Parameters
@@ -62,22 +56,6 @@ class Instance3(EventfulInstance):
         if not pointer:
             self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}", ComponentFileError)
         self._pointer.value = pointer
-
-    def set_clocks(self, references: Sequence[int]) -> None:
-        """Let input clocks tick, in event mode."""
-        count = len(references)
-        places, ticks = (c_uint32 * count)(*references), (c_bool * count)(*[True] * count)
-        self.check(self._function("SetClock")(self._pointer, places, c_size_t(count), ticks), "SetClock")
-
-    def clock_times(self, reference: int) -> tuple[float, float]:
-        """Return interval and shift of a fixed input clock, s, in initialization mode; NaN if not known yet."""
-        place, one = ctypes.byref(c_uint32(reference)), c_size_t(1)
-        interval, shift, qualifier = c_double(math.nan), c_double(math.nan), c_int()
-        get_interval, get_shift = self._function("GetIntervalDecimal"), self._function("GetShiftDecimal")
-        status = get_interval(self._pointer, place, one, ctypes.byref(interval), ctypes.byref(qualifier))
-        self.check(status, "GetIntervalDecimal")
-        self.check(get_shift(self._pointer, place, one, ctypes.byref(shift)), "GetShiftDecimal")
-        return (math.nan if qualifier.value == INTERVAL_NOT_YET_KNOWN else interval.value), shift.value
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
         """Enter initialization mode at `start_time`, s, with a relative tolerance; None: the FMU's own."""

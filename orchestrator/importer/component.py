@@ -14,7 +14,12 @@ from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
-from vibroimpact.orchestrator.fmi.capabilities import NEEDS_TOOL, ONLY_ONCE, capabilities_of
+from vibroimpact.orchestrator.fmi.capabilities import (
+    NEEDED_OF_CLOCKS,
+    NEEDS_TOOL,
+    ONLY_ONCE,
+    capabilities_of,
+)
 from vibroimpact.orchestrator.fmi.exchange import (
     Exchange2,
     Exchange3,
@@ -82,10 +87,12 @@ class Component:
     has_states : bool
         It can go back to a saved state.
     ticking : frozenset of int or None
-        Value references of the input clocks that tick now: their variables may be read and written. None before the
+        Value references of the clocks that tick now: their variables may be read and written. None before the
         run begins, when all variables may be.
     event_mode : bool
         It handles events in event mode and may return early.
+    on_own_grid : bool
+        Its steps are made apart from those of the others, at multiples of its one step size.
     refuses_events : bool
         It declares an event mode, but an instance could be made only without it.
     event_times : VariableGroup or None
@@ -113,7 +120,7 @@ class Component:
         self.has_states = self.capabilities.restorable
         version = 3 if description.fmiVersion.startswith("3") else 2
         self.event_mode = events and (version == 3 or exchanges) and self.capabilities.event_mode
-        self.refuses_events = False
+        self.refuses_events = self.on_own_grid = False
         self.ticking: frozenset[int] | None = None
         self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
         self.sha256 = fmu.sha256
@@ -140,9 +147,7 @@ class Component:
         """Raise ComponentFileError where an FMU needs a capability that no importer here has."""
         if self.capabilities.refusals:
             got = " and ".join(self.capabilities.refusals)
-            raise ComponentFileError(
-                f"{self.spec.fmu}: expected input clocks of a constant or fixed interval alone, got {got}."
-            )
+            raise ComponentFileError(f"{self.spec.fmu}: expected {NEEDED_OF_CLOCKS}, got {got}.")
 
     def _take_only_instance(self) -> None:
         """Register this component as the only instance of an FMU that allows one per process."""
@@ -201,7 +206,7 @@ class Component:
         names = ", ".join(clock.name for clock in self.capabilities.clocks)
         why = "made no instance with it" if self.refuses_events else "is watched, and so runs without it"
         return ComponentError(
-            f"{self.name}: expected event mode, in which its input clock {names} ticks, got a component that {why}.",
+            f"{self.name}: expected event mode, in which its clock {names} ticks, got a component that {why}.",
             instance=self.name,
         )
 
@@ -321,11 +326,23 @@ class Component:
         for group in self._inputs:
             group.get()
 
+    def write_inputs(self) -> None:
+        """Write the inputs that `note_inputs` found."""
+        for group in self._inputs:
+            group.set()
+
     def revisit_start(self) -> None:
         """Go back to the start of the step, with the inputs that `note_inputs` found."""
         self.instance.restore(self.at_start)
-        for group in self._inputs:
-            group.set()
+        self.write_inputs()
+
+    def is_within_own_step(self, time: float) -> bool:
+        """Are the others at `time`, s, within a step of this component, which it makes later?"""
+        return self.on_own_grid and self.instance.time < time - SAME_INSTANT * (1.0 + abs(time))
+
+    def keep_own_grid(self) -> None:
+        """Leave the steps of the others: this component is never taken back, nor read within its steps."""
+        self.on_own_grid, self.has_states, self.event_times = True, False, None
 
     @contextmanager
     def taken_back(self) -> Iterator[None]:

@@ -76,15 +76,17 @@ class _Connection:
         self._displacement = target.group("Float64", [displacement])
         slope = f"{connection.target[1]}_rate"
         self._slope = target.group("Float64", [slope]) if slope in target.variables else None
-        self.residual = 0.0
+        self._target = target
+        self.begin(connection.gain)
 
     def begin(self, gain: float) -> None:
         self._gain = gain
-        self.residual = 0.0
+        self.residual = self._impulse = self._seconds = 0.0
 
     def before(self, time: float) -> None:
         self._force_start = self._force()
-        self._displacement_start = float(self._displacement.get()[0])
+        if not self._seconds:  # a receiver on its own grid may be within a step
+            self._displacement_start = float(self._displacement.get()[0])
 
     def after(self, time: float, end: float) -> None:
         applied = float(self._applied.get()[0])
@@ -92,6 +94,13 @@ class _Connection:
             applied += 0.5 * (end - time) * float(self._slope.get()[0])
         connected = 0.5 * (self._force_start + self._force())
         moved = float(self._displacement.get()[0]) - self._displacement_start
+        if self._target.on_own_grid:
+            self._impulse += connected * (end - time)
+            self._seconds += end - time
+            if self._target.is_within_own_step(end):
+                return
+            connected = self._impulse / self._seconds if self._seconds else connected
+            self._impulse = self._seconds = 0.0
         self.residual += (applied - connected) * moved
 
     def _force(self) -> float:

@@ -99,11 +99,12 @@ class EventMode:
 
         A component that fails, or never settles, raises ComponentError.
         """
-        if ticks.are_due(time):
+        if ticks:
             self._enter()
-            self._tick(time, ticks)
-        else:
-            self.begin()
+            ends = self._tick(time, ticks)
+            self.leave()
+            return ends
+        self.begin()
         ends = False
         for instance in self.instances:
             if instance.decisions.value:
@@ -112,22 +113,36 @@ class EventMode:
         self.leave()
         return ends
 
-    def _tick(self, time: float, ticks: Ticks) -> None:
-        """Let clocks tick: their variables are set and read before the event iteration ends the tick."""
-        ticks.set(time)
-        self._moves()
-        ticks.keep_values()
-        self._update()
+    def _tick(self, time: float, ticks: Ticks) -> bool:
+        """Let clocks tick until all are settled; returns whether a component requests the run's end.
+
+        The variables of a clock are set and read before the event iteration, which ends its tick.
+        """
+        ends = False
+        for _ in range(EVENT_ITERATIONS):
+            ticks.set(time)
+            self._moves()
+            while ticks.trigger():
+                self._moves()
+            ticks.keep_values()
+            self._update()
+            ticks.look(time)
+            ends = ends or any(instance.event_wants_to_end for instance in self.instances)
+            if not (ticks.are_due(time) or any(i.needs_update.value for i in self.instances)):
+                return ends
+        if ticks.are_due(time):
+            raise ticks.endless_error(time, EVENT_ITERATIONS)
+        raise self.endless_error(time)
 
     def begin_run(self, time: float, ticks: Ticks) -> bool:
         """Leave the event mode after initialization, as `resolve` does."""
         if not self.instances:
             return False
-        if ticks.are_due(time):
-            self._tick(time, ticks)
+        if ticks:
+            ends = self._tick(time, ticks)
         else:
             self._begin_run()
-        ends = self._iterate(time)
+            ends = self._iterate(time)
         self.leave()
         return ends
 

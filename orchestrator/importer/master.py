@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.importer.events import (
     StepWatcher,
     standstill_error,
 )
+from vibroimpact.orchestrator.importer.own_grid import Divisions
 from vibroimpact.orchestrator.importer.parts import parts_of
 from vibroimpact.orchestrator.importer.plain_loop import MOST_SECONDS, Made, PlainLoop
 from vibroimpact.orchestrator.importer.progress import Progress
@@ -66,6 +67,8 @@ class Importer:
     contact_steps : float
         Communication steps that a contact with a yielding stop is divided into (its law is another FMU's). The macro
         step may divide it further.
+    divisions : Divisions or None
+        The macro steps and the ends of all runs; None: `macro_step`, and multiples of it.
     log, wrap : callable or None
         Given a component's name: the receiver of its log lines, and the wrapper of its FMU's functions.
 
@@ -100,15 +103,19 @@ class Importer:
         exchange: Exchange = "gauss_seidel",
         macro_step: float = math.inf,
         contact_steps: float = CONTACT_STEPS,
+        divisions: Divisions | None = None,
         log: Callable[[str], LogTail] | None = None,
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
-        parts = parts_of(components, connections, events, contacts, pairs, contact_steps, log, wrap)
+        divisions = divisions or Divisions((macro_step,))
+        parts = parts_of(
+            components, connections, events, contacts, pairs, divisions, contact_steps, log, wrap
+        )
         self.components, self._order = parts.named, parts.components
         self.macro_step = macro_step
         self.watches, self.contacts = parts.watches, parts.contacts
         self.transfers, self.loops = parts.transfers, parts.loops
-        self.tuning, self.ticks = parts.tuning, parts.ticks
+        self.tuning, self.ticks, self.grids = parts.tuning, parts.ticks, parts.grids
         self._progress = Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
         self.watchers: list[StepWatcher] = []
@@ -157,8 +164,7 @@ class Importer:
         for component in self._order:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
             component.begin(own, start_time, first=not self._has_started)
-            if not component.capabilities.variable_steps and math.isfinite(self.macro_step):
-                component.instance.only_step = self.macro_step
+        self.grids.begin(start_time, self.macro_step)
         self._has_started = True
         settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
         self._plan.keep_up()
@@ -197,7 +203,7 @@ class Importer:
             if seconds > 0.0 and (loop := self._plan.plain_loop) is not None:
                 self._make_plain_steps(loop, end, seconds)
             else:
-                self._step(time, min(now.next_point, end, self.ticks.next))
+                self._step(time, min(now.next_point, end, self.ticks.next, self.grids.next))
 
     # ---- plain steps ----
 
@@ -246,6 +252,7 @@ class Importer:
             contacts.apply()
         if plan.prepares or self.keeps_start or contacts.active:
             self._prepare(time)
+        self.grids.take_inputs(time)
         for watcher in self.watchers:
             watcher.before(time)
         self._finish(time, target, self._step_all(time, target))
@@ -270,6 +277,7 @@ class Importer:
         now.standstill = 0 if end > time else now.standstill + 1
         if now.standstill > STANDSTILLS:
             raise standstill_error(self._stopper.instance, STANDSTILLS, time)
+        self.wants_to_end = self.grids.reach(end) or self.wants_to_end
         if self.loops.names and end > time and not self.wants_to_end:
             self._solve_loops(end)
         for watcher in self.watchers:
@@ -441,8 +449,10 @@ class Importer:
                 self.on_event(Event(self.time, index, name))
 
     def _tune(self, time: float) -> None:
-        if self.tuning and self.tuning.resolve(time):
-            self.wants_to_end = True
+        ends = bool(self.tuning) and self.tuning.resolve(time, self.ticks)
+        if self.ticks.are_due(time):  # a tuned clock ticks at once
+            ends = self._plan.event_mode.resolve(time, self.ticks) or ends
+        self.wants_to_end = self.wants_to_end or ends
 
     # ---- repeated steps ----
 

@@ -62,7 +62,7 @@ def fresh_inputs(
         answers = not component.event_mode and (not component.has_states or (bool(depends) and all(depends)))
         return earlier if not jacobi or answers else []
 
-    return {c.name: fresh(c) for c in order}
+    return {c.name: fresh(c) for c in order if c.name in incoming}
 
 
 def _drawing(connections: Sequence[ConnectionSpec]) -> set[str]:

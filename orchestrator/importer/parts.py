@@ -12,6 +12,7 @@ from vibroimpact.orchestrator.importer.contacts import ContactBonds
 from vibroimpact.orchestrator.importer.feedthrough import order_of
 from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
 from vibroimpact.orchestrator.importer.order import stepping_order
+from vibroimpact.orchestrator.importer.own_grid import Divisions, OwnGrids, cut_components
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
@@ -20,7 +21,7 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
-from vibroimpact.orchestrator.importer.ticks import Ticks
+from vibroimpact.orchestrator.importer.ticks import Ticks, joins_clocks
 from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import Transfer, transfers_of
 
@@ -39,6 +40,7 @@ class Parts:
     contacts: ContactBonds
     tuning: Tuning
     ticks: Ticks
+    grids: OwnGrids
 
 
 def parts_of(
@@ -47,25 +49,29 @@ def parts_of(
     events: Sequence[EventSpec],
     contacts: Sequence[StopContactSpec],
     pairs: Sequence[PairSpec],
+    divisions: Divisions,
     contact_steps: float,
     log: Callable[[str], LogTail] | None,
     wrap: Callable[[str], Wrapper] | None,
 ) -> Parts:
     """Return the parts for the arguments of an `Importer`; components are instantiated."""
     watched = {event.component for event in events}
-    named = {
-        spec.name: Component(
-            spec,
-            log=log(spec.name) if log else None,
-            wrap=wrap(spec.name) if wrap else None,
-            events=spec.name not in watched,
-        )
-        for spec in specs
-    }
+
+    def made(spec: ComponentSpec, *, events: bool) -> Component:
+        tail, wrapper = log(spec.name) if log else None, wrap(spec.name) if wrap else None
+        return Component(spec, log=tail, wrap=wrapper, events=events)
+
+    named = {spec.name: made(spec, events=spec.name not in watched) for spec in specs}
+    for cut in cut_components(named.values(), divisions, has_events=bool(events or contacts or pairs)):
+        if cut.event_mode:  # its events lie inside its own steps
+            cut.free()
+            named[cut.name] = made(cut.spec, events=False)
+        named[cut.name].keep_own_grid()
     watches = [Watch(named[event.component], event) for event in events]
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
+    clocks = [c for c in connections if joins_clocks(c, named)]
     tuned = [c for c in connections if is_tunable(c, named)]
-    connections = [c for c in connections if c not in tuned]
+    connections = [c for c in connections if c not in tuned and c not in clocks]
     transfers = transfers_of(order_of(connections, named), named)
     parts = Parts(
         named=named,
@@ -74,7 +80,8 @@ def parts_of(
         watches=watches,
         tuning=Tuning(named, tuned, transfers),
         loops=LoopSolver(connections, named, transfers),
-        ticks=Ticks(named.values()),
+        grids=OwnGrids(named.values()),
+        ticks=Ticks(named.values(), clocks),
         contacts=ContactBonds(named, transfers, connections, contacts, pairs, contact_steps),
     )
     fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]

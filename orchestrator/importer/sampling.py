@@ -1,8 +1,8 @@
 """Sampling recorded variables on a time grid without disturbing the steps.
 
 A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
-The run is the same, bit for bit, with and without sampling. A component without states is read at the communication
-points, with straight lines between them.
+The run is the same, bit for bit, with and without sampling. A component without states, or with one step size, is read
+at the communication points, with straight lines between them. On a grid of its own its values are held.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Probe:
             alike.setdefault(key, []).append((place, name))
         for (kind, _), chosen in alike.items():
             self.groups.append(([i for i, _ in chosen], component.group(kind, [name for _, name in chosen])))
-        self.before = np.zeros(0)
+        self.is_revisited = component.has_states and component.capabilities.variable_steps
 
     def read(self, row: NDArray[np.float64]) -> None:
         """Write the present values into their columns of a row."""
@@ -110,7 +110,7 @@ class Sampler:
     def _before_step(self, time: float) -> None:
         self._start_row = np.empty(self._width)
         for probe in self._probes:
-            if not probe.component.has_states:
+            if not probe.is_revisited:
                 probe.read(self._start_row)
 
     def _after_step(self, time: float, end: float) -> None:
@@ -128,7 +128,7 @@ class Sampler:
         for row, instant in zip(rows, instants, strict=True):
             row[0] = instant
         for probe in self._probes:
-            if probe.component.has_states:
+            if probe.is_revisited:
                 self._revisit(probe, time, instants, rows)
             else:
                 self._interpolate(probe, time, end, instants, rows)
@@ -164,5 +164,5 @@ class Sampler:
         probe.read(last)
         columns = probe.columns
         for row, instant in zip(rows, instants, strict=True):
-            share = (instant - time) / (end - time)
+            share = 0.0 if probe.component.on_own_grid else (instant - time) / (end - time)
             row[columns] = (1.0 - share) * self._start_row[columns] + share * last[columns]

@@ -67,13 +67,14 @@ class StepPlan:
         # moves in a loop, between two solutions, would multiply changes by its gain
         self.looping = [t for t in parts.transfers if parts.loops.solves(t)]
         straight = [t for t in parts.transfers if t not in self.looping]
-        incoming = {c.name: [t for t in straight if t.target is c] for c in parts.components}
+        together = [c for c in parts.components if not c.on_own_grid]
+        incoming = {c.name: [t for t in straight if t.target is c] for c in together}
         fresh = fresh_inputs(parts.components, incoming, jacobi=self._is_jacobi)
         refreshed = [t for ts in fresh.values() for t in ts]
         behind = [t for t in parts.transfers if t not in refreshed]
         self.start_moves = moves_of(t for t in behind if t not in self.looping) or None
         self.moves_after_loops = moves_of(straight)
-        paths = [(c, moves_of(fresh[c.name]) or None) for c in parts.components]
+        paths = [(c, moves_of(fresh[c.name]) or None) for c in together]
         # components that cannot go back wait for the last repetition
         repeats = self.iterates or bool(parts.contacts)
         self.paths = [path for path in paths if path[0].has_states or not repeats]
@@ -104,7 +105,14 @@ class StepPlan:
 
     def _made_loop(self) -> PlainLoop | None:
         parts = self._parts
-        if self.iterates or self.stateless_paths or parts.watches or parts.tuning or parts.ticks:
+        if (
+            self.iterates
+            or self.stateless_paths
+            or parts.watches
+            or parts.tuning
+            or parts.ticks
+            or parts.grids
+        ):
             return None
         components, inputs = zip(*self.paths, strict=True)
         events = self.event_mode

@@ -12,6 +12,7 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS
 from vibroimpact.orchestrator.importer.feedthrough import order_of
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.ticks import Ticks
 from vibroimpact.orchestrator.importer.wiring import Transfer, transfers_of
 
 
@@ -48,8 +49,10 @@ class Tuning:
         """Note the first values of the parameters, which initialization has set."""
         self._given = [transfer.write.values.copy() for transfer in self.transfers]
 
-    def resolve(self, time: float) -> bool:
+    def resolve(self, time: float, ticks: Ticks) -> bool:
         """Write the changed parameters at `time`, s; returns whether a component requests the end of the run.
+
+        Clocks whose intervals depend on them are asked for the new intervals.
 
         ComponentError: a component fails, or never settles.
         """
@@ -60,11 +63,11 @@ class Tuning:
             values = transfer.take()
             if not np.array_equal(values, given):
                 given[:] = values
-                ends = _give(transfer, time) or ends
+                ends = _give(transfer, time, ticks) or ends
         return ends
 
 
-def _give(transfer: Transfer, time: float) -> bool:
+def _give(transfer: Transfer, time: float, ticks: Ticks) -> bool:
     """Write parameters, in event mode where their component has one."""
     instance = transfer.target.instance
     if not (transfer.target.event_mode and isinstance(instance, EventfulInstance)):
@@ -86,5 +89,6 @@ def _give(transfer: Transfer, time: float) -> bool:
             log=instance.log.take(),
         )
     ends = instance.event_wants_to_end
+    ticks.look(time, transfer.target)
     instance.check(instance.enter_step_call(), "EnterStepMode")
     return ends

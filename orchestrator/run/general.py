@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts, im
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.own_grid import Divisions, step_remarks
 from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.run.empty_record import MOST_CONTACTS, records_impacts
@@ -29,11 +30,19 @@ from vibroimpact.orchestrator.run.record import (
 )
 from vibroimpact.orchestrator.run.runner import Runner
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.component_numbers import component_variable
+from vibroimpact.orchestrator.scene.component_numbers import component_variable, is_step
 
 NO_ROWS = np.empty((0, 3))
 #: Added to rows of events, whose column of components counts from 0; the dataset counts from 1.
 COUNTED_FROM_ONE = np.array([0.0, 0.0, 1.0])
+
+
+def _divisions(scene: Scene) -> Divisions:
+    """Return the times that divide the runs of a scene."""
+    swept = [axis.values for axis in scene.sweep if is_step(scene.components, axis.key)]
+    record = scene.record
+    ends = (record.transient_time, record.transient_time + record.recorded_time)
+    return Divisions(tuple(map(float, swept[0])) if swept else (scene.macro_step,), ends)
 
 
 class GeneralRunner(Runner):
@@ -84,6 +93,7 @@ class GeneralRunner(Runner):
             scene.pairs,
             exchange=scene.execution.exchange,
             macro_step=scene.macro_step,
+            divisions=_divisions(scene),
             log=self._log,
             wrap=self._wrap,
         )
@@ -182,12 +192,13 @@ class GeneralRunner(Runner):
                 f"{len(self.scene.contacts)} contacts: of more than {MOST_CONTACTS} no impacts are kept"
             )
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
-        remarks += self._importer.loops.remarks()
+        remarks += [*self._importer.loops.remarks(), *self._importer.ticks.remarks()]
         remarks += [
             f"{name} made no instance with the event mode that it declares, and ran without"
             for name, component in self._importer.components.items()
             if component.refuses_events
         ]
+        remarks += self._remarks_on_steps()
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:
@@ -195,6 +206,18 @@ class GeneralRunner(Runner):
                     f"others, which could not be taken back, had been stepped to {self._importer.overrun:.17g}"
                 )
         return remarks
+
+    def _remarks_on_steps(self) -> list[str]:
+        """Return the remarks on components whose steps have sizes of their own."""
+        rate, first = self.scene.sampling_rate, self.scene.record.transient_time
+        sampled = {component_variable(name)[0] for name in self.scene.sampled} if rate else set()
+        return self._importer.grids.remarks() + [
+            remark
+            for name, component in self._importer.components.items()
+            for remark in step_remarks(
+                component, self._importer.macro_step, (first, 1.0 / rate) if name in sampled else None
+            )
+        ]
 
     def _set_gains(self, scene: Scene) -> None:
         changed = False

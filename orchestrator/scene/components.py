@@ -14,7 +14,7 @@ from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.shipped import letters_of
-from vibroimpact.orchestrator.fmi.capabilities import ONLY_ONCE
+from vibroimpact.orchestrator.fmi.capabilities import NEEDED_OF_CLOCKS, ONLY_ONCE
 from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.scene.component_facts import (
     MODEL_EXCHANGE,
@@ -198,10 +198,7 @@ def _facts(fmu: Path, run_as: RunAs, path: tuple[str, ...], problems: list[Probl
         problems.append(Problem(key_path((*path, "run_as")), "a kind that the FMU has", got))
         return None
     for needed in facts.capabilities.refusals:
-        expected = (
-            "an FMU whose clocks are input clocks of a constant or fixed interval, and that has an event mode"
-        )
-        problems.append(Problem(where, expected, f"{needed} of {facts.file}"))
+        problems.append(Problem(where, NEEDED_OF_CLOCKS, f"{needed} of {facts.file}"))
     return facts
 
 

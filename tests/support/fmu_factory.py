@@ -34,6 +34,7 @@ MODELS = {
     "Single": "single.c",
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
+    "Timed": "timed.c",
 }
 #: First letters of the C files of a model's adapters, without the version.
 ADAPTERS = {"Exchanged": "exchange"}
@@ -88,6 +89,15 @@ def clocked(folder: Path) -> Path:
     `interval` and `shift` (s) belong to its second clock.
     """
     return _write("Clocked", "3.0", folder)
+
+
+def timed(folder: Path) -> Path:
+    """Write a model of FMI 3.0 with tunable, changing, countdown and triggered clocks; it refuses missed ticks.
+
+    Input `u` (at ticks of `hit`); outputs `beats`, `strides`, `fuses`, `hits`, `sum`, `last`, `gated`; parameters
+    `period` (tunable), `shift`, `delay` (s).
+    """
+    return _write("Timed", "3.0", folder)
 
 
 def single(folder: Path, fmi: str = "3.0") -> Path:

@@ -59,7 +59,7 @@ class PlainContact:
     ) -> None:
         self._name, self._spec = connection_name(connection), spec
         self._stop = AskedStop(components[spec.stop], spec)
-        body = components[spec.body]
+        body = self._body = components[spec.body]
         self._motion = body.group("Float64", [spec.displacement, spec.velocity])
         self._applied = body.group("Float64", [spec.force])
         self._yields = False
@@ -68,7 +68,7 @@ class PlainContact:
     def begin(self, gain: float) -> None:
         """Start a run with this gain."""
         self._gain = gain
-        self._has_started = False
+        self._has_started = self._is_within = False
         self._work = ContactWork()
         self.residual = 0.0
 
@@ -79,15 +79,18 @@ class PlainContact:
             if self._yields:
                 self._stop.begin()
             self._has_started = True
-        if self._yields:
-            self._start = self._look()
+        if self._yields and not self._is_within:
+            self._start, self._began = self._look(), time
             self._stop.mark(time)
 
     def after(self, time: float, end: float) -> None:
         """Compare the work of the force over the step with that of the law."""
         if not (self._yields and end > time):
             return
-        path = StepPath(*self._start, *self._look(), end - time)
+        self._is_within = self._body.is_within_own_step(end)
+        if self._is_within:
+            return
+        path = StepPath(*self._start, *self._look(), end - self._began)
         surface = self._stop.surface
         if surface is not None and max(path.start, path.end) < surface and path.turn is None:
             work = 0.0

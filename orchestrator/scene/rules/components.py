@@ -111,9 +111,22 @@ def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> P
         is_input = variable.causality == "input"
         hint = "Connect the output that feeds it." if is_input else ""
         return Problem(where, "an output, a local variable or a parameter", got, hint)
+    if variable.kind == "clock":
+        return _clock_problem(draft, where, end, reference)
     if variable.kind not in NUMERIC_KINDS or not variable.scalar:
         return Problem(where, "a number, or true or false", f"the {variable.shape} {reference}")
     return None
+
+
+def _clock_problem(draft: GeneralDraft, where: str, end: str, reference: str) -> Problem | None:
+    """Return the problem of a clock in a connection: an output clock triggers input clocks that no time triggers."""
+    facts = draft.facts(reference)
+    clocks = facts.capabilities.clocks if facts else ()
+    found = next((clock for clock in clocks if clock.name == component_variable(reference)[1]), None)
+    if found is None or (not found.is_timed and found.is_input == (end == "to")):
+        return None  # a clock without ticks is a problem of its FMU
+    expected = "an output clock" if end == "from" else "a triggered input clock"
+    return Problem(where, expected, f"the {found.variability} clock {reference}")
 
 
 def _gain_unit(connection: ConnectionTable, place: int) -> tuple[Unit | None, list[Problem]]:

@@ -4,14 +4,14 @@
 #include <string.h>
 
 enum { TIME = 0 };
-static const double GRAVITY = 9.81, RESTITUTION = 0.8, MILLION = 1e6;
+static const double GRAVITY = 9.81, RESTITUTION = 0.8, MILLION = 1e6, ROOM = 1e-9;
 
 void exchanged_start(exchanged *m)
 {
     memset(m, 0, sizeof *m);
     m->real[X] = m->scale = 1.0;
     m->real[AT] = 0.25;
-    m->next = INFINITY;
+    m->next = m->fuse = INFINITY;
 }
 
 static int kind_of(const exchanged *m)
@@ -48,6 +48,7 @@ answer exchanged_rates(exchanged *m, double rates[2])
     switch (kind_of(m)) {
     case BALL: rates[1] = -GRAVITY; return ANSWER_OK;
     case STAIRS: rates[1] = 0.0; return ANSWER_OK;
+    case CLOCKED: rates[1] = 0.0; return m->is_lit || m->real[TIME] > m->fuse + ROOM ? ANSWER_ERROR : ANSWER_OK;
     case SHORT_RATES: return is_far(m) ? ANSWER_DISCARD : ANSWER_OK;
     case NAN_RATES: rates[1] = is_far(m) ? (double)NAN : rates[1]; return ANSWER_OK;
     case RATES_FAIL: return is_late ? ANSWER_ERROR : ANSWER_OK;
@@ -107,6 +108,23 @@ static void tick(exchanged *m, decisions *made)
     }
 }
 
+bool exchanged_tick(exchanged *m, unsigned clock)
+{
+    const bool is_due = clock == TICK || (clock == FUSE && fabs(m->fuse - m->real[TIME]) <= ROOM);
+    m->clock = clock;
+    return is_due && m->mode == EVENT_MODE;
+}
+
+static void end_tick(exchanged *m, decisions *made)
+{
+    m->real[COUNT] += m->clock == TICK;
+    m->real[V] = m->clock == TICK ? m->real[V] + 1.0 : 0.0;
+    m->is_lit = m->is_lit || (m->clock == TICK && m->real[COUNT] == 3.0);
+    m->fuse = m->clock == FUSE ? (double)INFINITY : m->fuse;
+    m->clock = 0;
+    made->values = true;
+}
+
 answer exchanged_update(exchanged *m, decisions *made)
 {
     const int kind = kind_of(m);
@@ -129,6 +147,9 @@ answer exchanged_update(exchanged *m, decisions *made)
         } else {
             tick(m, made);
         }
+    }
+    if (m->clock != 0) {
+        end_tick(m, made);
     }
     m->settled = true;
     made->has_next = m->next < (double)INFINITY;

@@ -5,6 +5,9 @@
 
 #include <stdbool.h>
 
+/* Clocks, of FMI 3.0. */
+enum { TICK = 40, FUSE };
+
 /* Value references; 0 is the time. */
 enum { X = 1, V, U, COUNT, KIND, AT, STEPS, NOMINALS, REALS, D = 20 };
 
@@ -26,6 +29,7 @@ enum {
     RATES_END,        /* NaN derivatives from `at` on */
     STUCK,            /* a time event at the present time, again and again */
     RATES_FATAL,      /* fatal error of the derivatives from `at` on */
+    CLOCKED,          /* clocks: each tick adds 1 to v; a countdown of `at`, lit by the third, stops the mass */
     KINDS
 };
 
@@ -39,6 +43,9 @@ typedef struct {
     double completed, next, scale; /* s; s; factor of states and nominal values */
     mode mode;
     bool settled, has_stopped;
+    unsigned clock;    /* that ticks now; 0: none */
+    bool is_lit;       /* the countdown runs, and the importer does not know yet */
+    double fuse;       /* end of the countdown, s */
 } exchanged;
 
 typedef struct {
@@ -52,6 +59,8 @@ answer exchanged_rates(exchanged *m, double rates[2]);
 answer exchanged_indicators(exchanged *m, double *indicator);
 void exchanged_completed(exchanged *m, bool *event, bool *ends);
 answer exchanged_update(exchanged *m, decisions *made);
+/* False: the clock is not due. */
+bool exchanged_tick(exchanged *m, unsigned clock);
 bool exchanged_set_d(exchanged *m, int d);
 bool exchanged_set_real(exchanged *m, unsigned reference, double value);
 /* NAN for an unknown reference. */

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { MODEL_VALUES = 10 };
+enum { MODEL_VALUES = 20 };
 
 /* Call in which an adapter is, as `fault_place` in the model descriptions of Faulty. */
 typedef enum {
