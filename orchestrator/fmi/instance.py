@@ -201,9 +201,7 @@ class Instance(ABC):
         """Return a group of variables of type String with `size` texts, read in one call."""
         functions = self._function("GetString"), self._function("SetString")
         with_value_count = self.fmi_version == "3.0"
-        return TextGroup(
-            functions, self._pointer, references, size, self, with_value_count=with_value_count
-        )
+        return TextGroup(functions, self._pointer, references, size, self, with_value_count=with_value_count)
 
     def set_texts(self, reference: int, texts: Sequence[str]) -> None:
         """Set a variable of type String; the FMU keeps a copy.

@@ -183,7 +183,9 @@ class LoopSolver:
 
     def _loop(self, members: tuple[int, ...], allowed: Graph) -> Loop:
         elements = [(i, link) for i in members for link in self._elements(i)]
-        depends = tuple(frozenset(k for k, (j, _) in enumerate(elements) if j in allowed[i]) for i, _ in elements)
+        depends = tuple(
+            frozenset(k for k, (j, _) in enumerate(elements) if j in allowed[i]) for i, _ in elements
+        )
         key = (members, depends)
         if key not in self._made:
             self._made[key] = Loop([link for _, link in elements], depends, self._slopes)
