@@ -194,7 +194,9 @@ def _rows_of(dataset: xr.Dataset, dimension: str) -> list[Any]:
             f"Set {_RECORD_KEYS[dimension]} under [record] in the scene and run it again."
         )
     return [
-        name for name, v in dataset.variables.items() if v.dims == (dimension,) and name != f"{dimension}_run"
+        name
+        for name, v in dataset.variables.items()
+        if v.dims[:1] == (dimension,) and name != f"{dimension}_run"
     ]
 
 

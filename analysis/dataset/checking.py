@@ -27,6 +27,7 @@ from vibroimpact.analysis.dataset.schema import (
     Outcome,
     UnitSystem,
     constant_names,
+    is_of_samples,
     swept_names,
     variable_rule,
 )
@@ -151,9 +152,9 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
         rule = variable_rule(name)
     problems = []
     if rule is None:
-        if variable.dims not in ((), ("run",), ("sample",)):
+        if variable.dims not in ((), ("run",)) and variable.dims[0] != "sample":
             problems.append(f"{name}: expected dimensions of a parameter or a sample, got {variable.dims}.")
-        if variable.dtype != np.float64:
+        if variable.dtype != np.float64 and not is_of_samples(variable.dims, variable.dtype):
             problems.append(f"{name}: expected float64, got {variable.dtype}.")
     else:
         if variable.dims != rule.dims:

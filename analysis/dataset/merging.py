@@ -167,6 +167,15 @@ def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Datase
             raise DatasetError(
                 f"{name}: {dimension}: expected the size {expected} of {first_name}, got {got}."
             )
+    for variable, one in first.variables.items():
+        expected, got = (
+            one.shape[1:],
+            part.variables[variable].shape[1:] if variable in part.variables else (),
+        )
+        if one.dims[:1] == ("sample",) and expected != got:
+            raise DatasetError(
+                f"{name}: {variable}: expected samples of the shape {expected} of {first_name}, got {got}."
+            )
     _refuse_other_meaning(name, part, first_name, first)
 
 

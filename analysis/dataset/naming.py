@@ -30,6 +30,10 @@ _QUANTITY_UNITS = {
 }
 
 
+LONGEST_NAME = 180
+"""Most characters of a quantity in a name, besides its number: NetCDF takes 256, stores here 200."""
+
+
 @dataclass(frozen=True, slots=True)
 class SampleRule:
     """The schema's entry for a sampled variable of a body; `unit` is its SI unit.
@@ -86,7 +90,8 @@ def file_name_of(quantity: str) -> str:
 def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAMES) -> tuple[str, ...]:
     """Return a unique name in a file for each quantity, in order.
 
-    A name that is taken already gets a number, also where it differs in case only, as CF advises.
+    A name that is taken already gets a number, also where it differs in case only, as CF advises. A name is cut after
+    `LONGEST_NAME` characters.
 
     Parameters
     ----------
@@ -111,6 +116,7 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
         plain = file_name_of(quantity)
         # CF wants a letter first.
         base = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
+        base = base[:LONGEST_NAME].rstrip("_")
         choices = (base, *(f"{base}_{number}" for number in range(2, len(used) + 3)))
         name = next(choice for choice in choices if choice.lower() not in used)
         used.add(name.lower())

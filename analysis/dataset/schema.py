@@ -126,7 +126,9 @@ class RunRecord:
     sticks : ndarray of float, shape (stick, 3), or None
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None
-        Time (s), then the sampled variables.
+        Time (s), then the sampled variables without a form of their own.
+    formed_samples : tuple of ndarray, each of shape (sample, ...), or None
+        The sampled variables with a form (`sample_forms`): arrays, texts, enumerations, integers of 64 bits.
     final_displacement, final_velocity, final_phase : float
         State (m, m/s) and forcing phase (rad) at the end, from which a sweep continues.
     seconds : float
@@ -151,6 +153,7 @@ class RunRecord:
     impacts: NDArray[np.float64] | None = None
     sticks: NDArray[np.float64] | None = None
     samples: NDArray[np.float64] | None = None
+    formed_samples: tuple[NDArray[Any], ...] | None = None
     final_displacement: float = np.nan
     final_velocity: float = np.nan
     final_phase: float = np.nan
@@ -342,6 +345,8 @@ RESERVED_NAMES = frozenset(
     | {"run_id", "displacement_range"}
 )
 """Names that mean something in a stored or opened dataset; nothing else may take them."""
+SAMPLE_TYPES = (np.float64, np.int64, np.uint64)
+"""Types of the numbers of sampled variables; these may be texts, too."""
 SWEPT_ALONG = "swept_along"
 """Attribute of a swept parameter: the dimension it shares with the parameters that move with it."""
 DRAW = "draw"
@@ -371,6 +376,11 @@ def variable_rule(name: str) -> VariableRule | None:
         return RULES[name]
     own = next((each for each in POINT_COLUMNS if name.startswith(f"{each}_")), None)
     return None if own is None else replace(RULES[own], name=name)
+
+
+def is_of_samples(dims: tuple[Any, ...], dtype: np.dtype[Any]) -> bool:
+    """Return whether dimensions and type are those of a sampled variable: one value or an array for each sample."""
+    return dims[:1] == ("sample",) and (dtype in SAMPLE_TYPES or dtype.kind in "OUT")
 
 
 def known_rule(name: str) -> VariableRule:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from vibroimpact.analysis.dataset.columns import (
 )
 from vibroimpact.analysis.dataset.naming import file_names, known_unit, quantity_unit, sample_rule
 from vibroimpact.analysis.dataset.registering import accessor  # noqa: F401  # for `ds.vibroimpact`
+from vibroimpact.analysis.dataset.sample_forms import SampleForm, axis_names
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -71,6 +73,7 @@ def build_dataset(
     further: Sequence[str] = (),
     measured: Mapping[str, NDArray[Any]] | None = None,
     constants: Mapping[str, Described] | None = None,
+    sample_forms: Mapping[str, SampleForm] | None = None,
 ) -> xr.Dataset:
     """Build the one-dimensional dataset of some runs, as it is written to a file.
 
@@ -84,8 +87,8 @@ def build_dataset(
     run_index : ndarray of int, shape (run,)
         Index of each run in its campaign.
     sample_variables : sequence of str
-        Names of the sampled variables, in the order of columns 1 on of `RunRecord.samples`; `component.variable`
-        in a general scene. In the file they have the names that `file_names` gives.
+        Names of the sampled variables; `component.variable` in a general scene. In the file they have the names that
+        `file_names` gives. Those without a form are in columns 1 on of `RunRecord.samples`, in their order.
     units : {"SI", "nondimensional"}
         Units of the scene.
     attrs : mapping, optional
@@ -112,6 +115,8 @@ def build_dataset(
         `schema.ORBIT_COLUMNS`.
     constants : mapping of str to tuple, optional
         Numbers that are the same for all runs, as `described_constants` gives them.
+    sample_forms : mapping of str to SampleForm, optional
+        Forms of sampled variables that are no plain numbers, in the order of `RunRecord.formed_samples`.
 
     Returns
     -------
@@ -136,8 +141,11 @@ def build_dataset(
     columns, records = (runs, ()) if isinstance(runs, RunColumns) else (columns_of(runs), runs)
     variables = _described({"run_index": run_index, "direction": direction}, units)
     variables |= _column_variables(columns, units, omit, each_period, further)
-    samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
-    variables |= _sample_variables(columns.samples, samples)
+    forms = sample_forms or {}
+    samples = _Samples(
+        sample_variables, event_components, frozenset(coordinates), unit_of or {}, units, forms
+    )
+    variables |= _sample_variables(columns.samples, [run.formed_samples for run in records], samples)
     variables |= _event_variables(records, event_components, units)
     variables |= _coupling_variables(records, connections, units)
     variables |= _score_variables(records, compared, units)
@@ -254,6 +262,7 @@ class _Samples:
     swept: Collection[str]
     unit_of: Mapping[str, str]
     units: UnitSystem
+    forms: Mapping[str, SampleForm]
 
     def attributes(self, name: str, stored: str) -> dict[str, Any]:
         """Return the attributes of a variable that is stored under another name than in its component."""
@@ -269,21 +278,48 @@ class _Samples:
         return attributes if stored == name else attributes | {"long_name": name, "component_variable": name}
 
 
-def _sample_variables(samples: Ragged | None, known: _Samples) -> _Variables:
-    """Return the time series: `time` and the sampled variables."""
+def _sample_variables(
+    samples: Ragged | None, formed: Sequence[tuple[NDArray[Any], ...] | None], known: _Samples
+) -> _Variables:
+    """Return the time series: `time` and the sampled variables; `formed` has those with a form, for each run."""
     variables = _ragged_variables("sample", samples, ("time",), known.units)
     if samples is None:
         return {}
-    if samples.rows.shape[1] != 1 + len(known.names):
+    plain = [name for name in known.names if name not in known.forms]
+    if samples.rows.shape[1] != 1 + len(plain):
         raise DatasetError(
-            f"dataset: samples: expected time and {len(known.names)} variables ({names_list(known.names)}), "
+            f"dataset: samples: expected time and {len(plain)} variables ({names_list(plain)}), "
             f"got {samples.rows.shape[1]} columns."
         )
-    stored_names = file_names(known.names, RESERVED_NAMES | set(known.swept))
-    for column, (name, stored) in enumerate(zip(known.names, stored_names, strict=True), start=1):
-        values = np.ascontiguousarray(samples.rows[:, column])
-        variables[stored] = (("sample",), values, known.attributes(name, stored))
+    taken = RESERVED_NAMES | set(known.swept)
+    stored = dict(zip(known.names, file_names(known.names, taken), strict=True))
+    own = [stored[name] for name in known.forms]
+    taken |= set(stored.values())
+    axes = dict(zip(known.forms, axis_names(own, [*known.forms.values()], taken), strict=True))
+    tables = dict(zip(known.forms, _formed_tables(formed, samples, known.forms), strict=True))
+    columns = iter(samples.rows[:, 1:].T)
+    for name, file in stored.items():
+        values = tables[name] if name in tables else np.ascontiguousarray(next(columns))
+        dims, form = ("sample", *axes.get(name, ())), known.forms.get(name)
+        variables[file] = (dims, values, known.attributes(name, file) | (form.attributes() if form else {}))
     return variables
+
+
+def _formed_tables(
+    formed: Sequence[tuple[NDArray[Any], ...] | None], samples: Ragged, forms: Mapping[str, SampleForm]
+) -> list[NDArray[Any]]:
+    """Return the samples of all runs of each variable with a form."""
+    rows = int(samples.count.sum())
+    tables = []
+    for place, (name, form) in enumerate(forms.items()):
+        parts = [form.empty(), *(run[place] for run in formed if run is not None)]
+        table = np.concatenate(parts) if all(part.shape[1:] == form.shape for part in parts) else form.empty()
+        if len(table) != rows:
+            raise DatasetError(
+                f"dataset: {name}: expected {rows} samples of the shape {form.shape}, got others."
+            )
+        tables.append(table)
+    return tables
 
 
 def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units: UnitSystem) -> _Variables:
@@ -404,6 +440,8 @@ def define_variable(
     is_text = variable.dtype.kind == "O"
     kind: Any = str if is_text else variable.dtype
     level: Any = compression
+    further = variable.shape[1:]
+    texts = max(1, min(_TEXT_CHUNK, size) // max(1, math.prod(further)))
     placed = file.createVariable(
         one.name,
         kind,
@@ -412,7 +450,7 @@ def define_variable(
         compression="zlib" if compression and not is_text else None,
         complevel=level,
         shuffle=True,
-        chunksizes=[min(_TEXT_CHUNK, size)] if is_text and size else None,
+        chunksizes=[texts, *further] if is_text and size else None,
     )
     placed.setncatts({**variable.attrs, "coordinates": one.linked} if one.linked else dict(variable.attrs))
     return placed
@@ -423,6 +461,7 @@ def store_texts(placed: netCDF4.Variable[Any], texts: NDArray[Any], first: int =
 
     An element that was never stored reads as empty, and takes no space.
     """
-    places = np.flatnonzero(texts.astype(bool))
+    filled = texts.astype(bool)
+    places = np.flatnonzero(filled.any(axis=tuple(range(1, texts.ndim))) if texts.ndim > 1 else filled)
     for block in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else ():
         placed[first + block[0] : first + block[-1] + 1] = texts[block]

@@ -14,7 +14,7 @@ MOST_VALUES = 1 << 40
 """Largest announced number of values of an array."""
 MOST_CHUNK_BYTES = 1 << 28
 """Largest size of a chunk in memory, bytes: a chunk is expanded as a whole."""
-_BYTES = {"float64": 8, "int8": 1, "int16": 2, "int32": 4, "int64": 8, "string": 16}
+_BYTES = {"float64": 8, "int8": 1, "int16": 2, "int32": 4, "int64": 8, "uint64": 8, "string": 16}
 _CODECS = frozenset({"bytes", "blosc", "zstd", "vlen-utf8", "crc32c", "sharding_indexed"})
 
 

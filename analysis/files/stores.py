@@ -260,6 +260,10 @@ def kind_of(array: Any) -> np.dtype[Any]:
     return np.dtype(object) if array.dtype.kind in "OUT" else np.dtype(array.dtype).newbyteorder("=")
 
 
+_MISSING = {"f": math.nan, "u": 0}
+"""Values of cells that are never written, by the kind of numpy; rows, the only unsigned numbers, are all written."""
+
+
 def new_array(
     group: Any,
     name: str,
@@ -285,7 +289,7 @@ def new_array(
             chunks=chunk,
             shards=None if shard == chunk else shard,
             compressors=(packed, Crc32cCodec()),
-            fill_value="" if is_text else math.nan if kind == "f" else -1,
+            fill_value="" if is_text else _MISSING.get(kind, -1),
             attributes=attributes,
             dimension_names=dims,
         )

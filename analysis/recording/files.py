@@ -339,12 +339,16 @@ def _run_signals(flat: Any, row: int, title: str) -> Recording:
         part = flat.isel(sample=rows("sample"))
         axes = {0.0: TimeAxis.through(part.time.values, "simulated")}
         for name, variable in part.data_vars.items():
-            if variable.dims == ("sample",) and name != "time":
+            # a channel is a number for each sample: arrays and texts are none
+            if variable.dims == ("sample",) and variable.dtype.kind in "fiu" and name != "time":
                 unit = "1" if nondimensional else str(variable.attrs["units"])
                 chain = chain_of(variable.attrs, flat, row)
                 if chain.skew not in axes:
                     axes[chain.skew] = TimeAxis.through(part.time.values + chain.skew, "simulated")
-                values, label = variable.values, str(variable.attrs["long_name"])
+                values, label = (
+                    variable.values.astype(np.float64, copy=False),
+                    str(variable.attrs["long_name"]),
+                )
                 attrs = {"role": "simulated", **chain.attrs}
                 channels[str(name)] = Channel(
                     str(name), values, unit, axes[chain.skew], chain.quality(values), label, attrs

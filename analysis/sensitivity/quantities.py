@@ -44,7 +44,7 @@ def _recorded(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
     if "event_count" in there:
         yield "event_count", dataset["event_count"]
     for name in _sampled(dataset):
-        squares = _sums(dataset, dataset[name].values ** 2)
+        squares = _sums(dataset, dataset[name].values.astype(np.float64) ** 2)
         root = (squares / dataset["sample_count"].where(dataset["sample_count"] > 0)) ** 0.5
         yield f"{name}_rms", _named(root, _unit(dataset, name), f"root mean square of {name}")
     if "variance_accounted_for" in there:
@@ -56,7 +56,11 @@ def _recorded(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
 def _sampled(dataset: xr.Dataset) -> list[str]:
     """Return the sampled variables of a dataset."""
     coordinates = {*RULES, *swept_names(dataset), "sample_run"}
-    return [str(n) for n, v in dataset.variables.items() if v.dims == ("sample",) and n not in coordinates]
+    return [
+        str(name)
+        for name, one in dataset.variables.items()
+        if one.dims == ("sample",) and one.dtype.kind in "fiu" and name not in coordinates
+    ]
 
 
 def _sums(dataset: xr.Dataset, values: Floats) -> xr.DataArray:

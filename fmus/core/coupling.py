@@ -46,6 +46,7 @@ class CouplingCall(Structure):
         ("value_count", c_size_t),
         ("from", c_void_p),
         ("gains", c_void_p),
+        ("offsets", c_void_p),
         ("note", c_int64),
         ("kind", c_int32),
         ("place", c_int32),

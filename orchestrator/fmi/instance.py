@@ -17,7 +17,7 @@ from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.library import Function, Library
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual
-from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
+from vibroimpact.orchestrator.fmi.variables import DTYPES, TextGroup, VariableGroup
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 #: noSetFMUStatePriorToCurrentPoint of every step. An importer here restores only states saved at the start of the step
@@ -197,18 +197,24 @@ class Instance(ABC):
             with_value_count=self.fmi_version == "3.0",
         )
 
-    def set_text(self, reference: int, text: str) -> None:
+    def text_group(self, references: Sequence[int], size: int) -> TextGroup:
+        """Return a group of variables of type String with `size` texts, read in one call."""
+        functions = self._function("GetString"), self._function("SetString")
+        with_value_count = self.fmi_version == "3.0"
+        return TextGroup(functions, self._pointer, references, size, self, with_value_count=with_value_count)
+
+    def set_texts(self, reference: int, texts: Sequence[str]) -> None:
         """Set a variable of type String; the FMU keeps a copy.
 
         Parameters
         ----------
         reference : int
             Value reference.
-        text : str
-            Text without null characters, which would end it in C.
+        texts : sequence of str
+            Texts without null characters, which would end them in C: one, or one for each element of an array.
         """
-        values = (ctypes.c_char_p * 1)(text.encode())
-        value_count = (ctypes.c_size_t(1),) if self.fmi_version == "3.0" else ()
+        values = (ctypes.c_char_p * max(1, len(texts)))(*(text.encode() for text in texts))
+        value_count = (ctypes.c_size_t(len(texts)),) if self.fmi_version == "3.0" else ()
         call = self._function("SetString")
         status = call(
             self._pointer, ctypes.byref(ctypes.c_uint32(reference)), ctypes.c_size_t(1), values, *value_count
@@ -216,6 +222,14 @@ class Instance(ABC):
         self.check(status, "SetString")
 
     # ---- life ----
+
+    def enter_configuration(self) -> None:
+        """Enter configuration mode, in which FMI 3.0 sets structural parameters, before initialization."""
+        self.check(self._function("EnterConfigurationMode")(self._pointer), "EnterConfigurationMode")
+
+    def exit_configuration(self) -> None:
+        """Leave configuration mode: the sizes of arrays follow the structural parameters."""
+        self.check(self._function("ExitConfigurationMode")(self._pointer), "ExitConfigurationMode")
 
     @abstractmethod
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:

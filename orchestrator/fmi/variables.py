@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ class Owner(Protocol):
 
     def check(self, status: int, function: str) -> None:
         """Raise unless a call ended with at most a warning."""
+
+    def fail(self, function: str, what: str) -> NoReturn:
+        """Raise the error of a call."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +118,54 @@ class VariableGroup:
         if status:
             self.instance.check(status, direction + self.name)
         return True
+
+
+class TextGroup(VariableGroup):
+    """Variables of type String of one instance; the FMU's memory of a text is copied at once.
+
+    Attributes
+    ----------
+    texts : ndarray of object
+        The texts of the last read. Bytes that are no UTF-8 are replaced.
+    """
+
+    __slots__ = ("texts",)
+
+    def __init__(
+        self,
+        functions: tuple[Callable[..., int], Callable[..., int]],
+        pointer: ctypes.c_void_p,
+        references: Sequence[int],
+        size: int,
+        owner: Owner,
+        *,
+        with_value_count: bool,
+    ) -> None:
+        addresses = np.zeros(size, dtype=np.uintp)
+        super().__init__(
+            "String", functions, pointer, references, addresses, owner, with_value_count=with_value_count
+        )
+        self.texts = np.full(size, "", dtype=object)
+        read = self.get_call
+
+        def read_texts() -> int:
+            status = read()
+            if 0 <= status < DISCARDED:
+                self._take()
+            return status
+
+        self.get_call = read_texts
+
+    def _take(self) -> None:
+        for place, address in enumerate(self.values.tolist()):
+            if address == 0:
+                self.instance.fail("GetString", f"gave no text for value reference {self.references[0]}")
+            self.texts[place] = ctypes.string_at(address).decode("utf-8", "replace")
+
+    def get(self) -> NDArray[Any]:
+        """Read the variables; returns the texts."""
+        super().get()
+        return self.texts
 
 
 #: C types of values by FMI type, for each version.

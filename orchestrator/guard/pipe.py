@@ -101,11 +101,35 @@ def _packed_record(record: RunRecord, memory: Memory | None) -> list[memoryview]
     shapes = [None if array is None else array.shape for array in arrays]
     numbers = _NUMBERS.pack(*_numbers_of(record))
     residual = None if record.loop_residual is None else float(record.loop_residual)
-    data = marshal.dumps((numbers, record.message, residual, shapes))
+    data = marshal.dumps((numbers, record.message, residual, shapes, _packed_forms(record)))
     rows = [_bytes_of(array) for array in arrays if array is not None and array.size]
     place = None if memory is None else memory.place(rows)
     head = memoryview(HEAD.pack(len(data), FOLLOWING if place is None else place) + data)
     return [head, *rows] if place is None else [head]
+
+
+def _packed_forms(record: RunRecord) -> list[tuple[str, tuple[int, ...], Any]] | None:
+    """Return the samples with a form: type, shape, and texts or bytes of each."""
+    if record.formed_samples is None:
+        return None
+    return [
+        (
+            array.dtype.str,
+            array.shape,
+            array.reshape(-1).tolist() if array.dtype.kind == "O" else array.tobytes(),
+        )
+        for array in record.formed_samples
+    ]
+
+
+def _received_forms(forms: list[tuple[str, tuple[int, ...], Any]] | None) -> tuple[NDArray[Any], ...] | None:
+    if forms is None:
+        return None
+    found = []
+    for dtype, shape, values in forms:
+        flat = np.array(values, dtype=object) if dtype == "|O" else np.frombuffer(values, dtype=dtype).copy()
+        found.append(flat.reshape(shape))
+    return tuple(found)
 
 
 def _bytes_of(array: NDArray[np.float64]) -> memoryview:
@@ -114,7 +138,7 @@ def _bytes_of(array: NDArray[np.float64]) -> memoryview:
 
 def _received_record(data: bytes, place: int, pipe: IO[bytes], memory: int | None) -> RunRecord | None:
     """Return the record that begins with `data`, with its arrays from `place`; None if they are incomplete."""
-    numbers, message, residual, shapes = marshal.loads(data)
+    numbers, message, residual, shapes, forms = marshal.loads(data)
     outcome, displacement, velocity, phase, seconds = _NUMBERS.unpack(numbers)
     arrays = {
         name: None if shape is None else np.empty(shape) for name, shape in zip(_ARRAYS, shapes, strict=True)
@@ -135,6 +159,7 @@ def _received_record(data: bytes, place: int, pipe: IO[bytes], memory: int | Non
         final_phase=phase,
         seconds=seconds,
         loop_residual=residual,
+        formed_samples=_received_forms(forms),
         **arrays,
     )
 

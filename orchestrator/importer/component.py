@@ -30,8 +30,9 @@ from vibroimpact.orchestrator.fmi.instance import OK, Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.fmi.shapes import STRUCTURAL, Shape, default_sizes, dimensions_of, shape_of
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, StartValue
 
 if TYPE_CHECKING:
     from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 #: FMI types by the kind of call that moves them in FMI 3.0; FMI 2.0's names are translated.
 KINDS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Int64"}
 
-Value = float | int | bool | str
+Value = StartValue
 Kind = Literal["co_simulation", "model_exchange"]
 
 
@@ -82,6 +83,8 @@ class Component:
     ----------
     kind : str
         The kind of FMU that runs: `co_simulation` or `model_exchange`.
+    shapes : dict of str to tuple of int
+        Shape of each array, by the name of the variable.
     capabilities : Capabilities
         The capabilities that its description declares.
     has_states : bool
@@ -112,6 +115,7 @@ class Component:
         description = description_of(spec.fmu)
         self.kind = kind_that_runs(spec, description)
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
+        self.shapes = _shapes(self.variables, spec.parameters)
         self.depends = _dependencies(description)
         fmu = unpack(spec.fmu)
         exchanges = self.kind == "model_exchange"
@@ -235,8 +239,15 @@ class Component:
 
     def group(self, kind: str, names: Sequence[str]) -> VariableGroup:
         """Return a group of this component's variables, by name."""
-        found = self.instance.group(kind, [self.variables[name].valueReference for name in names])
-        return self.clocked(found, names)
+        references = [self.variables[name].valueReference for name in names]
+        size = sum(map(self.size_of, names))
+        if kind == "String":
+            return self.clocked(self.instance.text_group(references, size), names)
+        return self.clocked(self.instance.group(kind, references, size=size), names)
+
+    def size_of(self, name: str) -> int:
+        """Return the number of values of a variable: 1, or the number of elements of an array."""
+        return math.prod(self.shapes.get(name, ()))
 
     def clocks_of(self, name: str) -> frozenset[int]:
         """Return the value references of the clocks of a variable."""
@@ -279,19 +290,28 @@ class Component:
         self.ticking = None
         if not first:
             self.instance.reset()
-        for name, value in {**self.spec.parameters, **values}.items():
+        starts = {**self.spec.parameters, **values}
+        sizes = [name for name in starts if self.variables[name].causality == STRUCTURAL]
+        if sizes:
+            self.instance.enter_configuration()
+            for name in sizes:
+                self._set_start(name, starts.pop(name))
+            self.instance.exit_configuration()
+        for name, value in starts.items():
             self._set_start(name, value)
         self.instance.enter_initialization(start_time, self.spec.tolerance)
 
     def _set_start(self, name: str, value: Value) -> None:
         variable = self.variables[name]
         if kind_of(variable) == "String":
-            self.instance.set_text(variable.valueReference, str(value))
+            texts = map(str, value) if isinstance(value, tuple) else [str(value)]
+            self.instance.set_texts(variable.valueReference, tuple(texts))
             return
         group = self._start_groups.get(name)
         if group is None:
             group = self._start_groups[name] = self.group(kind_of(variable), [name])
-        group.values[0] = _item_value(self.name, variable, value) if isinstance(value, str) else value
+        each = value if isinstance(value, tuple) else (value,)
+        group.values[:] = [_item_value(self.name, variable, v) if isinstance(v, str) else v for v in each]
         group.set()
 
     def first_event(self) -> float:
@@ -420,6 +440,13 @@ def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeF
 def _loses_memory(description: ModelDescription) -> bool:
     """Does each instance leak memory? The binary of PythonFMU 0.7 leaks 18 kB and an entry of sys.path."""
     return str(description.generationTool or "").startswith("PythonFMU")
+
+
+def _shapes(variables: Mapping[str, ModelVariable], parameters: Mapping[str, Value]) -> dict[str, Shape]:
+    """Return the shape of each array where some structural parameters have start values."""
+    sizes = default_sizes(variables)
+    sizes |= {name: v for name, v in parameters.items() if name in sizes and isinstance(v, int)}
+    return {name: shape_of(dimensions, sizes) for name, dimensions in dimensions_of(variables).items()}
 
 
 def _item_value(component: str, variable: ModelVariable, name: str) -> int:

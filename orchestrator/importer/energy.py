@@ -36,12 +36,15 @@ CONJUGATE = {"force": "displacement", "applied_force": "displacement"}
 
 
 def conjugate_displacement(variables: Container[str], variable: str) -> str | None:
-    """Return the displacement on which a force input does work; None when the input is no such force."""
+    """Return the displacement on which a force input does work; None when the input is no such force.
+
+    `variables` has the names of variables that are single numbers.
+    """
     head, _, last = variable.rpartition(".")
     if last not in CONJUGATE:
         return None
     name = f"{head}.{CONJUGATE[last]}" if head else CONJUGATE[last]
-    return name if name in variables else None
+    return name if name in variables and variable in variables else None
 
 
 def force_connections(
@@ -50,7 +53,9 @@ def force_connections(
     contacts: Sequence[StopContactSpec] = (),
 ) -> tuple[str, ...]:
     """Return the names of the connections whose energy residual is summed, and of the contacts behind them."""
-    variables = {c.name: {v.name for v in description_of(c.fmu).modelVariables} for c in components}
+    variables = {
+        c.name: {v.name for v in description_of(c.fmu).modelVariables if not v.dimensions} for c in components
+    }
     forces = [
         connection_name(c)
         for c in connections
@@ -213,10 +218,9 @@ class InterfaceEnergy:
             for connection in connections
             if ForceThatBegins.is_one(importer.components, connections, connection)
         ]
-        variables = {name: component.variables for name, component in importer.components.items()}
+        variables = {name: c.variables.keys() - c.shapes.keys() for name, c in importer.components.items()}
         for connection in connections:
-            target = importer.components[connection.target[0]]
-            displacement = conjugate_displacement(target.variables, connection.target[1])
+            displacement = conjugate_displacement(variables[connection.target[0]], connection.target[1])
             bond = bonds.get(".".join(connection.target))
             contact = plain_contact(variables, connections, connection)
             if bond is not None:

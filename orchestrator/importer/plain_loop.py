@@ -164,12 +164,14 @@ class PlainLoop:
         instance, moved = call.instance, call.moved
         if isinstance(moved, Scaling):
             self._kept.append(moved)
-            addresses = {"from": moved.read, "gains": moved.gains, "values": moved.write}
-            return CouplingCall(
-                kind=CallKind.scale,
-                value_count=moved.write.size,
-                **{name: array.ctypes.data for name, array in addresses.items()},
-            )
+            arrays = {
+                "from": moved.read,
+                "gains": moved.gains,
+                "offsets": moved.offsets,
+                "values": moved.write,
+            }
+            addresses = {name: array.ctypes.data for name, array in arrays.items() if array is not None}
+            return CouplingCall(kind=CallKind.scale, value_count=moved.write.size, **addresses)
         if isinstance(moved, VariableGroup):
             self._kept.append(moved)
             return self._call(

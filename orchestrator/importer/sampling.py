@@ -2,13 +2,15 @@
 
 A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
 The run is the same, bit for bit, with and without sampling. A component without states, or with one step size, is read
-at the communication points, with straight lines between them. On a grid of its own its values are held.
+at the communication points. Between them its real numbers follow straight lines, and all other values are those of the
+step's start. On a grid of its own all its values are held.
 """
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +20,23 @@ from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component,
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
 
+REAL_KINDS = ("Float64", "Float32")
+
+
+class _Row:
+    """One sample: the time and the plain numbers in columns, and the values of formed variables."""
+
+    def __init__(self, columns: int, formed: int) -> None:
+        self.numbers = np.empty(columns)
+        self.formed: list[Any] = [None] * formed
+
 
 class _Probe:
-    """The recorded variables of one component."""
+    """The recorded variables of one component: plain numbers by their columns, formed ones by their places."""
 
-    def __init__(self, component: Component, columns: Sequence[tuple[int, str]]) -> None:
+    def __init__(
+        self, component: Component, columns: Sequence[tuple[int, str]], places: Sequence[tuple[int, str]]
+    ) -> None:
         self.component = component
         self.groups: list[tuple[list[int], VariableGroup]] = []
         alike: dict[tuple[str, frozenset[int]], list[tuple[int, str]]] = {}
@@ -32,16 +46,32 @@ class _Probe:
         for (kind, _), chosen in alike.items():
             self.groups.append(([i for i, _ in chosen], component.group(kind, [name for _, name in chosen])))
         self.is_revisited = component.has_states and component.capabilities.variable_steps
+        self._formed = [(i, component.group(self._kind(name), [name])) for i, name in places]
+        kinds = {i: kind for (kind, _), chosen in alike.items() for i, _ in chosen}
+        self._drawn = [i for i, kind in kinds.items() if kind in REAL_KINDS]
+        self._held = [i for i, kind in kinds.items() if kind not in REAL_KINDS]
+        self._drawn_places = [i for i, name in places if self._kind(name) in REAL_KINDS]
 
-    def read(self, row: NDArray[np.float64]) -> None:
-        """Write the present values into their columns of a row."""
+    def _kind(self, name: str) -> str:
+        return kind_of(self.component.variables[name])
+
+    def read(self, row: _Row) -> None:
+        """Write the present values into a row."""
         for columns, group in self.groups:
-            row[columns] = group.get()
+            row.numbers[columns] = group.get()
+        for place, group in self._formed:
+            row.formed[place] = group.get().copy()
 
-    @property
-    def columns(self) -> list[int]:
-        """The columns of a row that this probe fills."""
-        return [column for columns, _ in self.groups for column in columns]
+    def interpolate(self, row: _Row, share: float, start: _Row, end: _Row) -> None:
+        """Write the values after a share of a step, from those at its start and its end."""
+        row.numbers[self._drawn] = (1.0 - share) * start.numbers[self._drawn] + share * end.numbers[
+            self._drawn
+        ]
+        row.numbers[self._held] = start.numbers[self._held]
+        for place, _ in self._formed:
+            row.formed[place] = start.formed[place]
+        for place in self._drawn_places:
+            row.formed[place] = (1.0 - share) * start.formed[place] + share * end.formed[place]
 
 
 class Sampler:
@@ -55,22 +85,35 @@ class Sampler:
         The recorded variables.
     rate : float
         Samples per second.
+    formed : collection of (component, variable)
+        The variables whose samples keep their type and shape, such as arrays and texts. All other variables are
+        columns of float64.
 
     Attributes
     ----------
     rows : ndarray, shape (sample, 1 + variables)
-        One row for each sample: time, then the variables.
+        One row for each sample: time, then the variables that are plain numbers.
     """
 
-    def __init__(self, importer: Importer, variables: Sequence[tuple[str, str]], rate: float) -> None:
+    def __init__(
+        self,
+        importer: Importer,
+        variables: Sequence[tuple[str, str]],
+        rate: float,
+        formed: Collection[tuple[str, str]] = (),
+    ) -> None:
         self._importer = importer
         self._rate = rate
-        self._width = 1 + len(variables)
-        columns: dict[str, list[tuple[int, str]]] = {}
-        for i, (component, name) in enumerate(variables, start=1):
-            columns.setdefault(component, []).append((i, name))
-        self._probes = [_Probe(importer.components[c], found) for c, found in columns.items()]
+        plain = [one for one in variables if one not in formed]
+        self._formed = [one for one in variables if one in formed]
+        self._width = 1 + len(plain)
+        columns, places = _by_component(plain, 1), _by_component(self._formed, 0)
+        self._probes = [
+            _Probe(importer.components[name], columns.get(name, ()), places.get(name, ()))
+            for name in dict.fromkeys(component for component, _ in variables)
+        ]
         self._values = array("d")
+        self._kept: list[list[Any]] = [[] for _ in self._formed]
         self._first, self._index, self._end = np.inf, 0, -np.inf
         importer.watchers.append(StepWatcher(self._before_step, self._after_step, self._patience))
 
@@ -79,9 +122,18 @@ class Sampler:
         """The samples so far."""
         return np.array(self._values).reshape(-1, self._width)
 
+    def formed(self, place: int, dtype: str, shape: tuple[int, ...]) -> NDArray[Any]:
+        """Return the samples of a formed variable so far, with a type and a shape of each sample."""
+        rows = self._kept[place]
+        found = np.empty((len(rows), *shape), dtype=dtype)
+        for number, row in enumerate(rows):
+            found[number] = row.reshape(shape)[()]
+        return found
+
     def begin(self, first: float, end: float) -> None:
         """Sample from `first` to `end`, s; the first sample is taken when the run reaches `first`."""
         self._values = array("d")
+        self._kept = [[] for _ in self._formed]
         self._first, self._index, self._end = first, 0, end
         if self._importer.time >= first - self._room(first):
             self._importer.keeps_start = True
@@ -100,15 +152,24 @@ class Sampler:
         return np.inf if self._next() == np.inf else 0.0
 
     def _take_now(self, time: float) -> None:
-        row = np.empty(self._width)
-        row[0] = time
+        row = self._row(time)
         for probe in self._probes:
             probe.read(row)
-        self._values.extend(row)
+        self._keep(row)
         self._index += 1
 
+    def _row(self, time: float) -> _Row:
+        row = _Row(self._width, len(self._formed))
+        row.numbers[0] = time
+        return row
+
+    def _keep(self, row: _Row) -> None:
+        self._values.extend(row.numbers)
+        for kept, values in zip(self._kept, row.formed, strict=True):
+            kept.append(values)
+
     def _before_step(self, time: float) -> None:
-        self._start_row = np.empty(self._width)
+        self._start_row = self._row(time)
         for probe in self._probes:
             if not probe.is_revisited:
                 probe.read(self._start_row)
@@ -124,20 +185,16 @@ class Sampler:
             self._take_now(end)
 
     def _take_inside(self, time: float, end: float, instants: Sequence[float]) -> None:
-        rows = [np.empty(self._width) for _ in instants]
-        for row, instant in zip(rows, instants, strict=True):
-            row[0] = instant
+        rows = [self._row(instant) for instant in instants]
         for probe in self._probes:
             if probe.is_revisited:
                 self._revisit(probe, time, instants, rows)
             else:
                 self._interpolate(probe, time, end, instants, rows)
         for row in rows:
-            self._values.extend(row)
+            self._keep(row)
 
-    def _revisit(
-        self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[NDArray[np.float64]]
-    ) -> None:
+    def _revisit(self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[_Row]) -> None:
         """Read a component inside the step just made, and put it back at the step's end.
 
         Each sample is reached from the start of the step. Some inputs (a slope from the start, the force of a yielding
@@ -153,16 +210,18 @@ class Sampler:
                 probe.read(row)
 
     def _interpolate(
-        self,
-        probe: _Probe,
-        time: float,
-        end: float,
-        instants: Sequence[float],
-        rows: Sequence[NDArray[np.float64]],
+        self, probe: _Probe, time: float, end: float, instants: Sequence[float], rows: Sequence[_Row]
     ) -> None:
-        last = np.empty(self._width)
+        last = self._row(end)
         probe.read(last)
-        columns = probe.columns
         for row, instant in zip(rows, instants, strict=True):
             share = 0.0 if probe.component.on_own_grid else (instant - time) / (end - time)
-            row[columns] = (1.0 - share) * self._start_row[columns] + share * last[columns]
+            probe.interpolate(row, share, self._start_row, last)
+
+
+def _by_component(variables: Sequence[tuple[str, str]], first: int) -> dict[str, list[tuple[int, str]]]:
+    """Return numbers from `first` on and names of variables, by their components."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for number, (component, name) in enumerate(variables, start=first):
+        found.setdefault(component, []).append((number, name))
+    return found

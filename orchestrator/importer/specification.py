@@ -13,6 +13,8 @@ Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
 RunAs = Literal["auto", "model_exchange", "co_simulation"]
+StartValue = float | int | bool | str | tuple[float | int | bool | str, ...]
+"""A start value; an array has its elements in a row, the last dimension fastest."""
 PairLaw = Literal["restitution", "kelvin_voigt", "hertz", "hunt_crossley"]
 #: Numbers of each law of a pair, besides the clearance.
 PAIR_NUMBERS: Mapping[PairLaw, tuple[str, ...]] = {
@@ -33,8 +35,9 @@ class ComponentSpec:
         Its name in the scene.
     fmu : Path
         Its FMU file.
-    parameters : mapping of str to number, bool or str
-        Start values by variable name; enumerations by number or by item name.
+    parameters : mapping of str to number, bool, str, or tuple of them
+        Start values by variable name; enumerations by number or by item name. An array has a tuple of its elements,
+        the last dimension fastest.
     tolerance : float or None
         Relative tolerance of the solver: inside the FMU, or of CVODE in model exchange; None: the FMU's own.
     run_as : str
@@ -43,7 +46,7 @@ class ComponentSpec:
 
     name: str
     fmu: Path
-    parameters: Mapping[str, float | int | bool | str] = field(default_factory=dict)
+    parameters: Mapping[str, StartValue] = field(default_factory=dict)
     tolerance: float | None = None
     run_as: RunAs = "auto"
 

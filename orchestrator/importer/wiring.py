@@ -35,37 +35,29 @@ class StatusCall:
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """Real numbers times their gains, into another buffer; as a call it returns status 0."""
+    """Real numbers times their gains, plus their offsets, into another buffer; as a call it returns status 0.
+
+    Without `offsets` nothing is added, not even 0: the sign of a zero is kept.
+    """
 
     read: NDArray[np.float64]
     gains: NDArray[np.float64]
     write: NDArray[np.float64]
+    offsets: NDArray[np.float64] | None = None
 
     def __call__(self) -> int:
         """Write the scaled values; returns status 0."""
         np.multiply(self.read, self.gains, out=self.write)
-        return 0
-
-
-@dataclass(frozen=True, slots=True)
-class Shifting:
-    """Real numbers times their gains, plus their offsets, into another buffer; as a call it returns status 0."""
-
-    read: NDArray[Any]
-    gains: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    write: NDArray[Any]
-
-    def __call__(self) -> int:
-        """Write the shifted values; returns status 0."""
-        np.copyto(self.write, self.read * self.gains + self.offsets, casting="unsafe")
+        if self.offsets is not None:
+            np.add(self.write, self.offsets, out=self.write)
         return 0
 
 
 class Transfer:
     """Connections from one component to another that are moved by one read and one write.
 
-    Where the two sides have the same type and no gains, both use one buffer and nothing is copied.
+    Where the two sides have the same type and no gains, both use one buffer and nothing is copied. An array is moved
+    whole, by a transfer of its own.
     """
 
     def __init__(self, source: Component, target: Component, connections: Connections) -> None:
@@ -75,32 +67,44 @@ class Transfer:
         target_kind = kind_of(target.variables[connections[0].target[1]])
         inputs = [target.variables[c.target[1]].valueReference for c in connections]
         self.read: VariableGroup = source.group(self.kind, [c.source[1] for c in connections])
-        self._gains = np.array([c.gain for c in connections])
-        self._offsets = np.array([c.offset for c in connections])
+        sizes = [source.size_of(c.source[1]) for c in connections]
+        self._ends = np.cumsum([0, *sizes])
+        self._gains = np.repeat([c.gain for c in connections], sizes)
+        self._offsets = np.repeat([c.offset for c in connections], sizes)
         same_type = DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
         shared = same_type and bool(np.all((self._gains == 1.0) & (self._offsets == 0.0)))
-        written = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
+        own = self.read.values if shared else None
+        written = target.instance.group(target_kind, inputs, size=self.read.values.size, values=own)
         self.write = target.clocked(written, [c.target[1] for c in connections])
         self.convert: Callable[[], int] | None = None if shared else self._converter()
         """Carries the values read to the values written, returns status 0; None when both share one buffer."""
         self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
-        read, write, gains, offsets = self.read.values, self.write.values, self._gains, self._offsets
-        if np.any(offsets):
-            return Shifting(read, gains, offsets, write)
+        read, write, gains = self.read.values, self.write.values, self._gains
+        offsets = self._offsets if np.any(self._offsets) else None
         if self.kind == "Float64" and write.dtype == np.float64:
-            return Scaling(read, gains, write)
+            return Scaling(read, gains, write, offsets)
 
         def convert() -> int:
             np.multiply(read, gains, out=write, casting="unsafe")
+            return 0
+
+        def shift() -> int:
+            np.copyto(write, read * gains + offsets, casting="unsafe")
             return 0
 
         def copy() -> int:
             np.copyto(write, read, casting="unsafe")
             return 0
 
+        if offsets is not None:
+            return shift
         return copy if bool(np.all(gains == 1.0)) else convert
+
+    def _places(self, chosen: Iterable[int]) -> list[int]:
+        """Return the places of the values of some connections."""
+        return [place for i in chosen for place in range(self._ends[i], self._ends[i + 1])]
 
     def _bind_rates(self) -> None:
         """Find the inputs that follow a straight line: those with an input for their slope (`force`, `force_rate`).
@@ -110,19 +114,20 @@ class Transfer:
         variables = self.target.variables
         slopes = [f"{c.target[1]}_rate" for c in self.connections]
         given = drawn_inputs(self.connections)
-        self._sloping = [
+        sloping = [
             i
             for i, name in enumerate(slopes)
             if name in variables and variables[name].causality == "input" and name not in given
         ]
-        names = [slopes[i] for i in self._sloping]
+        names = [slopes[i] for i in sloping]
+        self._sloping = self._places(sloping)
         self._rates = self.target.group("Float64", names) if names else None
-        self._kept = [i for i, c in enumerate(self.connections) if c.target[1] in given]
+        self._kept = self._places(i for i, c in enumerate(self.connections) if c.target[1] in given)
         self._begin_values = self.write.values.copy()
 
     def keep_at_start(self, inputs: Container[str], *, kept: bool) -> None:
         """Fix these inputs to their values at the start of a step, also in a repeated step, or release them."""
-        named = {i for i, c in enumerate(self.connections) if c.target[1] in inputs}
+        named = set(self._places(i for i, c in enumerate(self.connections) if c.target[1] in inputs))
         self._kept = sorted({*self._kept, *named} if kept else {*self._kept} - named)
 
     def note_begin(self) -> None:
@@ -159,15 +164,18 @@ class Transfer:
 
     def gain_of(self, connection: ConnectionSpec) -> float:
         """Return the present gain of one connection."""
-        return float(self._gains[[c.target for c in self.connections].index(connection.target)])
+        return float(self._gains[self._ends[self._place_of(connection)]])
 
     def set_gain(self, connection: ConnectionSpec, gain: float) -> None:
         """Change the gain of one connection; the calls from `calls` must be bound again."""
         if self.convert is None:
             kind = kind_of(self.target.variables[connection.target[1]])
             self.write = self.target.group(kind, [c.target[1] for c in self.connections])
-        self._gains[[c.target for c in self.connections].index(connection.target)] = gain
+        self._gains[self._places([self._place_of(connection)])] = gain
         self.convert = self._converter()
+
+    def _place_of(self, connection: ConnectionSpec) -> int:
+        return [c.target for c in self.connections].index(connection.target)
 
     def move(self) -> None:
         """Read the outputs and write the inputs."""
@@ -284,6 +292,7 @@ def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[
         kind_of(target.variables[connection.target[1]]),
         source.clocks_of(connection.source[1]),
         target.clocks_of(connection.target[1]),
+        connection.target[1] if connection.source[1] in source.shapes else None,
     )
 
 

@@ -20,6 +20,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import Described, wrapped
 from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS, RunColumns, arrays_of
+from vibroimpact.analysis.dataset.sample_forms import axis_names
 from vibroimpact.analysis.dataset.schema import POINT_COLUMNS, RAGGED, RULES, SWEPT_ALONG, unit_in
 from vibroimpact.analysis.dataset.writing import described_constants
 from vibroimpact.fmus.errors import UsageError
@@ -68,6 +69,7 @@ class DatasetForm:
             "connections": _energy_connections(scene),
             "compared": compared_names(scene),
             "further": further_points(scene),
+            "sample_forms": scene.sample_forms,
         }
         stored = dict(zip(scene.sampled, stored_samples(scene), strict=True))
         of_channels = channel_attributes(scene).items()
@@ -225,6 +227,7 @@ def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
     short = {key: coordinate_name(key, every) for key in keys}
     twice = Counter(short.values())
     taken = _taken(scene) | set(coordinate_names(scene).values()) | set(stored_samples(scene))
+    taken |= _sample_axes(scene)
     preferred = [name if twice[name] == 1 else key for key, name in short.items()]
     return dict(zip(short, file_names(preferred, taken), strict=True))
 
@@ -244,6 +247,14 @@ def _taken(scene: Scene) -> frozenset[str]:
 def stored_samples(scene: Scene) -> tuple[str, ...]:
     """Return the name in the file of each sampled variable, in the order of the scene."""
     return file_names(scene.sampled, _taken(scene) | set(coordinate_names(scene).values()))
+
+
+def _sample_axes(scene: Scene) -> set[str]:
+    """Return the names of the dimensions of sampled arrays."""
+    stored = dict(zip(scene.sampled, stored_samples(scene), strict=True))
+    taken = RESERVED_NAMES | set(coordinate_names(scene).values()) | set(stored.values())
+    own = [stored[name] for name in scene.sample_forms]
+    return {name for axes in axis_names(own, [*scene.sample_forms.values()], taken) for name in axes}
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:

@@ -42,7 +42,7 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     seconds : float
         Wall time of the run, s.
     """
-    record, names = scene.record, scene.sampled
+    record = scene.record
     elements = most_elements(scene)
     periods = scene.period is not None and (record.extrema or record.strobe)
     return RunRecord(
@@ -51,7 +51,10 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
         periods=np.empty((0, columns_of_periods(scene))) if periods else None,
         impacts=np.empty((0, len(IMPACT_COLUMNS))) if records_impacts(scene) else None,
         sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and scene.is_one_body else None,
-        samples=np.empty((0, 1 + len(names))) if names else None,
+        samples=np.empty((0, 1 + len(scene.plain_samples))) if scene.sampled else None,
+        formed_samples=tuple(form.empty() for form in scene.sample_forms.values())
+        if scene.sample_forms
+        else None,
         seconds=seconds,
         final_state=np.full(2 * elements, math.nan) if elements else None,
         events=np.empty((0, 3)) if record.impacts and not scene.is_one_body else None,

@@ -6,6 +6,7 @@ import platform
 import re
 import time
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,8 +108,10 @@ class GeneralRunner(Runner):
         self._broken = False
 
     def _make_sampler(self, scene: Scene) -> Sampler | None:
-        names = [component_variable(name) for name in scene.sampled]
-        return Sampler(self._importer, names, scene.sampling_rate) if names else None
+        names, formed = (
+            [component_variable(name) for name in chosen] for chosen in (scene.sampled, scene.sample_forms)
+        )
+        return Sampler(self._importer, names, scene.sampling_rate, formed) if names else None
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene does not carry states over.
@@ -237,17 +240,28 @@ class GeneralRunner(Runner):
         if self._sampler is None:
             return
         rows = self._sampler.rows
-        names = self.scene.sampled
+        names = self.scene.plain_samples
         has_none = [self._is_without_value_at_times(name) for name in names]
         bad = np.argwhere(~(np.isfinite(rows) | (np.isnan(rows) & [False, *has_none])))
         if len(bad):
             row, column = bad[0]
             name = names[column - 1]
-            raise ComponentError(
-                f"{name}: expected a finite value, got {rows[row, column]} at time {rows[row, 0]:.17g}.",
-                instance=component_variable(name)[0],
-                time=float(rows[row, 0]),
+            raise _not_finite(name, rows[row, column], rows[row, 0])
+        for name, values in zip(self.scene.sample_forms, self._formed_samples() or (), strict=True):
+            if values.dtype.kind != "f":
+                continue
+            bad = np.argwhere(
+                ~(np.isfinite(values) | (np.isnan(values) & self._is_without_value_at_times(name)))
             )
+            if len(bad):
+                raise _not_finite(name, values[tuple(bad[0])], rows[bad[0][0], 0])
+
+    def _formed_samples(self) -> tuple[NDArray[Any], ...] | None:
+        """Return the samples of arrays, texts, enumerations and long integers; None without any."""
+        forms, sampler = self.scene.sample_forms.values(), self._sampler
+        if sampler is None or not forms:
+            return None
+        return tuple(sampler.formed(place, form.dtype, form.shape) for place, form in enumerate(forms))
 
     def _is_without_value_at_times(self, reference: str) -> bool:
         component, name = component_variable(reference)
@@ -274,6 +288,7 @@ class GeneralRunner(Runner):
             outcome=outcome,
             message=message,
             samples=None if self._sampler is None else self._sampler.rows,
+            formed_samples=self._formed_samples(),
             seconds=seconds,
             events=in_time_order(np.concatenate([NO_ROWS, *self._events]))
             if self.scene.record.impacts
@@ -287,3 +302,12 @@ class GeneralRunner(Runner):
         """Free the components."""
         self._energy.free()
         self._importer.free()
+
+
+def _not_finite(name: str, value: float, time: float) -> ComponentError:
+    """Return the error of a sample that is no finite number."""
+    return ComponentError(
+        f"{name}: expected a finite value, got {value} at time {time:.17g}.",
+        instance=component_variable(name)[0],
+        time=float(time),
+    )

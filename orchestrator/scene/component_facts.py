@@ -16,8 +16,10 @@ from typing import Any, Final, Literal, NamedTuple
 from vibroimpact.fmus.packaging.archive import content_hash, unpack
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, reading_of
 from vibroimpact.fmus.packaging.model_description import Grade
+from vibroimpact.fmus.safe_xml import root_of
 from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
 from vibroimpact.orchestrator.fmi.capabilities import Capabilities, capabilities_of
+from vibroimpact.orchestrator.fmi.shapes import Dimensions, default_sizes, dimensions_of
 from vibroimpact.orchestrator.importer.specification import RunAs
 from vibroimpact.orchestrator.scene.problems import nearest
 
@@ -59,8 +61,8 @@ class VariableFacts:
         Limits in the description.
     items : mapping of str to int
         Names and numbers of an enumeration.
-    scalar : bool
-        Whether the variable is one number, not an array.
+    dimensions : tuple of int or str
+        Dimensions of an array: sizes, or names of the structural parameters that give them.
     """
 
     name: str
@@ -75,12 +77,17 @@ class VariableFacts:
     minimum: float | None
     maximum: float | None
     items: Mapping[str, int]
-    scalar: bool
+    dimensions: Dimensions
+
+    @property
+    def scalar(self) -> bool:
+        """Whether the variable is one value, not an array."""
+        return not self.dimensions
 
     @property
     def settable(self) -> bool:
         """Whether FMI allows an importer to set the start value."""
-        if self.variability == "constant" or self.causality in ("structuralParameter", "independent"):
+        if self.variability == "constant" or self.causality == "independent":
             return False
         return self.causality == "input" or self.initial in ("exact", "approx")
 
@@ -111,6 +118,8 @@ class ComponentFacts:
         Proposed communication step, s.
     capabilities : Capabilities
         Declared capabilities of the kind that runs.
+    sizes : mapping of str to int
+        Start values of the structural parameters.
     doubts : tuple of str
         Open points of the description, each with the assumption.
     remarks : int
@@ -124,6 +133,7 @@ class ComponentFacts:
     scheduled: bool
     step: float | None
     capabilities: Capabilities
+    sizes: Mapping[str, int]
     doubts: tuple[str, ...] = ()
     remarks: int = 0
 
@@ -154,7 +164,11 @@ def _facts(sha256: str, path: Path, run_as: RunAs) -> ComponentFacts:
     reading = reading_of(path)
     description = reading.description
     units = {unit.name: _unit(unit) for unit in description.unitDefinitions}
-    variables = {variable.name: _variable(variable, units) for variable in description.modelVariables}
+    folder = unpack(path).folder
+    named = {variable.name: variable for variable in description.modelVariables}
+    _take_limits(named, folder)
+    dimensions = dimensions_of(named)
+    variables = {name: _variable(one, units, dimensions.get(name, ())) for name, one in named.items()}
     interfaces = {CO_SIMULATION: description.coSimulation, MODEL_EXCHANGE: description.modelExchange}
     kinds = tuple(kind for kind, interface in interfaces.items() if interface is not None)
     kind = next((kind for kind in kinds if run_as in ("auto", kind)), "")
@@ -165,10 +179,22 @@ def _facts(sha256: str, path: Path, run_as: RunAs) -> ComponentFacts:
         kind=kind,
         scheduled=description.scheduledExecution is not None,
         step=_proposed_step(description),
-        capabilities=capabilities_of(description, unpack(path).folder, model_exchange=kind == MODEL_EXCHANGE),
+        capabilities=capabilities_of(description, folder, model_exchange=kind == MODEL_EXCHANGE),
+        sizes=default_sizes(named),
         doubts=tuple(finding.text for finding in reading.findings if finding.grade is Grade.doubt),
         remarks=sum(finding.grade is Grade.remark for finding in reading.findings),
     )
+
+
+def _take_limits(variables: Mapping[str, Any], folder: Path) -> None:
+    """Complete the limits of unsigned integers, which FMPy does not read."""
+    if not any(variable.type.startswith("UInt") for variable in variables.values()):
+        return
+    root = root_of((folder / "modelDescription.xml").read_bytes(), "modelDescription.xml")
+    for element in root.iterfind("ModelVariables/*"):
+        if element.tag.startswith("UInt") and element.get("name") in variables:
+            variable = variables[element.get("name", "")]
+            variable.min, variable.max = element.get("min"), element.get("max")
 
 
 def _proposed_step(description: ModelDescription) -> float | None:
@@ -188,7 +214,7 @@ def _unit(definition: Any) -> Unit | None:
     )
 
 
-def _variable(variable: Any, units: Mapping[str, Unit | None]) -> VariableFacts:
+def _variable(variable: Any, units: Mapping[str, Unit | None], dimensions: Dimensions) -> VariableFacts:
     declared = variable.declaredType
     unit_name = variable.unit or (declared.unit if declared else None) or ""
     items = declared.items if declared and variable.type == "Enumeration" else ()
@@ -205,7 +231,7 @@ def _variable(variable: Any, units: Mapping[str, Unit | None]) -> VariableFacts:
         minimum=_limit(variable.min, declared.min if declared else None),
         maximum=_limit(variable.max, declared.max if declared else None),
         items={item.name: int(item.value) for item in items},
-        scalar=not variable.dimensions,
+        dimensions=dimensions,
     )
 
 

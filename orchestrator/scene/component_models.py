@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.scene.models import (
     SceneTable,
 )
 
-_Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")]
+_Text = Annotated[str, Field(min_length=1, max_length=10_000, pattern=r"^[^\x00-\x1f\x7f]*$")]
 _VARIABLE_RULE = Rule(
     "a variable COMPONENT.VARIABLE in quotes",
     item="a variable COMPONENT.VARIABLE in quotes",
@@ -272,7 +272,7 @@ class GeneralRecord(SceneTable):
         replace(
             _VARIABLE_RULE,
             expected='an array such as ["ball.h", "ball.v"]',
-            doc="variables of any component, numbers or true/false; each once",
+            doc="variables of any component: numbers, true/false, texts, and arrays of them; each once",
             default="empty",
         ),
     ] = ()

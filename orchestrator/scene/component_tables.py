@@ -9,17 +9,19 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from vibroimpact.analysis.dataset.sample_forms import SampleForm
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
     ConnectionSpec,
     EventSpec,
     PairSpec,
+    StartValue,
     StopContactSpec,
 )
+from vibroimpact.orchestrator.scene.array_values import is_structural, sample_form, structural_dimensions
 from vibroimpact.orchestrator.scene.component_facts import (
     MODEL_EXCHANGE,
     Misfit,
-    StartValue,
     swept_value,
 )
 from vibroimpact.orchestrator.scene.component_models import (
@@ -108,6 +110,7 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
         "contacts": contacts,
         "connections": connections,
         "events": tuple(_event(table) for table in draft.events if table),
+        "sample_forms": _sample_forms(draft),
         "declared_units": {key: draft.unit(key) for key in keys},
         "doubts": tuple(dict.fromkeys(f"{one.file}: {doubt}" for one in facts for doubt in one.doubts)),
         "remarks": {one.file: one.remarks for one in facts if one.remarks},
@@ -115,6 +118,17 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
         "sweep": axes,
         "execution": _execution(draft, draft.execution),
     }
+
+
+def _sample_forms(draft: GeneralDraft) -> dict[str, SampleForm]:
+    """Return the forms of the recorded variables that are no plain numbers."""
+    found: dict[str, SampleForm] = {}
+    for reference in draft.record.variables if draft.record else ():
+        variable = draft.variable(reference)
+        form = variable and sample_form(variable, draft.shape(reference))
+        if form:
+            found[reference] = form
+    return found
 
 
 def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> ComponentSpec:
@@ -270,8 +284,28 @@ def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator
     elif variable:
         found = list(start_problems(variable, where))
         yield from found
-        if not found and variable.kind in ("boolean", "text"):
-            yield Problem(where, "a number", f"the {variable.type} {key}", "Run a scene for each value.")
+        if not found and (variable.kind in ("boolean", "text") or not variable.scalar):
+            yield Problem(where, "a number", f"the {variable.shape} {key}", "Run a scene for each value.")
+        elif not found and is_structural(variable):
+            yield from _size_problems(key, where, draft)
+
+
+def _size_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
+    """Yield the problem of a swept size of an array that the scene uses: all points have one dataset."""
+    component, size = component_variable(key)
+    ends = [end for table in draft.connections if table for end in (table.source, table.target)]
+    recorded = draft.record.variables if draft.record else ()
+    given = draft.components[component].parameters or {}
+    for reference in (*recorded, *ends, *(f"{component}.{name}" for name in given)):
+        variable = draft.variable(reference)
+        if (
+            variable
+            and component_variable(reference)[0] == component
+            and size in structural_dimensions(variable)
+        ):
+            hint = "Run a scene for each value."
+            yield Problem(where, "a size of no array that this scene uses", f"that of {reference}", hint)
+            return
 
 
 def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:

@@ -15,15 +15,15 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import NEEDED_OF_CLOCKS, ONLY_ONCE
-from vibroimpact.orchestrator.importer.specification import RunAs
+from vibroimpact.orchestrator.fmi.shapes import Shape
+from vibroimpact.orchestrator.importer.specification import RunAs, StartValue
+from vibroimpact.orchestrator.scene.array_values import array_shape, given_value
 from vibroimpact.orchestrator.scene.component_facts import (
     MODEL_EXCHANGE,
     ComponentFacts,
     Misfit,
-    StartValue,
     VariableFacts,
     component_facts,
-    typed_value,
 )
 from vibroimpact.orchestrator.scene.component_models import (
     PAIR_MODELS,
@@ -206,17 +206,19 @@ def _parameters(
     raw: Mapping[str, object], path: tuple[str, ...], facts: ComponentFacts, problems: list[Problem]
 ) -> dict[str, StartValue]:
     typed: dict[str, StartValue] = {}
-    for name, value in raw.items():
+    # the sizes of arrays come first
+    for name, value in sorted(raw.items(), key=lambda item: item[0] not in facts.sizes):
         place = (*path, "parameters", name)
         found = list(_start_problems(name, value, key_path(place), facts))
         if not found:
-            fitted = typed_value(facts.variables[name], value)
+            variable = facts.variables[name]
+            fitted = given_value(variable, value, array_shape(facts, variable, typed))
             if isinstance(fitted, Misfit):
                 found = [Problem(key_path(place), fitted.expected, quoted(value), fitted.hint)]
             else:
                 typed[name] = fitted
         problems += found
-    return typed
+    return {name: typed[name] for name in raw if name in typed}
 
 
 def _start_problems(name: str, value: object, where: str, facts: ComponentFacts) -> Iterator[Problem]:
@@ -242,8 +244,8 @@ def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
     if not variable.settable:
         hint = "Parameters, inputs and start states have one."
         yield Problem(where, "a variable with a start value", _described(variable), hint)
-    elif variable.kind in ("binary", "clock") or not variable.scalar:
-        yield Problem(where, "a number, true or false, or text", _described(variable))
+    elif variable.kind in ("binary", "clock"):
+        yield Problem(where, "a number, true or false, text, or an array of them", _described(variable))
 
 
 def not_restorable(facts: ComponentFacts, where: str, hint: str) -> Problem:
@@ -307,6 +309,14 @@ class GeneralDraft(DraftTables):
         """Return the variable of `COMPONENT.VARIABLE`; None where it is not known."""
         facts = self.facts(reference)
         return facts.variables.get(component_variable(reference)[1]) if facts else None
+
+    def shape(self, reference: str) -> Shape:
+        """Return the shape of `COMPONENT.VARIABLE`, which is known; empty for a single value."""
+        component, facts = self.components[component_variable(reference)[0]], self.facts(reference)
+        variable = self.variable(reference)
+        assert facts is not None
+        assert variable is not None
+        return array_shape(facts, variable, component.parameters or {})
 
     def unit(self, key: str) -> str:
         """Return the declared unit of a variable, a gain or a number of a contact, as written there; else `1`."""

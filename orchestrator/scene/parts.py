@@ -16,6 +16,7 @@ from typing import Any, Literal, Self, cast
 from pydantic import BaseModel, Field, SerializerFunctionWrapHandler, model_serializer
 from pydantic.fields import FieldInfo
 
+from vibroimpact.analysis.dataset.sample_forms import SampleForm
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
@@ -64,7 +65,10 @@ from vibroimpact.orchestrator.scene.sampled_names import channels_in
 from vibroimpact.orchestrator.scene.several_bodies import is_left_out
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
-_NAMED_BY_FORM = ("bodies", "contacts", "connections", "events", "declared_units", "doubts", "remarks")
+_NAMED_BY_FORM = (
+    *("bodies", "contacts", "connections", "events"),
+    *("sample_forms", "declared_units", "doubts", "remarks"),
+)
 """Parts with different names, or no name, in the documents of the two forms."""
 _OWN_TABLES = ("sensor", *CHAIN_TABLES)
 """Tables with numbers besides those of bodies, forces, stops and contacts."""
@@ -90,6 +94,7 @@ class Parts(SceneTable):
     sweep: tuple[SweepAxis, ...]
     execution: Execution
     replay: Replay | None = None
+    sample_forms: Mapping[str, SampleForm] = Field(default_factory=dict, repr=False)
     declared_units: Mapping[str, str] = Field(default_factory=dict, repr=False)
     doubts: tuple[str, ...] = Field((), repr=False)
     remarks: Mapping[str, int] = Field(default_factory=dict, repr=False)
@@ -272,6 +277,11 @@ class Parts(SceneTable):
     def sampled(self) -> tuple[str, ...]:
         """The variables of the time series, in its order; none without a time series."""
         return () if self.record.time_series is None else self.record.time_series.variables
+
+    @property
+    def plain_samples(self) -> tuple[str, ...]:
+        """The variables of the time series that are plain numbers, in its order."""
+        return tuple(name for name in self.sampled if name not in self.sample_forms)
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -35,9 +35,11 @@ MODELS = {
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
     "Timed": "timed.c",
+    "Typed": "typed.c",
 }
+WEAK = "__attribute__((weak))"
 #: First letters of the C files of a model's adapters, without the version.
-ADAPTERS = {"Exchanged": "exchange"}
+ADAPTERS = {"Exchanged": "exchange", "Typed": "typed"}
 #: Token of an FMU that accepts every token.
 ANY_TOKEN = "*"
 MADE = tuple(
@@ -144,6 +146,15 @@ def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
     return _write("Mass" if states else "StatelessMass", fmi, folder)
 
 
+def typed(folder: Path, fmi: str = "3.0") -> Path:
+    """Write parameters of all types that outputs repeat: `p_TYPE` and `y_TYPE`, in FMI 3.0 arrays `a_TYPE`, `b_TYPE`.
+
+    The structural parameters `rows` and `columns` give the sizes of the arrays. FMI 3.0 has z = 2 u and x' = u, too,
+    for arrays. `word`, `big` and `mode` change with each step.
+    """
+    return _write("Typed", fmi, folder)
+
+
 def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
     """Write an FMU with another description: each first text, which must occur, becomes the second."""
     with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as changed:
@@ -202,6 +213,7 @@ def _functions_left_out(sources: Sequence[Path], fmi: str) -> str:
     """Return C for the functions of the standard that no source defines: they answer error, or no instance.
 
     They declare no parameters, since they use none; in C's calling conventions the caller clears the arguments away.
+    They are weak: a function that a macro defines goes before them.
     """
     major = fmi[0]
     header = (fmi_headers() / f"fmi{major}Functions.h").read_text(encoding="utf-8", errors="replace")
@@ -216,5 +228,5 @@ def _functions_left_out(sources: Sequence[Path], fmi: str) -> str:
 
 def _refusal(function: str) -> str:
     if "Instantiate" in function:
-        return f"void *{function}(void);\nvoid *{function}(void) {{ return (void *)0; }}"
-    return f"int {function}(void);\nint {function}(void) {{ return 3; }}"
+        return f"{WEAK} void *{function}(void);\nvoid *{function}(void) {{ return (void *)0; }}"
+    return f"{WEAK} int {function}(void);\nint {function}(void) {{ return 3; }}"

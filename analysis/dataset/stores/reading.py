@@ -68,15 +68,16 @@ class _RowsArray(_StoreArray):
         super().__init__(place, array)
         self._order = order
         self._ends = np.concatenate([[0], np.cumsum(rows[order])])
-        self.shape = (int(self._ends[-1]),)
+        self.shape = (int(self._ends[-1]), *array.shape[2:])
 
     def _read(self, key: tuple[Any, ...]) -> Any:
-        (one,) = key
+        one, elements = key[0], key[1:]
         if not isinstance(one, slice):
-            return self._read((slice(one, one + 1),))[0]
+            return self._read((slice(one, one + 1), *elements))[0]
         first, stop, step = one.indices(self.shape[0])
         pieces = [self._array[shard, part] for shard, part in self._parts(first, max(first, stop))]
-        return np.concatenate([np.empty(0, self.dtype), *pieces])[::step]
+        rows = np.concatenate([np.empty((0, *self.shape[1:]), self.dtype), *pieces])[::step]
+        return rows[(slice(None), *elements)]
 
     def _parts(self, first: int, stop: int) -> Iterator[tuple[int, slice]]:
         """Yield the shards with rows from `first` to `stop - 1`, each with its part of them."""
@@ -182,8 +183,8 @@ class StoreContents:
         if (rows < 0).any():
             raise ValueError(f"{dim}_rows: a number below 0")
         for name, dims in self._dims.items():
-            if dims == _row_dims(dim):
-                shards, most = self._arrays[name].shape
+            if dims[:2] == _row_dims(dim):
+                shards, most = self._arrays[name].shape[:2]
                 if shards != rows.size or rows.max(initial=0) > most:
                     raise ValueError(f"{name}: fewer rows than {dim}_rows says")
         return rows
@@ -225,7 +226,7 @@ class StoreContents:
         return name in self.linked and name != "run_index"
 
     def _ragged(self, name: str) -> str | None:
-        return next((dim for dim in self.rows if self._dims[name] == _row_dims(dim)), None)
+        return next((dim for dim in self.rows if self._dims[name][:2] == _row_dims(dim)), None)
 
     def _flat(self) -> _Flat:
         """Return the variables as a file has them, along runs and rows."""
@@ -246,7 +247,7 @@ class StoreContents:
     def _described(self, name: str) -> _Described:
         array, dims, ragged = self._arrays[name], self._dims[name], self._ragged(name)
         if ragged is not None:
-            dims = (ragged,)
+            dims = (ragged, *dims[2:])
         elif self._is_of_cells(name):
             files = {label: dim for dim, label in LABELS.items()}
             dims = ("run", *(files.get(dim, dim) for dim in dims[len(self._points) :]))
@@ -261,7 +262,8 @@ class StoreContents:
         promised = 0
         for name in self.names:
             ragged = self._ragged(name)
-            size = math.prod(self._arrays[name].shape) if ragged is None else int(self.rows[ragged].sum())
+            shape = self._arrays[name].shape
+            size = math.prod(shape if ragged is None else (int(self.rows[ragged].sum()), *shape[2:]))
             promised += size * kind_of(self._arrays[name]).itemsize
         if promised > SPARSE_BYTES:
             # the folders of a large store would be listed for a second
@@ -340,8 +342,9 @@ class StoreContents:
         if kind_of(array).kind == "f":
             attrs["_FillValue"] = np.float64(np.nan)
         rows = self.rows[ragged]
-        chunks = (tuple(rows[self.order][rows[self.order] > 0].tolist()) or (0,),)
-        return self._lazy(name, (ragged,), _RowsArray(self._place, array, rows, self.order), attrs, chunks)
+        chunks = (tuple(rows[self.order][rows[self.order] > 0].tolist()) or (0,), *array.shape[2:])
+        read = _RowsArray(self._place, array, rows, self.order)
+        return self._lazy(name, (ragged, *dims[2:]), read, attrs, chunks)
 
     def _lazy(
         self, name: str, dims: tuple[str, ...], array: _StoreArray, attrs: Any, chunks: Any

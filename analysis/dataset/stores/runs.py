@@ -160,7 +160,7 @@ class StoreRuns:
                 data[name] = ((_DIMS[name],), variable.values.astype(object), attrs)
             elif variable.dims and variable.dims[0] in RAGGED:
                 dim = str(variable.dims[0])
-                data[name] = ((dim,), variable[rows[dim]].values, attrs)
+                data[name] = (variable.dims, variable[rows[dim]].values, attrs)
             else:
                 data[name] = self._of_runs(name, block, places, attrs)
         coords = {name: data.pop(name) for name in contents.linked if name in data}

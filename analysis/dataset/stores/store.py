@@ -253,7 +253,7 @@ class StoreWriter:
             for dim in self._ragged:
                 count = int(self._arrays[RAGGED[dim]][block].sum())
                 for name, array in self._arrays.items():
-                    if name in names and dims_of(array) == (f"{dim}_shard", f"{dim}_row"):
+                    if name in names and _is_along(array, dim):
                         found[name] = np.asarray(array[number, :count], dtype=kind_of(array))
         return found
 
@@ -289,7 +289,7 @@ class StoreWriter:
         for dim in self._ragged:
             owners = np.repeat(ids, columns[RAGGED[dim]].values)
             for name, array in self._arrays.items():
-                if dims_of(array) != (f"{dim}_shard", f"{dim}_row"):
+                if not _is_along(array, dim):
                     continue
                 values = owners if name == f"{dim}_run" else None
                 if values is None and name in columns:
@@ -348,8 +348,8 @@ class StoreWriter:
                 self._arrays[f"{dim}_rows"][: grid.shards] = np.array(rows, dtype=np.int64)
                 most = max([1, *rows])
                 for array in self._arrays.values():
-                    if dims_of(array) == (f"{dim}_shard", f"{dim}_row"):
-                        shapes[array.path] = (grid.shards, most)
+                    if _is_along(array, dim):
+                        shapes[array.path] = (grid.shards, most, *array.shape[2:])
             if self._ragged:
                 first = self._of_shards(
                     grid, "run_index", lambda index: int(index[index >= 0].min(initial=_LAST))
@@ -376,7 +376,8 @@ def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict
         if name in kept:
             continue
         if variable.dims[0] in RAGGED:
-            found[str(name)] = _rows(str(variable.dims[0]), grid, variable.dtype, variable.attrs)
+            elements = {str(each): variable.sizes[each] for each in variable.dims[1:]}
+            found[str(name)] = _rows(str(variable.dims[0]), grid, variable.dtype, variable.attrs, elements)
         else:
             further = {LABELS.get(str(d), str(d)): sizes.get(str(d), n) for d, n in variable.sizes.items()}
             further.pop("run")
@@ -425,9 +426,26 @@ def _cells(grid: StoreGrid, further: Mapping[str, int], dtype: Any, attrs: Mappi
     return _Array((*grid.dims, *further), (*grid.shape, *further.values()), chunk, shard, dtype, attrs)
 
 
-def _rows(dim: str, grid: StoreGrid, dtype: Any, attrs: Mapping[str, Any]) -> _Array:
-    shape = (grid.shards, MOST_ROWS)
-    return _Array((f"{dim}_shard", f"{dim}_row"), shape, (1, CHUNK_POINTS), (1, SHARD_POINTS), dtype, attrs)
+def _rows(
+    dim: str,
+    grid: StoreGrid,
+    dtype: Any,
+    attrs: Mapping[str, Any],
+    elements: Mapping[str, int] | None = None,
+) -> _Array:
+    """Return the array of the rows of a ragged dimension; `elements` are the dimensions of each row."""
+    names, sizes = tuple(elements or ()), tuple((elements or {}).values())
+    # a shard has whole chunks
+    chunk = max(1, CHUNK_POINTS // math.prod(sizes))
+    shard = chunk * (SHARD_POINTS // CHUNK_POINTS)
+    return _Array(
+        (f"{dim}_shard", f"{dim}_row", *names),
+        (grid.shards, MOST_ROWS, *sizes),
+        (1, chunk, *sizes),
+        (1, shard, *sizes),
+        dtype,
+        attrs,
+    )
 
 
 def _of_shards(dim: str, grid: StoreGrid, attrs: Mapping[str, Any]) -> _Array:
@@ -470,6 +488,11 @@ def _keys(array: Any, block: Block) -> list[str]:
 def grid_of(run_id: Any) -> StoreGrid:
     """Return the cells of a store, from the array that has a number for each."""
     return StoreGrid(dims_of(run_id), run_id.shape, run_id.chunks, run_id.shards or run_id.chunks)
+
+
+def _is_along(array: Any, dim: str) -> bool:
+    """Return whether an array has the rows of a ragged dimension."""
+    return dims_of(array)[:2] == (f"{dim}_shard", f"{dim}_row")
 
 
 def _is_of_rows(dims: tuple[str, ...]) -> bool:

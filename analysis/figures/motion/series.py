@@ -54,12 +54,28 @@ _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
 
 def sampled_variables(dataset: xr.Dataset) -> list[str]:
-    """Return the names of the sampled variables."""
+    """Return the names of the sampled variables that are one number for each sample."""
+    return [
+        name
+        for name in _all_sampled(dataset)
+        if dataset.variables[name].ndim == 1 and dataset.variables[name].dtype.kind in "fiu"
+    ]
+
+
+def _all_sampled(dataset: xr.Dataset) -> list[str]:
     return [
         str(name)
         for name, variable in dataset.variables.items()
-        if variable.dims in (("sample",), ("time",)) and name not in RULES and name != "sample_run"
+        if variable.dims[:1] in (("sample",), ("time",)) and name not in RULES and name != "sample_run"
     ]
+
+
+def left_out(dataset: xr.Dataset) -> str:
+    """Return the sampled arrays and texts, which no figure draws, in words; empty without any."""
+    drawn = sampled_variables(dataset)
+    names = [name for name in _all_sampled(dataset) if name not in drawn]
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f", without {', '.join(names[:3])}{more} (arrays, texts)" if names else ""
 
 
 def draw_series(dataset: xr.Dataset, view: View) -> Figure:
@@ -69,6 +85,7 @@ def draw_series(dataset: xr.Dataset, view: View) -> Figure:
     """
     samples = dataset.vibroimpact.samples(**selected(view.run))
     part, words = time_part(dataset, samples, view.window)
+    words += left_out(samples)
     time = samples["time"].values
     samples = samples.isel(time=(time >= part[0]) & (time <= part[1]))
     panels: dict[tuple[str, str], list[xr.DataArray]] = {}

@@ -1,8 +1,11 @@
-"""One connection of an algebraic loop: a number that is written to an input and read from an output."""
+"""One number of an algebraic loop, written to an input and read from an output: a connection, or an element of it."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
+
+from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import Component, kind_of
 from vibroimpact.orchestrator.importer.feedthrough import connection_name
@@ -17,12 +20,23 @@ DIFFERENCE, SINGLE_DIFFERENCE = -20, -10
 
 
 class Link:
-    """A connection of a loop, moved alone.
+    """A connection of a loop, moved alone, or one element of a connection of arrays.
+
+    Parameters
+    ----------
+    transfer : Transfer
+        Moves the connection alone.
+    element : int
+        Place of the element in the array; 0 for a single number.
+    written : ndarray
+        The values written last, which all elements of a connection share.
 
     Attributes
     ----------
     name : str
-        `component.output -> component.input`.
+        `component.output -> component.input`, with the number of the element.
+    is_element : bool
+        The connection is one of arrays.
     is_real : bool
         Both sides are real numbers without a clock.
     tolerance : float
@@ -33,11 +47,13 @@ class Link:
         Declared nominal value of the input or, over the gain, of the output; 0: none is declared.
     """
 
-    def __init__(self, transfer: Transfer) -> None:
+    def __init__(self, transfer: Transfer, element: int, written: NDArray[Any]) -> None:
         self.transfer = transfer
+        self._element, self._written = element, written
         self.source, self.target = transfer.source, transfer.target
         (self.connection,) = transfer.connections
-        self.name = connection_name(self.connection)
+        self.is_element = self.connection.source[1] in self.source.shapes
+        self.name = connection_name(self.connection) + (f" [{element + 1}]" if self.is_element else "")
         ends = ((self.source, self.connection.source[1]), (self.target, self.connection.target[1]))
         kinds = [kind_of(component.variables[name]) for component, name in ends]
         clocks = [component.clocks_of(name) for component, name in ends]
@@ -55,6 +71,11 @@ class Link:
         return value if math.isfinite(value) else 0.0
 
     @property
+    def output(self) -> object:
+        """The number that the link reads."""
+        return self.connection.source, self._element
+
+    @property
     def gain(self) -> float:
         """Present gain of the connection."""
         return self.transfer.gain_of(self.connection)
@@ -62,11 +83,15 @@ class Link:
     def start(self) -> float:
         """Return the present value of the input; NaN where its FMU discards the call."""
         group = self.transfer.write
-        return float(group.values[0]) if group.try_get() else math.nan
+        if not group.try_get():
+            return math.nan
+        self._written[:] = group.values
+        return float(self._written[self._element])
 
     def write(self, value: float) -> bool:
         """Write the input; returns whether its FMU has taken the value (it may discard it)."""
-        self.transfer.write.values[0] = value
+        self._written[self._element] = value
+        self.transfer.write.values[:] = self._written
         return self.transfer.write.try_set()
 
     def read(self) -> float:
@@ -76,7 +101,7 @@ class Link:
             return math.nan
         if transfer.convert is not None:
             transfer.convert()
-        return float(transfer.write.values[0])
+        return float(transfer.write.values[self._element])
 
     def near(self, value: float, size: float, side: float) -> float:
         """Return a value near another one, on one side (1 or -1); `size` is a size of values that are not small."""

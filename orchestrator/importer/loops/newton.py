@@ -308,7 +308,7 @@ def _joined(links: Sequence[Link]) -> tuple[NDArray[np.intp], Floats]:
     """
     groups: dict[object, list[int]] = {}
     for i, link in enumerate(links):
-        groups.setdefault(link.connection.source if link.is_real else i, []).append(i)
+        groups.setdefault(link.output if link.is_real else i, []).append(i)
     first = [max(group, key=lambda i: abs(links[i].gain)) for group in groups.values()]
     ratios = np.zeros((len(links), len(first)))
     for k, group in enumerate(groups.values()):

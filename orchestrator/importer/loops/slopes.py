@@ -65,7 +65,8 @@ class Slopes:
         if component.name not in self._gives:
             self._gives[component.name] = gives_derivatives(component.instance.fmu.folder)
         given = None
-        if self._gives[component.name]:
+        # a derivative of an array has all of its elements
+        if self._gives[component.name] and not any(links[i].is_element for i in (j, *rows)):
             given = self._derivatives(links, [i for i in rows if j in depends[i]], j)
         compared = (links[j].name, *(links[i].name for i in rows))
         if given is not None and compared not in self._compared:

@@ -54,7 +54,7 @@ class LoopSolver:
     ) -> None:
         self._connections, self._components = list(connections), components
         self._main = transfers
-        self._links: dict[int, Link] = {}
+        self._links: dict[int, tuple[Link, ...]] = {}
         self._slopes = Slopes()
         self._made: dict[tuple[tuple[int, ...], tuple[frozenset[int], ...]], Loop] = {}
         self._declared = declared_graph(self._connections, components)
@@ -67,7 +67,7 @@ class LoopSolver:
     @property
     def transfers(self) -> list[Transfer]:
         """The transfers that loops use, one for each connection."""
-        return [link.transfer for link in self._links.values()]
+        return [links[0].transfer for links in self._links.values()]
 
     @property
     def residual(self) -> float:
@@ -177,19 +177,22 @@ class LoopSolver:
         members = loops_of(graph)
         carried = between(graph, members)
         return [
-            (self._loop(loop, allowed), [self._link(i).transfer for i in more])
+            (self._loop(loop, allowed), [self._elements(i)[0].transfer for i in more])
             for loop, more in zip(members, carried, strict=True)
         ]
 
     def _loop(self, members: tuple[int, ...], allowed: Graph) -> Loop:
-        depends = tuple(frozenset(k for k, j in enumerate(members) if j in allowed[i]) for i in members)
+        elements = [(i, link) for i in members for link in self._elements(i)]
+        depends = tuple(
+            frozenset(k for k, (j, _) in enumerate(elements) if j in allowed[i]) for i, _ in elements
+        )
         key = (members, depends)
         if key not in self._made:
-            self._made[key] = Loop([self._link(i) for i in members], depends, self._slopes)
+            self._made[key] = Loop([link for _, link in elements], depends, self._slopes)
         return self._made[key]
 
-    def _link(self, i: int) -> Link:
-        """Return the link of a connection, with its present gain."""
+    def _elements(self, i: int) -> tuple[Link, ...]:
+        """Return the links of a connection, with its present gain: one for each element of an array."""
         if i not in self._links:
             connection = self._connections[i]
             source, target = (self._components[end[0]] for end in (connection.source, connection.target))
@@ -197,7 +200,8 @@ class LoopSolver:
             for main in self._main:
                 if main.carries(connection) and main.gain_of(connection) != connection.gain:
                     transfer.set_gain(connection, main.gain_of(connection))
-            self._links[i] = Link(transfer)
+            written = transfer.write.values.copy()
+            self._links[i] = tuple(Link(transfer, k, written) for k in range(written.size))
         return self._links[i]
 
     # ---- dependences that no list declares ----
@@ -227,22 +231,22 @@ class LoopSolver:
 
     def _responding(self, j: int, rows: Sequence[int]) -> list[int]:
         """Return the connections, among those given, whose output changes with the input of connection `j`."""
-        link = self._link(j)
-        links = [self._link(i) for i in rows]
-        if not (link.is_real and links):
-            return []
-        x = link.start()
-        before = [other.read() for other in links]
-        if not (math.isfinite(x) and link.write(link.near(x, 0.0, 1.0))):
-            return []
-        after = [other.read() for other in links]
-        link.write(x)
-        again = [other.read() for other in links]
-        return [
-            i
-            for i, a, b, c in zip(rows, before, after, again, strict=True)
-            if a == c and math.isfinite(b) and b != a
-        ]
+        links = [(i, link) for i in rows for link in self._elements(i)]
+        responding: dict[int, None] = {}
+        for link in self._elements(j) if links else ():
+            x = link.start()
+            before = [other.read() for _, other in links]
+            if not (link.is_real and math.isfinite(x) and link.write(link.near(x, 0.0, 1.0))):
+                continue
+            after = [other.read() for _, other in links]
+            link.write(x)
+            again = [other.read() for _, other in links]
+            responding |= {
+                i: None
+                for (i, _), a, b, c in zip(links, before, after, again, strict=True)
+                if a == c and math.isfinite(b) and b != a
+            }
+        return list(responding)
 
 
 def _targets(loops: Sequence[tuple[Loop, Sequence[Transfer]]]) -> set[tuple[str, str]]:

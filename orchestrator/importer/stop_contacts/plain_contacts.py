@@ -144,6 +144,7 @@ class ForceThatBegins:
         at_a_port = f"{target.rpartition('.')[0]}.law" in components[body].variables
         return (
             not at_a_port
+            and output not in components[source].shapes
             and ANSWER not in components[source].variables
             and _unit(components[source], output) == "N"
             and any(_unit(components[source], c.target[1]) == "m" for c in inward)

@@ -6,6 +6,7 @@ are therefore not checked.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 
@@ -16,6 +17,7 @@ from vibroimpact.fmus.units import (
     parse_unit,
     product_agrees,
 )
+from vibroimpact.orchestrator.scene.array_values import MOST_ELEMENTS, shape_words
 from vibroimpact.orchestrator.scene.component_facts import (
     NUMERIC_KINDS,
     VariableFacts,
@@ -37,6 +39,7 @@ ANSWERS = ("applied_restitution", "applied_force")
 PORT = "contact["
 """Beginning of the variables of a contact: its energy is computed without offsets."""
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
+RECORDED_KINDS = (*NUMERIC_KINDS, "text")
 _NUMBERED = {"integer", "enumeration"}
 """Kinds that feed one another: an item of an enumeration is passed on as its number."""
 
@@ -84,6 +87,7 @@ def _connections_join_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
         yield from gain_problem
         source, target = draft.variable(connection.source), draft.variable(connection.target)
         if source and target and not any(wrong):
+            yield from _shape_problems(draft, connection, place)
             yield from _type_problems(connection, place, source, target)
             if not gain_problem and not _is_without_units(draft, source, target):
                 yield from _unit_problems(connection, place, gain, source, target)
@@ -113,9 +117,19 @@ def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> P
         return Problem(where, "an output, a local variable or a parameter", got, hint)
     if variable.kind == "clock":
         return _clock_problem(draft, where, end, reference)
-    if variable.kind not in NUMERIC_KINDS or not variable.scalar:
-        return Problem(where, "a number, or true or false", f"the {variable.shape} {reference}")
-    return None
+    if variable.kind not in NUMERIC_KINDS:
+        return Problem(where, "numbers, or true or false", f"the {variable.shape} {reference}")
+    return _size_problem(draft, where, reference)
+
+
+def _size_problem(draft: GeneralDraft, where: str, reference: str) -> Problem | None:
+    """Return the problem of an array of too many elements, or of none."""
+    shape = draft.shape(reference)
+    if 0 < math.prod(shape) <= MOST_ELEMENTS:
+        return None
+    return Problem(
+        where, f"an array of 1 to {MOST_ELEMENTS} elements", f"{reference} of {shape_words(shape)}"
+    )
 
 
 def _clock_problem(draft: GeneralDraft, where: str, end: str, reference: str) -> Problem | None:
@@ -139,6 +153,14 @@ def _gain_unit(connection: ConnectionTable, place: int) -> tuple[Unit | None, li
     hint = "Join symbols by dots, write exponents directly behind them, divide by one symbol or parenthesis."
     expected = 'a product of SI units such as "N.s/m", "kg.m2/s2" or "1"'
     return None, [Problem(where, expected, quoted(connection.gain_unit), hint)]
+
+
+def _shape_problems(draft: GeneralDraft, connection: ConnectionTable, place: int) -> Iterator[Problem]:
+    ends = connection.source, connection.target
+    shapes = [draft.shape(end) for end in ends]
+    if shapes[0] != shapes[1]:
+        got = " to ".join(f"{shape_words(shape)} ({end})" for shape, end in zip(shapes, ends, strict=True))
+        yield Problem(key_path(("connection", place)), "two variables of one shape", got)
 
 
 def _type_problems(
@@ -246,8 +268,13 @@ def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
         elif dataset_name(reference) in map(dataset_name, record.variables[:place]):
             hint = f"It would be a second {dataset_name(reference)} in the dataset."
             yield Problem(where, "each variable once", quoted(reference), hint)
-        elif variable and (variable.kind not in NUMERIC_KINDS or not variable.scalar):
-            yield Problem(where, "a variable that is one number", f"the {variable.shape} {reference}")
+        elif variable and variable.kind not in RECORDED_KINDS:
+            hint = "It is passed to no dataset in this version: take it out."
+            yield Problem(
+                where, "numbers, true or false, or texts", f"the {variable.shape} {reference}", hint
+            )
+        elif variable and (problem := _size_problem(draft, where, reference)):
+            yield problem
     if record.variables and record.rate is None:
         hint = "Add rate = ... to [record]: samples per unit of time."
         yield Problem("record.rate", "a number > 0 beside variables", "nothing", hint)
@@ -258,7 +285,10 @@ def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
 
 def _samples_fit(draft: GeneralDraft) -> Iterator[Problem]:
     if draft.record and draft.record.rate is not None:
-        yield from sample_problems("record.rate", draft.record.rate * draft.record.recorded_time, "time")
+        known = [name for name in draft.record.variables if draft.variable(name)]
+        elements = max((math.prod(draft.shape(name)) for name in known), default=1)
+        samples = draft.record.rate * draft.record.recorded_time * elements
+        yield from sample_problems("record.rate", samples, "time")
 
 
 def _runs_coupled(draft: GeneralDraft) -> Iterator[Problem]:

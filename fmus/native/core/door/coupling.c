@@ -26,6 +26,9 @@ static int scale(const vi_coupling_call *c)
     double *values = c->values;
     for (size_t i = 0; i < c->value_count; ++i) {
         values[i] = c->from[i] * c->gains[i];
+        if (c->offsets != NULL) {
+            values[i] += c->offsets[i];
+        }
     }
     return 0;
 }

@@ -30,7 +30,7 @@ enum {
     VI_CALL_MOVE3 = 1,   /* a read or a write, FMI 3.0 */
     VI_CALL_MOVE2 = 2,   /* a read or a write, FMI 2.0 */
     VI_CALL_UPDATE = 3,  /* fmi3UpdateDiscreteStates; `values` are the decisions */
-    VI_CALL_SCALE = 4,   /* no call: values = from * gains */
+    VI_CALL_SCALE = 4,   /* no call: values = from * gains + offsets */
     VI_CALL_SAVE = 5,    /* save the state into the slot `values` */
     VI_CALL_RESTORE = 6, /* restore the state from it */
     VI_CALL_STEP3 = 7,
@@ -55,7 +55,7 @@ typedef struct {
     size_t count;
     void *values; /* [value_count] */
     size_t value_count;
-    const double *from, *gains; /* [value_count] */
+    const double *from, *gains, *offsets; /* [value_count]; without offsets NULL */
     int64_t note;               /* number noted before the call */
     int32_t kind, place;        /* one of VI_CALL_*; the importer's number of the call */
 } vi_coupling_call;

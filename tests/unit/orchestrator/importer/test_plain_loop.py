@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,7 +96,8 @@ def test_structures_with_several_stops_move_as_step_by_step(scene: BodyScene, ve
     assert len(run.events) > 10
 
 
-def test_values_with_gains_and_of_other_tools_move_as_step_by_step(folder: Path) -> None:
+@pytest.mark.parametrize("offset", [0.0, -0.25])
+def test_values_with_gains_and_of_other_tools_move_as_step_by_step(folder: Path, offset: float) -> None:
     # the ball has no event mode and rests on the ground; the gain has no states; the stepped ball ends early
     parts = [body("b", {**P11, **external(1.0)}), part("ball", fmu_factory.bouncing_ball(folder, "3.0"))]
     parts += [
@@ -103,6 +105,7 @@ def test_values_with_gains_and_of_other_tools_move_as_step_by_step(folder: Path)
         part("stepped", fmu_factory.stepped_ball(folder)),
     ]
     links = [link("b.displacement", "mass.f", -0.3), link("mass.x", "b.force", 0.1)]
+    links[0] = replace(links[0], offset=offset)
     both(parts, links, 7.0, 20.0, macro_step=0.1)
 
 
