@@ -73,7 +73,9 @@ class ServedInstance:
         }
         if self._is_3:
             clock = {"GetIntervalDecimal": (c_double, c_int), "GetShiftDecimal": (c_double,)}
-            self._others |= {name: lambda call, kinds=kinds: self._clock(call, *kinds) for name, kinds in clock.items()}
+            self._others |= {
+                name: lambda call, kinds=kinds: self._clock(call, *kinds) for name, kinds in clock.items()
+            }
 
     def answer(self, data: bytes) -> tuple[bytes, bool]:
         """Make the calls of a batch up to the first that fails; return the answer, and whether others may follow."""
@@ -134,7 +136,12 @@ class ServedInstance:
         try:
             if self._is_3:
                 self._instance = Instance3(
-                    self._fmu, name, event_mode=flags[0], early_return=flags[1], log=self._log, wrap=self._wrap
+                    self._fmu,
+                    name,
+                    event_mode=flags[0],
+                    early_return=flags[1],
+                    log=self._log,
+                    wrap=self._wrap,
                 )
             else:
                 self._instance = Instance2(self._fmu, name, log=self._log, wrap=self._wrap)
@@ -151,7 +158,8 @@ class ServedInstance:
         if len(numbers) != len(given) or not all(abs(number) < 2.0**31 for number in whole):
             raise Refused(f"{call.function}: expected {len(given)} numbers, got others.")
         arguments = [
-            CODES[code](number if code == "d" else int(number)) for code, number in zip(given, numbers, strict=True)
+            CODES[code](number if code == "d" else int(number))
+            for code, number in zip(given, numbers, strict=True)
         ]
         results = [CODES[code](math.nan if code == "d" else 0) for code in returned]
         status = self._call(call, *arguments, *map(ctypes.byref, results))

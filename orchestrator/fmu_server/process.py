@@ -18,7 +18,7 @@ from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.orchestrator.fmu_server.child import NOTES_SIZE, Notes
 
 SUPERVISOR = "vibroimpact.orchestrator.guard.supervisor"
-"""Module that starts the child and ends whatever an FMU has started; by name, as the server needs nothing else of it."""
+"""Module that starts the child and ends whatever an FMU has started."""
 CHILD = "vibroimpact.orchestrator.fmu_server.child"
 END_SECONDS = 10.0
 """Longest time for a process to end, s: longer than its supervisor takes to kill all processes of an FMU."""

@@ -131,7 +131,9 @@ class FmuServer:
         except RuntimeError:
             port = 0
         if not port:
-            raise UsageError(f"--listen: expected an address of this machine with a free port, got {address}.")
+            raise UsageError(
+                f"--listen: expected an address of this machine with a free port, got {address}."
+            )
         return int(port)
 
     def wait(self) -> None:

@@ -1,9 +1,9 @@
 """A process between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
 
 It is started as `python -m` with the descriptor of the bell (`pipe`), and forks before any large import. The fork runs
-the points (`child`), or the function `main` of a module named as second argument, in a process group of its own. The supervisor runs no code of an FMU, so none can crash it. It
-kills all remaining processes if the fork ends, or if the guard closes its pipe, dies, or sends SIGTERM. Then it ends
-as the fork has ended.
+the points (`child`), or `main` of the module that a second argument names, in a process group of its own. The
+supervisor runs no code of an FMU, so none can crash it. It kills all remaining processes if the fork ends, or if the
+guard closes its pipe, dies, or sends SIGTERM. Then it ends as the fork has ended.
 
 On Linux it is the reaper of its descendants: processes that left the group (setsid) come back to it. Elsewhere it
 knows only the process group.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.component import Component
@@ -53,15 +54,19 @@ def parts_of(
 ) -> Parts:
     """Return the parts for the arguments of an `Importer`; components are instantiated."""
     watched = {event.component for event in events}
-    named = {
-        spec.name: Component(
-            spec,
-            log=log(spec.name) if log else None,
-            wrap=wrap(spec.name) if wrap else None,
-            events=spec.name not in watched,
-        )
-        for spec in specs
-    }
+    named: dict[str, Component] = {}
+    try:
+        for spec in specs:
+            named[spec.name] = Component(
+                spec,
+                log=log(spec.name) if log else None,
+                wrap=wrap(spec.name) if wrap else None,
+                events=spec.name not in watched,
+            )
+    except ComponentError:
+        for component in named.values():
+            component.free()
+        raise
     watches = [Watch(named[event.component], event) for event in events]
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
     tuned = [c for c in connections if is_tunable(c, named)]

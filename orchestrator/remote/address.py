@@ -17,7 +17,9 @@ TOKENS_VARIABLE = "VIBROIMPACT_FMU_TOKENS"
 """Environment variable of tokens: `HOST:PORT=TOKEN`, several divided by blanks."""
 FOLDER = "fmu-servers"
 #: A name or an address of a host, in brackets if it has colons, and a port.
-_PLACE = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9]([A-Za-z0-9.\-]{0,252}[A-Za-z0-9])?):([0-9]{1,5})", re.ASCII)
+_PLACE = re.compile(
+    r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9]([A-Za-z0-9.\-]{0,252}[A-Za-z0-9])?):([0-9]{1,5})", re.ASCII
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,7 +67,9 @@ def open_channel(address: Address, certificate: Path | None) -> Any:
     try:
         roots = certificate.read_bytes()
     except OSError as error:
-        raise ComponentFileError(f"{certificate}: expected a certificate (PEM), got {error.strerror}.") from error
+        raise ComponentFileError(
+            f"{certificate}: expected a certificate (PEM), got {error.strerror}."
+        ) from error
     if b"-----BEGIN CERTIFICATE-----" not in roots:
         raise ComponentFileError(f"{certificate}: expected a certificate (PEM), got a file without one.")
     return grpc.secure_channel(str(address), grpc.ssl_channel_credentials(roots), options=OPTIONS)

@@ -66,7 +66,9 @@ def described_fmu(server: FmuServer, known: Path) -> Path:
 def _described(address: Address, certificate: Path | None) -> Any:
     end = time.monotonic() + CONNECT_SECONDS
     with open_channel(address, certificate) as channel:
-        call = channel.unary_unary(DESCRIBE, lambda message: message.SerializeToString(), Description.FromString)
+        call = channel.unary_unary(
+            DESCRIBE, lambda message: message.SerializeToString(), Description.FromString
+        )
         metadata = metadata_for(address)
         while True:
             try:

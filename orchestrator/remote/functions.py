@@ -1,7 +1,7 @@
 """The functions of an FMU elsewhere: they take the arguments of the C functions, as prebound ctypes objects.
 
-Calls without results wait for the next call with one, and go with it. Values that were read after the last step are
-taken along by the next step. So a step with its inputs and outputs is one batch, mostly.
+Calls without results wait for the next call with one, and go with it. Values that were read after a batch are read
+along with the next batch of the same functions. So a step with its inputs and outputs is one batch, mostly.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from vibroimpact.orchestrator.remote.protocol import CODES, SCALARS, STATE_WORDS
 
 OK, WARNING = 0, 1
 #: Functions without results besides their status, which wait for the next call.
-WAITING = ("SetupExperiment", "EnterInitializationMode", "EnterEventMode", "EnterStepMode", "SetString", "SetClock")
+WAITING = (
+    "SetupExperiment",
+    "EnterInitializationMode",
+    "EnterEventMode",
+    "EnterStepMode",
+    "SetString",
+    "SetClock",
+)
+STEPPING, NOT_STEPPING = ("DoStep", "EnterStepMode"), ("EnterInitializationMode", "EnterEventMode", "Reset")
 Send = Callable[[list[Any]], Any]
 
 
@@ -43,7 +51,10 @@ class RemoteFunctions:
         self._waiting: list[Any] = []
         self._slots = 0
         self._read: dict[bytes, Any] = {}  # results of reading calls that are still valid
-        self._used: dict[bytes, Any] = {}  # reading calls since the last step
+        self._follow: dict[tuple[str, ...], dict[bytes, Any]] = {}  # reading calls that followed a batch
+        self._following: dict[bytes, Any] = {}  # those since the last batch, up to a change
+        self._has_changed = False  # a call waits that may change values
+        self._is_stepping = False  # neither an event nor initialization goes on, in which more can be read
         self._at_once = False
 
     @contextmanager
@@ -82,57 +93,69 @@ class RemoteFunctions:
     def _later(self, call: Any) -> int:
         """Let a call wait, which may change values; returns its status if it must be known at once."""
         self._read.clear()
+        self._has_changed = True
         self._waiting.append(call)
         return self._flushed([]).status if self._at_once else OK
 
     def _flushed(self, more: list[Any]) -> Any:
-        """Send the waiting calls and further ones; return the result of the first of these, else of the last."""
-        waiting, self._waiting = self._waiting, []
-        results = self._send([*waiting, *more])
-        must = len(waiting) - (0 if more else 1)
-        if len(results) <= must:  # a call that has waited was the last to be made
-            failed = results[-1]
-            self._refuse(failed.status, waiting[len(results) - 1].function)
-        for call, result in zip(more[1:], results[must + 1 :], strict=False):
-            self._read[call.SerializeToString()] = result
-        return results[must]
+        """Send the waiting calls, perhaps another, and reading calls that will follow; return the last one's result."""
+        waiting, self._waiting, self._has_changed = self._waiting, [], False
+        calls = [*waiting, *more]
+        batch = tuple(call.function for call in calls)
+        own = more[0].SerializeToString() if more else b""
+        follow = self._follow.get(batch, {}) if self._is_stepping else {}
+        reads = [(key, call) for key, call in follow.items() if key != own]
+        self._following = self._follow[batch] = {}
+        results = self._send([*calls, *(call for _, call in reads)])
+        last = len(calls) - 1
+        if len(results) <= last:  # a call that has waited failed, and was the last to be made
+            failed = len(results) - 1
+            self._refuse(results[failed].status, calls[failed].function)
+        for (key, _), result in zip(reads, results[last + 1 :], strict=False):
+            self._read[key] = result
+        return results[last]
 
-    def _now(self, call: Any, *, with_reads: bool = False) -> Any:
-        """Send a call, which changes values, and return its result; `with_reads` reads values after it."""
+    def _now(self, call: Any) -> Any:
+        """Send a call that changes values, and return its result."""
         self._read.clear()
-        reads = list(self._used.values()) if with_reads else []
-        self._used = {}
-        return self._flushed([call, *reads])
+        return self._flushed([call])
 
     # ---- kinds of functions ----
 
     def _call_scalars(self, name: str, given: str, returned: str, _: Any, *arguments: Any) -> int:
         call = Call(function=name, numbers=[argument.value for argument in arguments[: len(given)]])
+        self._is_stepping = (self._is_stepping or name in STEPPING) and name not in NOT_STEPPING
         if name in WAITING:
             return self._later(call)
-        result = self._now(call, with_reads=name == "DoStep")
+        result = self._now(call)
         if result.numbers:
             for code, place, number in zip(returned, arguments[len(given) :], result.numbers, strict=True):
                 place._obj.value = number if code == "d" else int(number)
         return int(result.status)
 
-    def _get(self, name: str, kind: Any, _: Any, places: Any, count: Any, address: Any, size: Any = None) -> int:
+    def _get(
+        self, name: str, kind: Any, _: Any, places: Any, count: Any, address: Any, size: Any = None
+    ) -> int:
         length = (count if size is None else size).value
         call = Call(function=name, references=_references(places, count), size=length)
         key = call.SerializeToString()
-        self._used[key] = call
+        if self._is_stepping and not self._has_changed:
+            self._following[key] = call
         result = self._read.get(key)
         if result is None:
-            result = self._flushed([call])
-            self._read[key] = result
+            result = self._read[key] = self._flushed([call])
         if result.status <= WARNING:
             _copy(address, result.values, length * ctypes.sizeof(kind))
         return int(result.status)
 
-    def _set(self, name: str, kind: Any, _: Any, places: Any, count: Any, address: Any, size: Any = None) -> int:
+    def _set(
+        self, name: str, kind: Any, _: Any, places: Any, count: Any, address: Any, size: Any = None
+    ) -> int:
         length = (count if size is None else size).value
         values = ctypes.string_at(address.value, length * ctypes.sizeof(kind)) if length else b""
-        return self._later(Call(function=name, references=_references(places, count), size=length, values=values))
+        return self._later(
+            Call(function=name, references=_references(places, count), size=length, values=values)
+        )
 
     def _set_string(self, _: Any, place: Any, count: Any, texts: Any, *size: Any) -> int:
         given = [text.decode() for text in texts]
@@ -193,6 +216,8 @@ def _references(places: Any, count: Any) -> list[int]:
 def _copy(address: Any, values: bytes, size: int) -> None:
     """Copy values into a buffer of `size` bytes; raise ComponentFileError for another number of bytes."""
     if len(values) != size:
-        raise ComponentFileError(f"an answer of a server: expected {size} bytes of values, got {len(values)}.")
+        raise ComponentFileError(
+            f"an answer of a server: expected {size} bytes of values, got {len(values)}."
+        )
     if size:
         ctypes.memmove(address.value, values, size)

@@ -62,7 +62,9 @@ class _Remote(Instance):
         self._pointer.value = 1  # not NULL: it exists
 
     def _send(self, calls: list[Any]) -> Any:
-        function = next((c.function for c in reversed(calls) if not c.function.startswith("Get")), calls[-1].function)
+        function = next(
+            (c.function for c in reversed(calls) if not c.function.startswith("Get")), calls[-1].function
+        )
         if not self._session.is_open:
             self.fail(function, f"was called without a connection to {SCHEME}{self._server.address}")
         answer = self._session.ask(calls, self.prefix + function, self.time)
@@ -75,7 +77,9 @@ class _Remote(Instance):
         if answer.refusal or not 1 <= len(answer.results) <= most:
             self._session.close()
             got = answer.refusal or f"{len(answer.results)} results of {most} calls"
-            raise ComponentFileError(f"{self.name}: expected an answer of {SCHEME}{self._server.address}, got {got}.")
+            raise ComponentFileError(
+                f"{self.name}: expected an answer of {SCHEME}{self._server.address}, got {got}."
+            )
         return answer.results
 
     def _refuse_waiting(self, status: int, function: str) -> None:

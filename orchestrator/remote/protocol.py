@@ -14,7 +14,9 @@ A batch has all calls of one step: the inputs, the step, the outputs. The messag
     }
     message Batch { repeated Call calls = 1; }
     message Result { sint32 status = 1; bytes values = 2; repeated double numbers = 3; }
-    message Answer { repeated Result results = 1; repeated string log = 2; bool changed_rounding = 3; string refusal = 4; }
+    message Answer {
+      repeated Result results = 1; repeated string log = 2; bool changed_rounding = 3; string refusal = 4;
+    }
     message Description { string version = 1; string name = 2; string sha256 = 3; bytes xml = 4; }
     service Fmu { rpc Describe(Batch) returns (Description); rpc Run(stream Batch) returns (stream Answer); }
 
@@ -69,7 +71,9 @@ SCALARS: Mapping[str, Mapping[str, tuple[str, str]]] = {
     },
 }
 CODES: Mapping[str, Any] = {"d": ctypes.c_double, "i": ctypes.c_int, "?": ctypes.c_bool}
-_WHOLE = {f"{u}Int{bits}": getattr(ctypes, f"c_{u.lower()}int{bits}") for u in ("", "U") for bits in (8, 16, 32, 64)}
+_WHOLE = {
+    f"{u}Int{bits}": getattr(ctypes, f"c_{u.lower()}int{bits}") for u in ("", "U") for bits in (8, 16, 32, 64)
+}
 #: C types of the values of the functions Get... and Set..., by FMI's name of the type.
 VALUES: Mapping[str, Mapping[str, Any]] = {
     "3.0": {"Float64": ctypes.c_double, "Float32": ctypes.c_float, "Boolean": ctypes.c_bool, **_WHOLE},
@@ -98,7 +102,9 @@ _FIELDS: Mapping[str, tuple[str, ...]] = {
 
 def _file() -> Any:
     kinds = descriptor_pb2.FieldDescriptorProto
-    file = descriptor_pb2.FileDescriptorProto(name="vibroimpact_fmu.proto", package="vibroimpact", syntax="proto3")
+    file = descriptor_pb2.FileDescriptorProto(
+        name="vibroimpact_fmu.proto", package="vibroimpact", syntax="proto3"
+    )
     for name, fields in _FIELDS.items():
         message = file.message_type.add(name=name)
         for number, field in enumerate(fields, start=1):
